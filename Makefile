@@ -1,0 +1,80 @@
+# The two commands: `make demo` and `make test`. Both start from nothing.
+SHELL := /bin/bash
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUN_STAMP := $(VENV)/.installed
+DEV_STAMP := $(VENV)/.installed-dev
+SYSTEM_STAMP := $(VENV)/.installed-system
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_ROOT_USER_ACTION := ignore
+
+.PHONY: demo gui test check fast reports screenshots clean help
+
+help:
+	@echo "make demo         install, run the paper's experiment on the simulated bench"
+	@echo "make gui          install, open the bench window"
+	@echo "make test         install what tests need, run every check and test"
+	@echo "make fast         the unit tests alone"
+	@echo "make reports      the long campaigns; rewrites the tables in docs/"
+	@echo "make screenshots  pictures of the window and of the demo's figure for docs/"
+	@echo "make clean        remove the environment and caches; runs/ is kept"
+
+demo: $(RUN_STAMP)
+	$(BIN)/tactile-lab run
+
+gui: $(DEV_STAMP)
+	$(BIN)/tactile-lab gui
+
+test: $(DEV_STAMP) $(SYSTEM_STAMP)
+	$(MAKE) --no-print-directory check
+	# fill the cache of compiled code once, or each worker compiles for itself
+	$(BIN)/tactile-lab simulate >/dev/null
+	$(BIN)/python -m pytest -n auto --dist loadfile
+
+check: $(DEV_STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+fast: $(DEV_STAMP)
+	$(BIN)/python -m pytest -x -q -m "not campaign" --ignore tests/gui
+
+# hours on two cores, alone on the machine; every table states commit and date
+reports: $(DEV_STAMP)
+	$(BIN)/tactile-lab accuracy --campaign 1000 --out docs
+	$(BIN)/tactile-lab stability --out docs
+	$(BIN)/python docs/make_fit_recovery.py
+	$(BIN)/python docs/make_paper.py
+	$(BIN)/python tests/benchmarks/spike_detection.py --out docs/detection-figures.md
+	$(BIN)/python tests/benchmarks/store_speed.py --out docs/store-figures.md
+	$(BIN)/python tests/benchmarks/kill_store.py --kills 200 --out docs/kill-figures.md
+	$(BIN)/python tests/benchmarks/sustained.py --out docs/streaming-figures.md
+	$(BIN)/python tests/benchmarks/serial_bench.py --out docs/serial-figures.md
+
+screenshots: $(DEV_STAMP)
+	$(BIN)/python -m gui.screenshots docs/pictures
+	$(BIN)/tactile-lab run --out $$(mktemp -d) --json | \
+	    $(BIN)/python -c 'import json, shutil, sys; from pathlib import Path; shutil.copy(Path(json.load(sys.stdin)["report"]).with_name("figure.png"), "docs/pictures/demo.png")'
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@.ci/venv $(PYTHON) $(VENV)
+
+$(RUN_STAMP): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install -q --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install -q -e .
+	@touch $@
+
+$(DEV_STAMP): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install -q --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install -q -e ".[gui]" --group dev
+	@touch $@ $(RUN_STAMP)
+
+$(SYSTEM_STAMP): .ci/system-packages | $(BIN)/python
+	@.ci/install-system-packages
+	@touch $@
