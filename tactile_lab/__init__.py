@@ -1,0 +1,1 @@
+"""The nouns and the one loop: no Qt, no wires, no simulated instruments."""

@@ -1,0 +1,306 @@
+"""The bench as the rest of the program sees it: three small instrument interfaces.
+
+Drivers implement them; nothing here knows a wire. Each instrument is used by one
+thread only, the one that opened it. All values are SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.clock import Clock
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoilLimits:
+    """What the coil and its source may be asked to do.
+
+    Attributes:
+        current: largest magnitude, A.
+        slew: largest rate of change, A/s.
+        compliance: voltage limit of the source, V.
+        continuous: current that may flow for ever, A.
+        heat: budget of the leaky integral of I^2 above `continuous`^2, A^2 s.
+        recovery: time constant with which the heat integral falls, s.
+        resistance: coil resistance at 20 C, Ohm; None until measured.
+    """
+
+    current: float = 2.0
+    slew: float = 5.0
+    compliance: float = 14.0
+    continuous: float = 0.6
+    heat: float = 30.0
+    recovery: float = 60.0
+    resistance: float | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One value an instrument reported, with the clock's time of its arrival, s."""
+
+    time: float
+    value: float
+
+
+@dataclass(frozen=True)
+class OffReport:
+    """How a `safe_off` ended.
+
+    Attributes:
+        verified: the read-back showed 0 A and the output off.
+        current: current read back, A; None if it could not be read.
+        text: what happened, for a person.
+    """
+
+    verified: bool
+    current: float | None
+    text: str
+
+
+class Coil(Protocol):
+    """A current source that drives the electromagnet."""
+
+    @property
+    def identity(self) -> str:
+        """What the source answered when asked who it is."""
+        ...
+
+    @property
+    def limits(self) -> CoilLimits:
+        """Limits in force: the narrowest of model, coil and user."""
+        ...
+
+    @property
+    def update_interval(self) -> float:
+        """Time one verified set-point takes, s; measured when opened."""
+        ...
+
+    def open(self) -> None:
+        """Connect, identify, make safe, measure the update interval."""
+        ...
+
+    def energise(self) -> None:
+        """Set compliance and 0 A, verify both, then switch the output on."""
+        ...
+
+    def set_current(self, current: float) -> float:
+        """Step towards `current`, A, as far as slew allows; what was commanded, A."""
+        ...
+
+    def read_current(self) -> Reading:
+        """Measured output current, A."""
+        ...
+
+    def read_voltage(self) -> Reading:
+        """Measured output voltage, V."""
+        ...
+
+    def beat(self) -> None:
+        """Tell a guard, if there is one, that the owning thread is alive."""
+        ...
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """What a person should know, in the order it was noticed; only grows."""
+        ...
+
+    def settings(self) -> dict[str, str]:
+        """Settings read back, for the run's record."""
+        ...
+
+    def safe_off(self) -> OffReport:
+        """Ramp to 0 A, output off, read back; idempotent, never raises."""
+        ...
+
+    def close(self) -> None:
+        """Make safe and let go of the port; idempotent."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One scope input and what is wired to it.
+
+    Attributes:
+        signal: what it measures (`V_C1`, `V_C2`, `V_K`, `coil_current`, ...).
+        input: the scope's name for the input, such as "A".
+        range: full scale, V: the input takes -range to +range around -offset.
+        offset: analogue offset added before digitising, V.
+        coupling: "DC" or "AC".
+        scale: signal unit per volt at the input (10 for a 10:1 probe, 1/R for a shunt).
+    """
+
+    signal: str
+    input: str
+    range: float
+    offset: float = 0.0
+    coupling: str = "DC"
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScopeCapability:
+    """What a scope can do.
+
+    Attributes:
+        gapless: streams without gaps (block-only scopes do not).
+        inputs: names of its inputs.
+        ranges: full-scale ranges, V.
+        bits: resolution of its converter.
+        fastest: highest streaming rate for 1, 2, ... enabled channels, S/s.
+    """
+
+    gapless: bool
+    inputs: tuple[str, ...]
+    ranges: tuple[float, ...]
+    bits: int
+    fastest: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """How a running stream is scaled.
+
+    A code c of channel k means ``(c / full_scale * range_k - offset_k) * scale_k``.
+
+    Attributes:
+        channels: in the order of the rows of each block.
+        interval: actual sample interval as the scope reported it, s.
+        full_scale: code at the end of the range (32512 for 8-bit PicoScopes).
+        shift: low bits of every code that are always 0 (8 for 8-bit PicoScopes).
+        started: clock time at which the stream was started, s.
+        uncertainty: of `started` against the first sample, s.
+    """
+
+    channels: tuple[Channel, ...]
+    interval: float
+    full_scale: int
+    shift: int
+    started: float
+    uncertainty: float
+
+    def volts_per_code(self, row: int) -> tuple[float, float]:
+        """(gain, offset) with signal = gain * code + offset, in the signal's unit."""
+        channel = self.channels[row]
+        gain = channel.range / self.full_scale * channel.scale
+        return gain, -channel.offset * channel.scale
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive samples of all enabled channels.
+
+    Attributes:
+        first: index of the first sample since the stream was started.
+        codes: shape (channels, samples), int16, C-contiguous, owned by the block.
+        overrange: one flag per channel, true if the input left its range.
+        received: clock time of arrival, s.
+    """
+
+    first: int
+    codes: NDArray[np.int16]
+    overrange: tuple[bool, ...]
+    received: float
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel."""
+        return int(self.codes.shape[1])
+
+
+class Scope(Protocol):
+    """A digitiser that streams all enabled channels at one rate."""
+
+    @property
+    def identity(self) -> str:
+        """Maker, model and serial number."""
+        ...
+
+    @property
+    def capability(self) -> ScopeCapability:
+        """What this scope can do; known once open."""
+        ...
+
+    def open(self) -> None:
+        """Connect and identify."""
+        ...
+
+    def start(self, channels: Sequence[Channel], interval: float) -> Stream:
+        """Configure and start streaming; the stream tells the actual interval."""
+        ...
+
+    def poll(self) -> Block | None:
+        """All samples since the last poll, or None if there are none yet.
+
+        Raises:
+            LinkLostError: unplugged, or no data for longer than the watchdog allows.
+            SamplesLostError: the scope or driver reported a gap.
+        """
+        ...
+
+    @property
+    def poll_interval(self) -> float:
+        """How often to poll while streaming, s."""
+        ...
+
+    def stop(self) -> None:
+        """Stop streaming; idempotent."""
+        ...
+
+    def settings(self) -> dict[str, str]:
+        """Settings in force, for the run's record."""
+        ...
+
+    def close(self) -> None:
+        """Stop and let go of the scope; idempotent."""
+        ...
+
+
+class FieldMeter(Protocol):
+    """A teslameter."""
+
+    @property
+    def identity(self) -> str:
+        """What the meter answered when asked who it is."""
+        ...
+
+    def open(self) -> None:
+        """Connect, identify, set the unit."""
+        ...
+
+    def read(self) -> Reading:
+        """Magnetic flux density, T."""
+        ...
+
+    def settings(self) -> dict[str, str]:
+        """Settings read back, for the run's record."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the port; idempotent."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """The instruments one run opened nothing of yet; None where the run needs none.
+
+    Attributes:
+        name: for people.
+        simulated: whether physics is computed.
+        clock: the time all of it lives in.
+        accuracy: says, after a run, how accurate the computed physics was.
+    """
+
+    name: str
+    simulated: bool
+    clock: Clock
+    coil: Coil | None = None
+    scope: Scope | None = None
+    field_meter: FieldMeter | None = None
+    accuracy: Callable[[], str] | None = None

@@ -1,0 +1,95 @@
+"""The one error tree. Every leaf is also a builtin exception.
+
+TactileLabError
+├── SceneError            (ValueError)
+│   └── QuantityError     (ValueError)
+├── LimitError            (ValueError)
+├── ParameterError        (ValueError)
+├── SolverError           (ArithmeticError)
+├── InstrumentError       (OSError)
+│   ├── NotFoundError     (FileNotFoundError)
+│   ├── LinkLostError     (ConnectionError)
+│   ├── NoReplyError      (TimeoutError)
+│   ├── BadReplyError     (ValueError)
+│   ├── RefusedError      (RuntimeError)
+│   └── SamplesLostError  (RuntimeError)
+├── InterlockError        (RuntimeError)
+├── UnsafeError           (RuntimeError)
+├── RecordingError        (OSError)
+├── RunFolderError        (ValueError)
+└── NotIdentifiableError  (ValueError)
+
+A message says what, value, unit, limit, and what to do.
+"""
+
+
+class TactileLabError(Exception):
+    """Root of every error this program raises on purpose."""
+
+
+class SceneError(TactileLabError, ValueError):
+    """A scene, bench file, CSV or option cannot be used as written."""
+
+
+class QuantityError(SceneError):
+    """A quantity has a wrong unit, number or range."""
+
+
+class LimitError(TactileLabError, ValueError):
+    """A request exceeds what the coil, scope or calibration allows."""
+
+
+class ParameterError(TactileLabError, ValueError):
+    """A model parameter, waveform or tolerance lies outside its domain."""
+
+
+class SolverError(TactileLabError, ArithmeticError):
+    """The model cannot answer to the asked tolerance."""
+
+
+class InstrumentError(TactileLabError, OSError):
+    """An instrument failed."""
+
+
+class NotFoundError(InstrumentError, FileNotFoundError):
+    """Nothing answers at the address, or a vendor library is missing."""
+
+
+class LinkLostError(InstrumentError, ConnectionError):
+    """The instrument was unplugged or the far end closed the link."""
+
+
+class NoReplyError(InstrumentError, TimeoutError):
+    """The link is open but no answer came in time."""
+
+
+class BadReplyError(InstrumentError, ValueError):
+    """The answer is not one the dialect knows."""
+
+
+class RefusedError(InstrumentError, RuntimeError):
+    """The instrument reported an error of its own."""
+
+
+class SamplesLostError(InstrumentError, RuntimeError):
+    """Samples are missing from a stream that must be gapless."""
+
+
+class InterlockError(TactileLabError, RuntimeError):
+    """A safety limit tripped; it stays latched until acknowledged."""
+
+
+class UnsafeError(TactileLabError, RuntimeError):
+    """The safe state (0 A, output off) could not be verified."""
+
+
+class RecordingError(TactileLabError, OSError):
+    """Samples cannot be stored as fast as they arrive, or not at all."""
+
+
+class RunFolderError(TactileLabError, ValueError):
+    """A folder cannot be read as a run."""
+
+
+class NotIdentifiableError(TactileLabError, ValueError):
+    """The data do not determine the parameter that was asked for."""

@@ -1,0 +1,170 @@
+"""Force, field and current: Eq. (2) of the paper, or a measured calibration.
+
+``F = B1 A1 A2 B2 / (4 pi mu0 r^2)``; B2 is the field of the electromagnet at the
+magnet, proportional to the current or taken from a calibration. The force that drives
+the sensor is counted from that at 0 A: the constant pull on the steel core is no drive.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_lab.calibration import Calibration
+from tactile_lab.errors import LimitError, ParameterError
+from tactile_lab.quantity import show
+from tactile_lab.waveform import Waveform
+
+MU_0 = 1.25663706127e-6
+"""Permeability of vacuum, T m/A (CODATA 2022)."""
+A2_PRINTED = 2.25e-3
+"""A2 as Table 1 prints it, m^2; a 15 mm x 15 mm core has a tenth of it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Magnet:
+    """The electromagnet, the magnet on the cantilever and the distance between them.
+
+    Args:
+        r: distance between magnet and pole face, m, above 0.
+        A1: area of the permanent magnet, m^2.
+        A2: area of the electromagnet's core, m^2.
+        B1: field of the permanent magnet, T.
+        B2_per_ampere: field of the electromagnet per current, T/A; not used where a
+            calibration is given.
+        calibration: measured field or force against current.
+
+    Raises:
+        ParameterError: a value is not finite or not above 0.
+    """
+
+    r: float
+    A1: float = 2.827e-5
+    A2: float = A2_PRINTED
+    B1: float = 0.163
+    B2_per_ampere: float = 0.011
+    calibration: Calibration | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("r", "A1", "A2", "B1"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ParameterError(f"{name} = {value} must be finite and above 0.")
+        if not math.isfinite(self.B2_per_ampere) or self.B2_per_ampere == 0:
+            raise ParameterError(
+                f"B2_per_ampere = {self.B2_per_ampere} T/A must be finite and not 0."
+            )
+
+    @property
+    def newtons_per_tesla(self) -> float:
+        """Force per field of the electromagnet, Eq. (2), N/T."""
+        return self.B1 * self.A1 * self.A2 / (4 * math.pi * MU_0 * self.r**2)
+
+    @property
+    def newtons_per_ampere(self) -> float:
+        """Force per current around 0 A, N/A."""
+        if self.calibration is None:
+            return self.newtons_per_tesla * self.B2_per_ampere
+        return self._per_unit * self.calibration.slope_at_zero
+
+    @property
+    def _per_unit(self) -> float:
+        """Newtons per unit of the calibration's values."""
+        assert self.calibration is not None
+        return 1.0 if self.calibration.unit == "N" else self.newtons_per_tesla
+
+    def field(self, current: ArrayLike) -> NDArray[np.float64]:
+        """Field of the electromagnet, T, at `current` A (any shape)."""
+        amperes = np.asarray(current, dtype=np.float64)
+        if self.calibration is None:
+            return amperes * self.B2_per_ampere
+        if self.calibration.unit == "T":
+            return self.calibration.at(amperes)
+        return self.force(amperes) / self.newtons_per_tesla
+
+    def force(self, current: ArrayLike) -> NDArray[np.float64]:
+        """Drive force F(I) - F(0), N, at `current` A (any shape)."""
+        amperes = np.asarray(current, dtype=np.float64)
+        if self.calibration is None:
+            return amperes * self.newtons_per_ampere
+        change = self.calibration.at(amperes) - self.calibration.at(0.0)
+        return np.asarray(self._per_unit * change)
+
+    def reachable(self, limit: float) -> tuple[float, float]:
+        """Least and largest force, N, within `limit` A and the calibration."""
+        low, high = -limit, limit
+        if self.calibration is not None:
+            low = max(low, self.calibration.least)
+            high = min(high, self.calibration.most)
+        ends = np.sort(self.force(np.array([low, high])))
+        return float(ends[0]), float(ends[1])
+
+    def current_for(self, force: Waveform, limit: float = math.inf) -> Waveform:
+        """The current, A, that gives `force`, N.
+
+        Args:
+            force: piecewise linear; kinks of a calibration become points of their own.
+            limit: largest current magnitude the coil may carry, A.
+
+        Raises:
+            LimitError: a force lies beyond the coil's limit or the calibration; the
+                reachable force is named.
+        """
+        wanted = force.value[np.argmax(np.abs(force.value))]
+        if self.calibration is None and math.isinf(limit):
+            return force.scaled(1 / self.newtons_per_ampere)
+        low, high = self.reachable(limit)
+        slack = 1e-12 * max(abs(low), abs(high))
+        if force.value.min() < low - slack or force.value.max() > high + slack:
+            over = float(wanted)
+            raise LimitError(
+                f"force {show(over, 'N')} is beyond the coil: reachable is "
+                f"{show(low, 'N')} to {show(high, 'N')} within {self._bounds(limit)}. "
+                "Ask for less force, or bring the magnet nearer (r) in the bench file."
+            )
+        if self.calibration is None:
+            return force.scaled(1 / self.newtons_per_ampere)
+        bent = _with_kinks(force, self.force(self.calibration.current))
+        return Waveform(bent.time, self._inverse(bent.value))
+
+    def force_for(self, current: Waveform) -> Waveform:
+        """The force, N, that `current`, A, gives."""
+        if self.calibration is None:
+            return current.scaled(self.newtons_per_ampere)
+        bent = _with_kinks(current, self.calibration.current)
+        return Waveform(bent.time, self.force(bent.value))
+
+    def _inverse(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        assert self.calibration is not None
+        amperes = self.calibration.current
+        newtons = self.force(amperes)
+        if newtons[0] > newtons[-1]:
+            amperes, newtons = amperes[::-1], newtons[::-1]
+        return np.asarray(np.interp(force, newtons, amperes))
+
+    def _bounds(self, limit: float) -> str:
+        if self.calibration is None:
+            return f"the limit of {show(limit, 'A')}"
+        return (
+            f"the limit of {show(limit, 'A')} and the calibration's "
+            f"{show(self.calibration.least, 'A')} to {show(self.calibration.most, 'A')}"
+        )
+
+
+def _with_kinks(wave: Waveform, levels: NDArray[np.float64]) -> Waveform:
+    """`wave` with a point wherever it crosses one of `levels`."""
+    points: list[tuple[float, float]] = [(wave.start, float(wave.value[0]))]
+    for t0, t1, v0, v1 in wave.segments():
+        if t1 > t0 and v0 != v1:
+            low, high = min(v0, v1), max(v0, v1)
+            inner = levels[(levels > low) & (levels < high)]
+            inner = np.sort(inner)[:: 1 if v1 > v0 else -1]
+            for level in inner:
+                t = t0 + (t1 - t0) * (float(level) - v0) / (v1 - v0)
+                if points[-1][0] < t < t1:
+                    points.append((t, float(level)))
+        points.append((t1, v1))
+    return Waveform.through(points)

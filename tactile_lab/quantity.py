@@ -1,0 +1,210 @@
+"""Quantities: a number and a unit as text at the user's side, SI floats inside."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema, core_schema
+
+from tactile_lab.errors import QuantityError
+
+PREFIXES = {
+    "": 1.0, "q": 1e-30, "r": 1e-27, "y": 1e-24, "z": 1e-21, "a": 1e-18,
+    "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3,
+    "c": 1e-2, "d": 1e-1, "h": 1e2, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
+    "P": 1e15, "E": 1e18,
+}  # fmt: skip
+_NUMBER = re.compile(
+    r"\s*([-+−]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+−]?[0-9]+)?)\s*(\S.*?)?\s*$"
+)
+_FACTOR = re.compile(r"^(?P<symbol>[^\^/ ]+?)(?:\^(?P<power>\d+)|(?P<square>²))?$")
+
+
+def parse(text: str, unit: str) -> float:
+    """The SI value of `text`, which must be in `unit` with any SI prefix.
+
+    Args:
+        text: number (exponents allowed), space, unit, such as "50 mN" or "1.2e-12 A".
+        unit: the SI unit it must have, such as "N", "V m/N" or "m^2".
+
+    Raises:
+        QuantityError: not a number and unit, another unit, or not finite.
+    """
+    match = _NUMBER.match(text)
+    if match is None:
+        raise QuantityError(
+            f'"{text}" is not a quantity; write a number, a space and a unit in '
+            f"{unit}, such as {example(unit)}."
+        )
+    digits, written = match.group(1).replace("−", "-"), match.group(2)
+    if written is None:
+        raise QuantityError(
+            f'"{text}" has no unit; write for example "{digits} {unit}".'
+        )
+    factor = _factor(written, unit)
+    if factor is None:
+        raise QuantityError(
+            f'"{text}" has the unit {written}; {unit} is needed here (any SI prefix), '
+            f"such as {example(unit)}."
+        )
+    value = _scaled(digits, factor)
+    if not math.isfinite(value):
+        raise QuantityError(f'"{text}" is not finite; give a finite number in {unit}.')
+    return value
+
+
+def _scaled(digits: str, factor: float) -> float:
+    """Digits times a power of ten, rounded once where the factor allows it."""
+    power = round(math.log10(factor))
+    if math.isclose(factor, 10.0**power, rel_tol=1e-12):
+        mantissa, _, exponent = digits.lower().partition("e")
+        return float(f"{mantissa}e{int(exponent or 0) + power}")
+    return float(digits) * factor
+
+
+def example(unit: str) -> str:
+    """A quantity of that unit, to show in a message."""
+    return {
+        "N": '"50 mN"', "s": '"2 s"', "V": '"1.4 V"', "S/s": '"1 MS/s"', "A": '"0.5 A"',
+        "Ohm": '"100 MOhm"', "F": '"150 pF"', "m": '"6 mm"', "T": '"163 mT"',
+    }.get(unit, f'"1 {unit}"')  # fmt: skip
+
+
+def _factor(written: str, unit: str) -> float | None:
+    """Scale from the written unit to `unit`, or None if it is another unit."""
+    written = written.replace("Ω", "Ohm").replace("Ω", "Ohm").replace("·", " ")
+    written = re.sub(r"\s+", " ", written).replace(" / ", "/")
+    over, under = _split(unit), _split(written)
+    if [len(part) for part in over] != [len(part) for part in under]:
+        return None
+    total = 1.0
+    for wanted_part, given_part, sign in zip(over, under, (1, -1), strict=True):
+        for wanted, given in zip(wanted_part, given_part, strict=True):
+            one = _prefix(given, wanted)
+            if one is None:
+                return None
+            total *= one**sign
+    return total
+
+
+def _split(unit: str) -> tuple[list[str], list[str]]:
+    over, _, under = unit.partition("/")
+    return over.split(), under.split()
+
+
+def _prefix(given: str, wanted: str) -> float | None:
+    got, need = _FACTOR.match(given), _FACTOR.match(wanted)
+    if got is None or need is None:
+        return None
+    power = int(need["power"] or (2 if need["square"] else 1))
+    if int(got["power"] or (2 if got["square"] else 1)) != power:
+        return None
+    symbol, base = got["symbol"], need["symbol"]
+    if not symbol.endswith(base):
+        return None
+    prefix = PREFIXES.get(symbol[: len(symbol) - len(base)])
+    return None if prefix is None else prefix**power
+
+
+_SHOWN = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+def show(value: float, unit: str, digits: int = 4) -> str:
+    """`value` (SI) for a person: "50 mN", with a prefix that keeps 1 to 999 in front.
+
+    Compound units and powers get no prefix. A true minus is used.
+    """
+    if not math.isfinite(value):
+        return f"{value} {unit}"
+    prefix, number = "", value
+    if value != 0 and not any(c in unit for c in " ^²"):
+        power = 3 * math.floor(math.log10(abs(value)) / 3 + 1e-12)
+        power = min(max(power, -15), 9)
+        number = value / 10.0**power
+        if float(f"{abs(number):.{digits}g}") >= 1000 and power < 9:
+            power, number = power + 3, number / 1000
+        prefix = _SHOWN[power]
+    text = f"{number:.{digits}g}".replace("-", "−")
+    return f"{text} {prefix}{unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Pydantic field type: SI float inside, quantity text in files and on the wire.
+
+    Text is parsed; a bare number is taken as SI from Python code but refused where
+    the validation context says ``{"text_only": True}`` (scene files).
+
+    Attributes:
+        symbol: SI unit.
+        above, least, most: open lower, closed lower and closed upper limit, SI.
+    """
+
+    symbol: str
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+
+    def limits(self) -> str:
+        """The allowed range for a person."""
+        parts = []
+        if self.above is not None:
+            parts.append(f"above {show(self.above, self.symbol)}")
+        if self.least is not None:
+            parts.append(f"at least {show(self.least, self.symbol)}")
+        if self.most is not None:
+            parts.append(f"at most {show(self.most, self.symbol)}")
+        return " and ".join(parts)
+
+    def validate(self, value: Any, info: ValidationInfo) -> float:
+        """The SI value, or an error that says what is allowed."""
+        if isinstance(value, str):
+            number = parse(value, self.symbol)
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            raise QuantityError(
+                f"{value!r} is no quantity; write for example {example(self.symbol)}."
+            )
+        elif (info.context or {}).get("text_only"):
+            raise QuantityError(
+                f'{value!r} has no unit; write for example "{value} {self.symbol}".'
+            )
+        else:
+            try:
+                number = float(value)
+            except OverflowError:  # a whole number of hundreds of digits
+                number = math.inf
+            if not math.isfinite(number):
+                raise QuantityError(f"{number} {self.symbol} is not finite.")
+        low = (self.above is not None and number <= self.above) or (
+            self.least is not None and number < self.least
+        )
+        if low or (self.most is not None and number > self.most):
+            raise QuantityError(
+                f"{show(number, self.symbol)} is out of range; allowed is "
+                f"{self.limits()}."
+            )
+        return number
+
+    def write(self, value: float) -> str:
+        """Exact text that `parse` reads back to the same float."""
+        return f"{value!r} {self.symbol}"
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(
+            self.validate,
+            serialization=core_schema.plain_serializer_function_ser_schema(self.write),
+        )
+
+
+Force = Annotated[float, Unit("N")]
+Current = Annotated[float, Unit("A")]
+Voltage = Annotated[float, Unit("V")]
+Duration = Annotated[float, Unit("s", above=0.0)]
+Pause = Annotated[float, Unit("s", least=0.0)]
+SampleRate = Annotated[float, Unit("S/s", above=0.0)]

@@ -1,0 +1,46 @@
+"""The signals a scene may record, where each comes from, and its unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Source = Literal["measured", "derived", "model"]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One recordable signal.
+
+    Attributes:
+        name: as written in scenes and files.
+        unit: SI.
+        source: where a run gets it from; `simulate` computes all but bench signals.
+        title: for axes and legends.
+    """
+
+    name: str
+    unit: str
+    source: Source
+    title: str
+
+
+SIGNALS = {
+    signal.name: signal
+    for signal in (
+        Signal("force", "N", "derived", "Force"),
+        Signal("coil_current", "A", "measured", "Coil current"),
+        Signal("field", "T", "measured", "Field"),
+        Signal("V_P", "V", "model", "V_P"),
+        Signal("I_DS", "A", "derived", "I_DS"),
+        Signal("V_C1", "V", "measured", "V_C1"),
+        Signal("I_C", "A", "model", "I_C"),
+        Signal("V_C2", "V", "measured", "V_C2"),
+        Signal("V_K", "V", "measured", "V_K"),
+        Signal("spikes", "s", "derived", "Spikes"),
+        Signal("rate", "Hz", "derived", "Rate"),
+    )
+}
+
+BENCH_ONLY = frozenset({"coil_current", "field"})
+"""Signals the model alone knows nothing of."""

@@ -1,0 +1,100 @@
+"""What a protocol asks for, and what it gets back."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from tactile_lab.waveform import Waveform
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """One force waveform and what to record.
+
+    Attributes:
+        force: N against s, time 0 is the start of the trial; lasts until its last
+            point or `duration`, whichever is later.
+        label: for people ("120 mN").
+        level: the force a result is filed under, N; None where there is no one level.
+        duration: s; None for the waveform's end.
+        pause: a planned recovery: neither streamed nor stored, and no gap.
+        hold: (start s, end s) of the part that adaptation is judged on, or None.
+        current: drive the coil by this current (A against s) instead of `force`, for
+            calibrations that know no force yet.
+    """
+
+    force: Waveform
+    label: str
+    level: float | None = None
+    duration: float | None = None
+    pause: bool = False
+    hold: tuple[float, float] | None = None
+    current: Waveform | None = None
+
+    @property
+    def length(self) -> float:
+        """Duration of the trial, s."""
+        end = (self.current or self.force).end
+        return end if self.duration is None else self.duration
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What one trial gave.
+
+    Attributes:
+        trial: what was asked.
+        index: number of the trial in the run, from 0.
+        start: on the run's time axis, s.
+        spike_times: shape (k,), s from the trial's start, detected on V_K.
+        current: applied current: shape (n, 2), s from the trial's start and A.
+        rest: mean of each measured signal just before the trial, by name.
+        traces: decimated measured signals by name: shape (n, 2), s and SI unit.
+        skipped: coil set-points that were skipped because they came too late.
+    """
+
+    trial: Trial
+    index: int
+    start: float
+    spike_times: NDArray[np.float64]
+    current: NDArray[np.float64]
+    rest: dict[str, float] = field(default_factory=dict)
+    traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    skipped: int = 0
+
+
+Trials = Generator[Trial, Outcome, None]
+
+
+class Protocol(BaseModel):
+    """A measurement protocol: typed parameters and a generator of trials.
+
+    A subclass is one file: its fields (with units and limits, see
+    `tactile_lab.quantity`) become the scene's ``[protocol]`` keys, the ``--set`` keys,
+    the window's form and the stored attributes.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", arbitrary_types_allowed=True, strict=True
+    )
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    signals: ClassVar[tuple[str, ...]] = ("force", "V_C1", "V_C2", "V_K", "spikes")
+    """Signals recorded unless the scene says otherwise."""
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Signals the generator looks at in outcomes: acquired even when not recorded."""
+
+    def trials(self) -> Trials:
+        """Yield trials; each ``yield`` returns that trial's outcome."""
+        raise NotImplementedError
+
+    def located(self, folder: Any) -> Protocol:
+        """The same protocol with file parameters resolved against `folder` (a Path)."""
+        return self

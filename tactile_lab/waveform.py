@@ -1,0 +1,176 @@
+"""Piecewise-linear waveforms with explicit jumps: force N(t), current A(t)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_lab.errors import ParameterError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """A value against time, linear between points.
+
+    The same time twice is a jump; the later value holds at that instant
+    (right-continuous). The first value holds before the first point, so a first
+    value other than 0 is no jump, and the last value holds after the last point.
+
+    Args:
+        time: shape (n,), s, finite, non-decreasing, at most two points per instant.
+        value: shape (n,), the caller's SI unit, finite.
+
+    Raises:
+        ParameterError: empty, unequal lengths, unsorted, or not finite.
+    """
+
+    time: FloatArray
+    value: FloatArray
+
+    def __post_init__(self) -> None:
+        time = np.array(self.time, dtype=np.float64, ndmin=1)
+        value = np.array(self.value, dtype=np.float64, ndmin=1)
+        if time.ndim != 1 or time.shape != value.shape or time.size == 0:
+            raise ParameterError(
+                f"A waveform needs as many values as times, at least one; got shapes "
+                f"{time.shape} and {value.shape}."
+            )
+        for what, numbers in (("time", time), ("value", value)):
+            bad = np.flatnonzero(~np.isfinite(numbers))
+            if bad.size:
+                raise ParameterError(
+                    f"Waveform {what} number {bad[0] + 1} is {numbers[bad[0]]}; "
+                    "give finite numbers."
+                )
+        unsorted = np.flatnonzero(np.diff(time) < 0)
+        if unsorted.size:
+            i = int(unsorted[0])
+            raise ParameterError(
+                f"Waveform times must not decrease: point {i + 2} at {time[i + 1]:g} s "
+                f"follows {time[i]:g} s. Sort the points."
+            )
+        triple = np.flatnonzero(time[2:] == time[:-2])
+        if triple.size:
+            i = int(triple[0])
+            raise ParameterError(
+                f"Waveform has three points at {time[i]:g} s; a jump has two, "
+                "the value before and the value after."
+            )
+        time.setflags(write=False)
+        value.setflags(write=False)
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "value", value)
+
+    @classmethod
+    def constant(cls, value: float) -> Waveform:
+        """A waveform that has one value at all times."""
+        return cls(np.zeros(1), np.array([value]))
+
+    @classmethod
+    def through(cls, points: Iterable[tuple[float, float]]) -> Waveform:
+        """A waveform through (time s, value) points."""
+        pairs = np.array(list(points), dtype=np.float64).reshape(-1, 2)
+        return cls(pairs[:, 0], pairs[:, 1])
+
+    @classmethod
+    def pulse(
+        cls, level: float, *, ramp: float, hold: float, rest: float = 0.0
+    ) -> Waveform:
+        """0 to `level` in `ramp` s, `hold` s there, `ramp` s back, `rest` s at 0."""
+        rise, fall = ramp, ramp + hold
+        points = [(0.0, 0.0), (rise, level), (fall, level), (fall + ramp, 0.0)]
+        if rest > 0:
+            points.append((fall + ramp + rest, 0.0))
+        return cls.through(points)
+
+    @property
+    def start(self) -> float:
+        """Time of the first point, s."""
+        return float(self.time[0])
+
+    @property
+    def end(self) -> float:
+        """Time of the last point, s."""
+        return float(self.time[-1])
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude of the value."""
+        return float(np.max(np.abs(self.value)))
+
+    @cached_property
+    def steepest(self) -> float:
+        """Largest slope magnitude, per s; infinite where there is a jump."""
+        rise = np.abs(np.diff(self.value))
+        run = np.diff(self.time)
+        if np.any((run == 0) & (rise > 0)):
+            return float("inf")
+        sloped = run > 0
+        return float(np.max(rise[sloped] / run[sloped], initial=0.0))
+
+    def at(self, time: ArrayLike) -> FloatArray:
+        """Value at `time` (any shape, s), right-continuous at jumps."""
+        t = np.asarray(time, dtype=np.float64)
+        after = np.searchsorted(self.time, t, side="right")
+        left = np.clip(after - 1, 0, self.time.size - 1)
+        right = np.clip(after, 0, self.time.size - 1)
+        run = self.time[right] - self.time[left]
+        inside = (after > 0) & (run > 0)
+        part = np.where(inside, (t - self.time[left]) / np.where(run > 0, run, 1.0), 0)
+        value: FloatArray = self.value[left] + part * (
+            self.value[right] - self.value[left]
+        )
+        return value
+
+    def segments(self) -> Iterator[tuple[float, float, float, float]]:
+        """Each (start s, end s, value at start, value at end); jumps have no length."""
+        for i in range(self.time.size - 1):
+            yield (
+                float(self.time[i]),
+                float(self.time[i + 1]),
+                float(self.value[i]),
+                float(self.value[i + 1]),
+            )
+
+    def shifted(self, by: float) -> Waveform:
+        """The same waveform `by` s later."""
+        return Waveform(self.time + by, self.value)
+
+    def scaled(self, by: float) -> Waveform:
+        """The same waveform with every value multiplied."""
+        return Waveform(self.time, self.value * by)
+
+    def then(self, other: Waveform) -> Waveform:
+        """This waveform followed by `other`, whose time 0 is put at this one's end."""
+        moved = other.shifted(self.end)
+        time = np.concatenate([self.time, moved.time])
+        value = np.concatenate([self.value, moved.value])
+        return Waveform(*_without_repeats(time, value))
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Waveform)
+            and np.array_equal(self.time, other.time)
+            and np.array_equal(self.value, other.value)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.time.tobytes(), self.value.tobytes()))
+
+
+def _without_repeats(
+    time: FloatArray, value: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Drop points equal to the one before, and the middle of three at one instant."""
+    keep = np.ones(time.size, dtype=bool)
+    keep[1:] = (np.diff(time) != 0) | (np.diff(value) != 0)
+    time, value = time[keep], value[keep]
+    keep = np.ones(time.size, dtype=bool)
+    keep[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
+    return time[keep], value[keep]

@@ -1,0 +1,83 @@
+"""Protocols, scenes and dialects are found by name, never by import."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tactile_lab.errors import SceneError
+from tactile_lab.plugins import (
+    nearest,
+    protocol_class,
+    protocol_from_file,
+    protocol_names,
+    scene_names,
+    update_interval,
+)
+from tactile_lab.scene.bench_file import CoilSpec
+from tactile_lab.scene.load import load
+
+GOOD = """
+from typing import ClassVar
+from tactile_lab.trial import Protocol
+
+class Mine(Protocol):
+    name: ClassVar[str] = "mine"
+    title: ClassVar[str] = "Mine"
+"""
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_every_protocol_is_found_by_its_name(name):
+    assert protocol_class(name).name == name
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_shipped_scene_loads_and_stays_on_the_simulated_bench(name):
+    assert load(name).bench.simulated
+
+
+def test_names_are_listed_without_importing():
+    code = (
+        "import sys; from tactile_lab.plugins import protocol_names; protocol_names()\n"
+        "assert 'protocols.pulses' not in sys.modules and 'numpy' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_file_is_a_protocol_if_it_holds_one_of_its_name(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(GOOD)
+    assert protocol_from_file(path).title == "Mine"
+    path.write_text(GOOD.replace('"mine"', '"other"'))
+    with pytest.raises(SceneError, match="mine"):
+        protocol_from_file(path)
+
+
+def test_a_users_file_never_shadows_ours(tmp_path):
+    path = tmp_path / "pulses.py"
+    path.write_text(GOOD.replace('"mine"', '"pulses"'))
+    assert protocol_from_file(path).title == "Mine"
+    assert protocol_class("pulses").title == "Pulses"
+
+
+@pytest.mark.parametrize(
+    "text", ["import nothing_of_that_name", "1 +", "raise SystemError"]
+)
+def test_a_file_that_fails_is_refused_in_words(tmp_path, text):
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    with pytest.raises(SceneError, match="does not run"):
+        protocol_from_file(path)
+
+
+def test_nearest():
+    assert nearest("hodl", ["hold", "ramp"]) == 'did you mean "hold"?'
+    assert nearest("v_c1", ["V_C1"]) == 'did you mean "V_C1"?'
+    assert nearest("xyz", ["hold"]) == ""
+
+
+def test_a_faster_line_updates_faster():
+    slow = update_interval(CoilSpec(baud=9600))
+    fast = update_interval(CoilSpec(baud=19200))
+    assert 0.02 < fast < slow < 0.2
