@@ -1,0 +1,1 @@
+"""The circuit model of the paper: pure maths, no I/O."""

@@ -1,0 +1,367 @@
+"""The circuit: its parameters (Table 1) and the paper's equations as functions.
+
+Scalars or arrays go in and come out alike, SI units throughout. Equation numbers are
+those of Birkoben et al., Sci. Rep. 10, 2020.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_lab.errors import ParameterError
+
+FloatArray = NDArray[np.float64]
+
+SMALLEST, LARGEST = 1e-60, 1e60
+"""Range of positive parameters: no product of three can overflow or underflow."""
+LARGEST_VOLTAGE = 1e4
+SUBTHRESHOLD_LIMIT = 2.75
+"""V_GS + V_P up to which the exponential law, Eq. (1), describes the PiezoFET, V."""
+SATURATION_HEADROOM = 0.5
+"""Real T1 saturates where V_C1 falls below V_fire less this, V (ngspice)."""
+
+_UNITS = {
+    "I_S": "A", "V_GS": "V", "m": "", "V_T": "V", "g31": "V m/N", "h": "m", "L": "m",
+    "d": "m", "a": "m", "b": "m", "tau": "s", "R1": "Ohm", "R2": "Ohm", "R3": "Ohm",
+    "R_L": "Ohm", "R_k": "Ohm", "C1": "F", "C2": "F", "V_S": "V", "V_th": "V",
+    "I_T1s": "A", "V_fire": "V", "V_reset": "V", "t_eps": "s", "I_bias": "A",
+}  # fmt: skip
+_POSITIVE = frozenset("I_S m V_T h L a b tau R1 R2 R3 R_L C1 C2 V_S V_th I_T1s".split())
+_PUT = {"V_fire": 3.56, "V_reset": 0.578, "t_eps": 8e-6}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circuit:
+    """The sensor circuit of Fig. 3; the defaults are Table 1.
+
+    Args:
+        I_S: reverse current of the PiezoFET, A.
+        V_GS: gate-source bias, V.
+        m: slope factor.
+        V_T: thermal voltage, V; 0.025 V is 290 K (see `thermal_voltage`).
+        g31: piezoelectric voltage coefficient, V m/N; its sign is that of the force.
+        h: thickness of the AlScN film, m.
+        L: length of the cantilever, m.
+        d: distance of the PiezoFET from the clamping, m, 0 to L.
+        a: width of the cantilever, m.
+        b: height of the cantilever, m.
+        tau: leakage time constant of the AlScN film, s.
+        R1: resistor from V_S to node A, Ohm.
+        R2: resistor from node A to ground, Ohm.
+        R3: resistor in T1's emitter, Ohm; not used by ``t1="direct"``.
+        R_L: leak of the integrator, Ohm.
+        R_k: cathode resistor over which spikes are measured, Ohm, from 0.
+        C1: capacitor at node A, F.
+        C2: capacitor of the integrator, F.
+        V_S: supply, V.
+        V_th: threshold of the firing stage, V.
+        I_T1s: saturation current of T1, A; not in the paper, 2N3906 by default.
+        V_fire: V_C2 at which it fires, V; None: what `firing` sets.
+        V_reset: V_C2 after a spike, V, below V_fire; None: what `firing` sets.
+        t_eps: time of the reset, s, from 0; None: what `firing` sets.
+        t1: "emitter_resistor" (R3 in the emitter) or "direct" (V_EB = V_S - V_C1).
+        firing: "lif" (V_th, 0 V, 0 s) or "put" (3.56 V, 0.578 V, 8 us from ngspice).
+        saturation: let T1 saturate as a transistor does; not implemented yet.
+        I_bias: current of a measuring follower's input into C2, A.
+
+    Raises:
+        ParameterError: a value is not finite, impossible, or contradicts another.
+    """
+
+    I_S: float = 1.216e-12
+    V_GS: float = 1.4
+    m: float = 5.646
+    V_T: float = 0.025
+    g31: float = 0.039
+    h: float = 500e-9
+    L: float = 7.7e-3
+    d: float = 1.8e-3
+    a: float = 2e-3
+    b: float = 475e-6
+    tau: float = 8.69
+    R1: float = 9.58e6
+    R2: float = 100e6
+    R3: float = 100e6
+    R_L: float = 500e6
+    R_k: float = 10e3
+    C1: float = 680e-12
+    C2: float = 150e-12
+    V_S: float = 5.0
+    V_th: float = 3.213
+    I_T1s: float = 1.41e-15
+    V_fire: float | None = None
+    V_reset: float | None = None
+    t_eps: float | None = None
+    t1: Literal["emitter_resistor", "direct"] = "emitter_resistor"
+    firing: Literal["lif", "put"] = "lif"
+    saturation: bool = False
+    I_bias: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in _UNITS:
+            value = getattr(self, name)
+            if value is None and name in _PUT:
+                continue
+            object.__setattr__(self, name, _checked(name, value))
+        self._check_options()
+        if not 0 <= self.d < self.L:
+            raise ParameterError(
+                f"d = {self.d:g} m must lie between 0 and L = {self.L:g} m."
+            )
+        if abs(self.g31) > LARGEST or abs(self.I_bias) > LARGEST:
+            raise ParameterError(
+                f"g31 = {self.g31:g} V m/N and I_bias = {self.I_bias:g} A must not "
+                f"exceed {LARGEST:g} in magnitude."
+            )
+        if not 0 <= self.R_k <= LARGEST:
+            raise ParameterError(
+                f"R_k = {self.R_k:g} Ohm must lie between 0 and {LARGEST:g} Ohm."
+            )
+        if not 0 <= self.reset_time <= LARGEST:
+            raise ParameterError(f"t_eps = {self.reset_time:g} s must be at least 0 s.")
+        if self.reset_voltage >= self.fire_voltage:
+            raise ParameterError(
+                f"V_reset = {self.reset_voltage:g} V must be below V_fire = "
+                f"{self.fire_voltage:g} V."
+            )
+        for what, value, low, high in (
+            ("k_F of Eqs. (3)-(6), V/N,", abs(self.k_F), 0.0, 1e30),
+            ("R_L C2, s,", self.tau_L, 1e-30, 1e30),
+            ("C1 times R1 parallel R2, s,", self.tau_A, 1e-30, 1e30),
+        ):
+            if not low <= value <= high:
+                raise ParameterError(
+                    f"{what} is {value:g}; it must lie between {low:g} and {high:g}."
+                )
+
+    def _check_options(self) -> None:
+        for name, allowed in (
+            ("t1", ("emitter_resistor", "direct")),
+            ("firing", ("lif", "put")),
+        ):
+            if getattr(self, name) not in allowed:
+                raise ParameterError(
+                    f"{name} = {getattr(self, name)!r} does not exist; "
+                    f"choose {' or '.join(repr(a) for a in allowed)}."
+                )
+        if not isinstance(self.saturation, bool):
+            raise ParameterError(
+                f"saturation = {self.saturation!r} must be true or false."
+            )
+        if self.saturation:
+            raise ParameterError(
+                "saturation = true is not implemented yet; use false and heed the "
+                "warning where T1 would saturate."
+            )
+
+    @property
+    def k_F(self) -> float:
+        """Piezoelectric voltage per force, Eqs. (3)-(6), V/N."""
+        return float(
+            6 * self.g31 * self.h * (self.L - self.d) / (self.a * self.b * self.b)
+        )
+
+    @property
+    def tau_L(self) -> float:
+        """Time constant of the leaky integrator, Eq. (18), s."""
+        return self.R_L * self.C2
+
+    @property
+    def tau_A(self) -> float:
+        """Time constant of node A without the PiezoFET, Eq. (16), s."""
+        return self.C1 / (1 / self.R1 + 1 / self.R2)
+
+    @property
+    def tau_K(self) -> float:
+        """Decay time of a spike over R_k, s."""
+        return self.R_k * self.C2
+
+    @property
+    def fire_voltage(self) -> float:
+        """V_C2 at which the circuit fires, Eq. (10), V."""
+        if self.V_fire is not None:
+            return self.V_fire
+        return _PUT["V_fire"] if self.firing == "put" else self.V_th
+
+    @property
+    def reset_voltage(self) -> float:
+        """V_C2 after a spike, Eq. (11), V."""
+        if self.V_reset is not None:
+            return self.V_reset
+        return _PUT["V_reset"] if self.firing == "put" else 0.0
+
+    @property
+    def reset_time(self) -> float:
+        """Time of the reset t_eps, Eq. (11), s."""
+        if self.t_eps is not None:
+            return self.t_eps
+        return _PUT["t_eps"] if self.firing == "put" else 0.0
+
+    @property
+    def critical_V_C1(self) -> float:
+        """V_C1 below which V_C2 can reach V_fire, from Eqs. (17) and (18), V.
+
+        Infinite where I_bias alone reaches it.
+        """
+        current = self.threshold_current
+        if current <= -self.I_T1s:
+            return math.inf
+        U = self.V_T * math.log1p(current / self.I_T1s)
+        if self.t1 == "emitter_resistor":
+            U += self.R3 * current
+        return self.V_S - U
+
+    @property
+    def threshold_current(self) -> float:
+        """Collector current that just keeps V_C2 at V_fire, A."""
+        return self.fire_voltage / self.R_L - self.I_bias
+
+
+def _checked(name: str, value: object) -> float:
+    unit = _UNITS[name]
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
+        raise ParameterError(
+            f"{name} = {value!r} must be a number in {unit or 'ones'}."
+        )
+    number = float(value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} = {number} {unit} must be finite.")
+    if name in _POSITIVE and not SMALLEST <= number <= LARGEST:
+        raise ParameterError(
+            f"{name} = {number:g} {unit} must lie between {SMALLEST:g} and "
+            f"{LARGEST:g} {unit}."
+        )
+    if unit == "V" and abs(number) > LARGEST_VOLTAGE:
+        raise ParameterError(
+            f"{name} = {number:g} V must lie between -{LARGEST_VOLTAGE:g} and "
+            f"{LARGEST_VOLTAGE:g} V."
+        )
+    return number
+
+
+PARAMETERS = tuple(field.name for field in fields(Circuit))
+"""Names of all parameters and options, in the order of Table 1."""
+
+
+def thermal_voltage(temperature: float) -> float:
+    """V_T = kT/q at `temperature` K, V.
+
+    Raises:
+        ParameterError: the temperature is not between 1 K and 1000 K.
+    """
+    if not 1.0 <= temperature <= 1000.0:
+        raise ParameterError(
+            f"temperature = {temperature} K must lie between 1 K and 1000 K."
+        )
+    return 1.380649e-23 * temperature / 1.602176634e-19
+
+
+def V_P(circuit: Circuit, V_P0: float, slope: float, time: float) -> float:
+    """Eq. (7) after `time` s from V_P0 under a force of constant slope N/s, V."""
+    e = math.expm1(-time / circuit.tau)
+    return V_P0 + V_P0 * e - circuit.k_F * slope * circuit.tau * e
+
+
+def I_DS(circuit: Circuit, V_P: ArrayLike, V_C1: ArrayLike) -> FloatArray:
+    """Drain current of the PiezoFET, Eq. (8) with V_DS = V_C1, A."""
+    c = circuit
+    exponent = np.minimum((c.V_GS + np.asarray(V_P)) / (c.m * c.V_T), 600.0)
+    current: FloatArray = (
+        c.I_S * np.exp(exponent) * -np.expm1(-np.asarray(V_C1) / c.V_T)
+    )
+    return current
+
+
+def V_C1_slope(circuit: Circuit, V_P: ArrayLike, V_C1: ArrayLike) -> FloatArray:
+    """dV_C1/dt, Eq. (16), V/s."""
+    c, V = circuit, np.asarray(V_C1)
+    slope: FloatArray = ((c.V_S - V) / c.R1 - V / c.R2 - I_DS(c, V_P, V)) / c.C1
+    return slope
+
+
+def I_C(circuit: Circuit, V_C1: ArrayLike) -> FloatArray:
+    """Collector current of T1, Eq. (17), A.
+
+    With R3 in the emitter, V_EB + R3 I_C = V_S - V_C1 has the closed form of the
+    Wright omega function; "direct" takes V_EB = V_S - V_C1.
+    """
+    c, U = circuit, circuit.V_S - np.asarray(V_C1, dtype=np.float64)
+    if c.t1 == "direct":
+        direct: FloatArray = c.I_T1s * np.expm1(np.minimum(U / c.V_T, 700.0))
+        return direct
+    drop = c.I_T1s * c.R3
+    omega = wright_omega((U + drop) / c.V_T + math.log(drop / c.V_T))
+    current: FloatArray = c.V_T / c.R3 * omega - c.I_T1s
+    return current
+
+
+def wright_omega(z: ArrayLike) -> FloatArray:
+    """The root w of w + ln w = z, by Fritsch, Shafer and Crowley's iteration."""
+    z = np.asarray(z, dtype=np.float64)
+    small = np.exp(np.minimum(z, 1.0))
+    large = np.log(np.maximum(z, 1.0))
+    w = np.where(z < 1.0, small / (1.0 + 0.76 * small), z - large * (1 - 1 / (1 + z)))
+    tiny = z < -40.0
+    w, z = np.where(tiny, 1.0, w), np.where(tiny, 1.0, z)
+    for _ in range(3):
+        r = z - w - np.log(w)
+        a = (1 + w) * (1 + w + 2 / 3 * r)
+        w = w * (1 + r / (1 + w) * (a - 0.5 * r) / (a - r))
+    omega: FloatArray = np.where(tiny, small, w)
+    return omega
+
+
+def V_C2_slope(circuit: Circuit, V_C1: ArrayLike, V_C2: ArrayLike) -> FloatArray:
+    """dV_C2/dt between spikes, Eq. (18), V/s."""
+    c = circuit
+    slope: FloatArray = (I_C(c, V_C1) + c.I_bias - np.asarray(V_C2) / c.R_L) / c.C2
+    return slope
+
+
+def rest_V_C1(circuit: Circuit, V_P: float = 0.0) -> float:
+    """Equilibrium of V_C1 at a given V_P, the root of Eq. (16), V.
+
+    The root is unique: Eq. (16) falls strictly from a positive value at 0 V to a
+    negative one at the open divider's voltage.
+    """
+    c = circuit
+    open_divider = c.V_S * c.R2 / (c.R1 + c.R2)
+    G = 1 / c.R1 + 1 / c.R2
+    log_A = math.log(c.I_S / G) + (c.V_GS + V_P) / (c.m * c.V_T)
+    A = math.exp(min(log_A, 600.0))
+    low, high = 0.0, open_divider
+    # convex in V, so Newton from the left of the root never overshoots
+    V = max(0.0, open_divider - A)
+    for _ in range(200):
+        f = open_divider - V + A * math.expm1(-V / c.V_T)
+        low, high = (V, high) if f > 0 else (low, V)
+        V_next = V + f / (1 + A / c.V_T * math.exp(-V / c.V_T))
+        if not low <= V_next <= high:
+            V_next = 0.5 * (low + high)
+        if abs(V_next - V) <= 2e-16 * V_next:
+            return V_next
+        V = V_next
+    return V
+
+
+@lru_cache(maxsize=256)
+def rest_point(circuit: Circuit) -> tuple[float, float]:
+    """V_C1 and V_C2 at equilibrium, V; V_C2 as if it did not fire."""
+    V_C1 = rest_V_C1(circuit)
+    return V_C1, rest_V_C2(circuit, V_C1)
+
+
+def fires_at_rest(circuit: Circuit) -> bool:
+    """Whether the equilibrium lies above V_fire."""
+    return rest_point(circuit)[1] >= circuit.fire_voltage
+
+
+def rest_V_C2(circuit: Circuit, V_C1: float) -> float:
+    """Equilibrium of V_C2 at a given V_C1 without firing, Eq. (18), V."""
+    return float(circuit.R_L * (I_C(circuit, V_C1) + circuit.I_bias))

@@ -1,0 +1,1 @@
+"""Our solver beside others: error against run time, and extreme cases."""

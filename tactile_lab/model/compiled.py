@@ -1,0 +1,46 @@
+"""Compile the solver's inner functions with numba, and keep the machine code on disk.
+
+See docs/decisions/ for why. numba keys its disk cache on the one file that holds the
+entry point; `source_stamp` makes the key cover every file of the solver, so that an
+edit anywhere in it can never run old machine code.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., Any])
+COMPILED = (
+    "compiled.py", "tableau.py", "node_a.py", "integrator.py", "spiking.py",
+    "kernel.py", "sampling.py",
+)  # fmt: skip
+"""Every file that machine code is made from."""
+# wrappers for calls from Python or C would double the time to compile
+_INNER: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+
+
+def inner(function: F) -> F:
+    """Compile as part of whichever entry point calls it."""
+    return cast(F, njit(**_INNER)(function))
+
+
+def entry(function: F) -> F:
+    """Compile on the first call, keep on disk, run without the interpreter's lock."""
+    return cast(F, njit(error_model="numpy", cache=True, nogil=True)(function))
+
+
+def source_stamp() -> int:
+    """A number that changes with any of the files above."""
+    stamp = 0
+    for name in COMPILED:
+        stamp = zlib.crc32((Path(__file__).parent / name).read_bytes(), stamp)
+    return stamp

@@ -1,0 +1,139 @@
+"""The leaky integrator: V_C2 between spikes in closed form, Eqs. (17) and (18).
+
+With Q = R_L (I_C + I_bias) as a Chebyshev series on a piece, tau_L P' = Q - P has a
+particular solution P as a series, and V_C2 = P + c exp(-t/tau_L) between resets.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import inner
+from tactile_lab.model.node_a import V_T
+from tactile_lab.model.tableau import ORDER, TO_SERIES
+
+DIRECT, V_S, T1_LOG, T1_DROP, T1_SCALE, T1_SHIFT = range(6, 12)
+TAU_L, V_FIRE, V_RESET, T_EPS, Y_CRITICAL, Y_SATURATED = range(12, 18)
+"""Where `par` holds what T1 and the integrator need."""
+PARAMETERS = 18
+
+SHORT, LONG = 24.0, 48.0
+"""Pieces of up to SHORT tau_L resolve exp(-t/tau_L); from LONG on they need not."""
+MOST_TERMS = 40
+
+
+@inner
+def omega(z: float) -> float:
+    """Wright omega: w + ln w = z, by Fritsch, Shafer and Crowley's iteration."""
+    if z < -1.0:
+        w = math.exp(z)
+        if z < -40.0:
+            return w
+        w *= 1.0 - w / (1.0 + w)
+    elif z < 3.0:
+        w = 0.567 + (z - 0.0) * (0.362 + 0.0737 * z - 0.003 * z * z)
+        w = max(w, 0.2)
+    else:
+        log = math.log(z)
+        w = z - log + log / z
+    for _ in range(2):
+        r = z - w - math.log(w)
+        one = 1.0 + w
+        a = one * (one + 2.0 / 3.0 * r)
+        w *= 1.0 + r / one * (a - 0.5 * r) / (a - r)
+    return w
+
+
+@inner
+def Q_at(y: float, par: FloatArray) -> float:
+    """R_L (I_C + I_bias) at V_C1 = y, Eq. (17), V."""
+    U = par[V_S] - y
+    if par[DIRECT] != 0.0:
+        direct: float = par[T1_SCALE] * math.expm1(min(U / par[V_T], 600.0))
+        return direct + float(par[T1_SHIFT])
+    z = (U + par[T1_DROP]) / par[V_T] + par[T1_LOG]
+    Q: float = par[T1_SCALE] * omega(z) + par[T1_SHIFT]
+    return Q
+
+
+@inner
+def Q_gain(Q: float, par: FloatArray) -> float:
+    """-dQ/dV_C1 where Q has this value."""
+    w = (Q - par[T1_SHIFT]) / par[T1_SCALE]
+    if par[DIRECT] != 0.0:
+        w += 1.0
+    else:
+        w /= 1.0 + w
+    gain: float = par[T1_SCALE] / par[V_T] * w
+    return gain
+
+
+@inner
+def to_series(values: FloatArray, series: FloatArray) -> None:
+    """Chebyshev coefficients of the polynomial through values at POINTS."""
+    points = values.size
+    for n in range(points):
+        total = 0.0
+        for i in range(points):
+            total += TO_SERIES[n, i] * values[i]
+        series[n] = total
+
+
+@inner
+def series_at(series: FloatArray, degree: int, x: float) -> float:
+    """Sum of c_n T_n(x) over n = 1 .. degree (without c_0), by Clenshaw."""
+    b1 = b2 = 0.0
+    x2 = 2.0 * x
+    for n in range(degree, 0, -1):
+        b1, b2 = series[n] + x2 * b1 - b2, b1
+    return x * b1 - b2
+
+
+@inner
+def particular(q: FloatArray, r: float, P: FloatArray) -> int:
+    """Series of a P with (1/r) dP/du + P = Q, r = piece / tau_L; returns its degree.
+
+    From LONG on it is the one polynomial that solves the equation; below, the one that
+    starts at Q(0), by the tridiagonal recursion of the integrated equation.
+    """
+    if r >= LONG:
+        # P_n = q_n - (2/r) (dP/dx)_n, from the top; d_n the coefficients of dP/dx
+        later = d = 0.0
+        P[ORDER] = q[ORDER]
+        for n in range(ORDER - 1, -1, -1):
+            following = later + 2.0 * (n + 1) * P[n + 1]
+            later, d = d, following
+            P[n] = q[n] - (2.0 / r) * (following if n else 0.5 * following)
+        return ORDER
+    degree = min(ORDER + 2 + math.ceil(r), MOST_TERMS)
+    half = 0.5 * r
+    # P_n = alpha_n - beta_n P_(n-1), from the top; beta kept in P's upper half
+    alpha = beta = 0.0
+    for n in range(degree, 0, -1):
+        below = q[n - 1] if n - 1 <= ORDER else 0.0
+        above = q[n + 1] if n + 1 <= ORDER else 0.0
+        if n == 1:
+            below *= 2.0
+        d = 1.0 / (2.0 * n + half * beta)
+        alpha = half * (below - above + alpha) * d
+        beta = half * (2.0 if n == 1 else 1.0) * d
+        P[n] = alpha
+        P[MOST_TERMS + 1 + n] = beta
+    # P = X + P_0 Y with Y_0 = 1; P(-1) = Q(-1) fixes P_0
+    X = 0.0
+    Y = 1.0
+    x_n, y_n, sign = 0.0, 1.0, 1.0
+    wanted = q[0]
+    for n in range(1, degree + 1):
+        sign = -sign
+        x_n = P[n] - P[MOST_TERMS + 1 + n] * x_n
+        y_n = -P[MOST_TERMS + 1 + n] * y_n
+        X += sign * x_n
+        Y += sign * y_n
+        if n <= ORDER:
+            wanted += sign * q[n]
+    P[0] = (wanted - X) / Y
+    for n in range(1, degree + 1):
+        P[n] -= P[MOST_TERMS + 1 + n] * P[n - 1]
+    return degree

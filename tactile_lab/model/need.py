@@ -1,0 +1,121 @@
+"""What is asked for, and what that needs: stages nothing depends on are left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from tactile_lab.errors import ParameterError
+
+DEPENDS = {
+    "force": (),
+    "V_P": (),
+    "V_C1": ("V_P",),
+    "I_DS": ("V_P", "V_C1"),
+    "I_C": ("V_C1",),
+    "V_C2": ("I_C", "spikes"),
+    "spikes": ("I_C",),
+    "V_K": ("spikes",),
+    "rate": ("spikes",),
+    "statistics": ("I_C",),
+}
+"""What each signal is computed from; "statistics" is spikes counted, not kept."""
+
+EVENTS = frozenset({"spikes", "V_K", "rate", "statistics"})
+"""Signals that are known from the spikes alone, in as much memory as those take."""
+
+STAGES = ("V_P", "V_C1", "I_C", "V_C2", "spikes", "V_K")
+"""Stages of the cascade with a counter each."""
+
+
+def _closure(names: Sequence[str]) -> frozenset[str]:
+    found: set[str] = set()
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting.extend(DEPENDS[name])
+    return frozenset(found)
+
+
+@dataclass(frozen=True)
+class Need:
+    """The closure of what is kept.
+
+    Attributes:
+        signals: kept signals and all they depend on.
+        sampled: those that can be sampled; spikes alone store no waveform.
+        left_out: signals that nothing kept depends on.
+    """
+
+    signals: frozenset[str]
+    sampled: frozenset[str]
+    left_out: tuple[str, ...]
+
+    @classmethod
+    def of(cls, keep: Sequence[str]) -> Need:
+        """What `keep` needs.
+
+        Raises:
+            ParameterError: a name that is no signal of the model.
+        """
+        return _need((keep,) if isinstance(keep, str) else tuple(keep))
+
+    @property
+    def dense(self) -> bool:
+        """Whether steps of V_P or V_C1 are stored to be sampled."""
+        return bool(self.sampled & {"V_P", "V_C1", "V_C2"})
+
+    @property
+    def integrator(self) -> bool:
+        """Whether V_C2 and its spikes must be solved."""
+        return bool(self.signals & {"V_C2", "spikes", "statistics"})
+
+    @property
+    def node_a(self) -> bool:
+        """Whether V_C1 must be solved."""
+        return "V_C1" in self.signals
+
+
+@lru_cache(maxsize=256)
+def _need(keep: tuple[str, ...]) -> Need:
+    unknown = [name for name in keep if name not in DEPENDS]
+    if unknown:
+        raise ParameterError(
+            f"{unknown[0]!r} is no signal of the model; "
+            f"choose from {', '.join(DEPENDS)}."
+        )
+    signals = _closure(keep)
+    waveforms = [name for name in keep if name not in EVENTS]
+    sampled = _closure(waveforms) | frozenset(keep)
+    # spikes are found in V_C2, whether its waveform is kept or not
+    counted = signals & {"spikes", "statistics"}
+    solved = signals | {"V_C2"} if counted else signals
+    left_out = tuple(
+        name for name in DEPENDS if name not in solved and name != "statistics"
+    )
+    return Need(signals, sampled, left_out)
+
+
+SMALLEST_TOLERANCE = 1e-14
+LARGEST_TOLERANCE = 1e-2
+
+
+def checked_tolerance(tolerance: float) -> float:
+    """The tolerance (s of spike time, V of V_C1) if it can be asked for.
+
+    Raises:
+        ParameterError: below machine precision, too coarse, or not a number.
+    """
+    if not (
+        math.isfinite(tolerance)
+        and SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE
+    ):
+        raise ParameterError(
+            f"tolerance = {tolerance} s must lie between {SMALLEST_TOLERANCE:g} s "
+            f"(machine precision) and {LARGEST_TOLERANCE:g} s."
+        )
+    return float(tolerance)

@@ -1,0 +1,154 @@
+"""The sensor under a force: spikes and signals, how accurate, how long it took."""
+
+from __future__ import annotations
+
+import math
+import time as wall
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_lab.errors import ParameterError
+from tactile_lab.model.advance import rest
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit, FloatArray
+from tactile_lab.model.need import Need, checked_tolerance
+from tactile_lab.model.solution import Solution
+from tactile_lab.model.solver import solve
+from tactile_lab.model.state import State
+from tactile_lab.waveform import Waveform
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Voltages at time 0 instead of the equilibrium; a cold start is all 0 V."""
+
+    V_P: float
+    V_C1: float
+    V_C2: float
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Largest estimated error over a result.
+
+    Attributes:
+        spike_time: s; None where spikes were left out.
+        V_C1: V; None where V_C1 was left out.
+    """
+
+    spike_time: float | None
+    V_C1: float | None
+
+
+@dataclass(frozen=True)
+class Result:
+    """What `simulate` found.
+
+    Attributes:
+        duration: s.
+        spike_times: shape (n,), s; None if not kept.
+        error: how far from the exact solution at most, by estimate.
+        run_time: wall time spent, s.
+        left_out: signals that were not computed because nothing asked for them.
+        warnings: where the model leaves what it describes well.
+        stages: evaluations of each stage, 0 where left out.
+    """
+
+    duration: float
+    spike_times: FloatArray | None
+    error: ErrorEstimate
+    run_time: float
+    left_out: tuple[str, ...]
+    warnings: tuple[str, ...]
+    stages: dict[str, int]
+    solution: Solution
+    end: State
+
+    def sample(self, signal: str, times: FloatArray) -> FloatArray:
+        """Values of `signal` at `times` s in [0, duration], right-continuous.
+
+        Args:
+            signal: force V_P I_DS V_C1 I_C V_C2 V_K or rate, if kept or implied.
+            times: any shape, s.
+
+        Raises:
+            ParameterError: the signal was not kept, or a time lies outside.
+        """
+        return self.solution.sample(signal, times)
+
+
+def simulate(
+    circuit: Circuit,
+    force: Waveform,
+    *,
+    keep: Sequence[str] = ("spikes",),
+    until: float | None = None,
+    start: Start | None = None,
+    tolerance: float = 1e-9,
+) -> Result:
+    """Simulate the circuit from time 0 under a force, Eqs. (1)-(18).
+
+    Args:
+        circuit: parameters.
+        force: N over s; before its first point the first value was held for ever.
+        keep: what is wanted; stages that nothing wanted depends on are left out.
+        until: end, s; the force's last point if None.
+        start: voltages at time 0; equilibrium if None.
+        tolerance: of spike times (s) and V_C1 (V).
+
+    Raises:
+        ParameterError: a bad option or waveform.
+        SolverError: the model cannot answer to that tolerance.
+    """
+    duration = force.end if until is None else until
+    if not (math.isfinite(duration) and duration > 0):
+        raise ParameterError(
+            f"The duration is {duration} s; it must be finite and above 0 s. Give "
+            "`until` or a force with a last point after 0 s."
+        )
+    if force.start < 0:
+        raise ParameterError(
+            f"The force starts at {force.start:g} s; a simulation starts at 0 s. "
+            "Shift the waveform."
+        )
+    need = Need.of(keep)
+    tolerance = checked_tolerance(tolerance)
+    began = wall.perf_counter()
+    first = rest(circuit, force=float(force.value[0]))
+    if start is not None:
+        first = _started(circuit, start, first.force)
+    end, solution = solve(circuit, first, force, duration, need, tolerance)
+    return Result(
+        duration=duration,
+        spike_times=solution.spike_times if "spikes" in need.signals else None,
+        error=ErrorEstimate(
+            solution.error_spike_time if need.integrator else None,
+            solution.error_V_C1 if need.node_a else None,
+        ),
+        run_time=wall.perf_counter() - began,
+        left_out=need.left_out,
+        warnings=solution.warnings,
+        stages=solution.stages,
+        solution=solution,
+        end=end,
+    )
+
+
+def _started(circuit: Circuit, start: Start, force: float) -> State:
+    for name, low, high in (
+        ("V_P", -LARGEST_VOLTAGE, LARGEST_VOLTAGE),
+        ("V_C1", 0.0, circuit.V_S),
+        ("V_C2", -LARGEST_VOLTAGE, circuit.fire_voltage),
+    ):
+        value = getattr(start, name)
+        if not (np.isfinite(value) and low <= value <= high):
+            raise ParameterError(
+                f"start {name} = {value} V must lie between {low:g} V and {high:g} V."
+            )
+    if start.V_C2 >= circuit.fire_voltage:
+        raise ParameterError(
+            f"start V_C2 = {start.V_C2:g} V must be below V_fire = "
+            f"{circuit.fire_voltage:g} V."
+        )
+    return State(time=0.0, force=force, V_P=start.V_P, V_C1=start.V_C1, V_C2=start.V_C2)

@@ -1,0 +1,127 @@
+"""The solved slice: spikes, and every signal at any time in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_lab.errors import ParameterError
+from tactile_lab.model import sampling
+from tactile_lab.model.circuit import I_C, I_DS, Circuit, FloatArray
+from tactile_lab.model.need import Need
+from tactile_lab.waveform import Waveform
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What is known of a spike train without keeping it.
+
+    Attributes:
+        count: number of spikes.
+        first: time of the first, s; None without spikes.
+        last: time of the last, s.
+        shortest: shortest interval between two spikes, s; None below two spikes.
+        longest: longest interval, s.
+    """
+
+    count: int
+    first: float | None
+    last: float | None
+    shortest: float | None
+    longest: float | None
+
+    @property
+    def mean_rate(self) -> float:
+        """Intervals per time between first and last spike, Hz; 0 below two spikes."""
+        if self.first is None or self.last is None or self.count < 2:
+            return 0.0
+        return (self.count - 1) / (self.last - self.first)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved slice [start, end] with dense evaluators, absolute time, s."""
+
+    circuit: Circuit
+    need: Need
+    force: Waveform
+    start: float
+    end: float
+    spike_times: FloatArray
+    before: tuple[float, ...]
+    """Up to two spike times before the slice."""
+    parameters: FloatArray
+    segments: FloatArray
+    steps: FloatArray
+    pieces: FloatArray
+    last: tuple[float, float, float]
+    """V_P, V_C1, V_C2 at the end, after a jump or reset there."""
+    stages: dict[str, int]
+    statistics: Statistics | None
+    error_spike_time: float
+    error_V_C1: float
+    warnings: tuple[str, ...]
+
+    def sample(self, signal: str, times: FloatArray) -> FloatArray:
+        """Values of `signal` at `times`, any shape, right-continuous.
+
+        Raises:
+            ParameterError: the signal was not kept, or a time lies outside.
+        """
+        if signal not in self.need.sampled or signal in ("spikes", "statistics"):
+            raise ParameterError(
+                f"{signal!r} was not kept as a waveform; add it to keep. Kept: "
+                f"{', '.join(sorted(self.need.sampled)) or 'nothing'}."
+            )
+        t = np.asarray(times, dtype=np.float64)
+        if t.size and not (np.min(t) >= self.start and np.max(t) <= self.end):
+            raise ParameterError(
+                f"Sample times must lie within {self.start:g} s to {self.end:g} s."
+            )
+        return self._values(signal, np.ascontiguousarray(t).ravel()).reshape(t.shape)
+
+    def _values(self, signal: str, t: FloatArray) -> FloatArray:
+        if signal == "force":
+            return self.force.at(t)
+        if signal in ("V_K", "rate"):
+            return self._after_spikes(signal, t)
+        if signal == "I_DS":
+            return I_DS(self.circuit, self._values("V_P", t), self._values("V_C1", t))
+        if signal == "I_C":
+            return I_C(self.circuit, self._values("V_C1", t))
+        kind = ("V_P", "V_C1", "V_C2").index(signal)
+        rows = (self.segments, self.steps, self.pieces)[kind]
+        if rows.shape[0] == 0:
+            return np.full(t.size, self.last[kind])
+        starts = np.ascontiguousarray(
+            rows[:, 0] if kind == 0 else rows[:, 0] + rows[:, 1]
+        )
+        out = np.empty(t.size)
+        sampling.sample(kind, t, starts, rows, self.spike_times, self.parameters, out)
+        out[t == self.end] = self.last[kind]
+        return out
+
+    def _after_spikes(self, signal: str, t: FloatArray) -> FloatArray:
+        spikes = np.concatenate([np.array(self.before), self.spike_times])
+        last = np.searchsorted(spikes, t, side="right") - 1
+        out = np.zeros(t.size)
+        if signal == "rate":
+            known = last >= 1
+            out[known] = 1 / (spikes[last[known]] - spikes[last[known] - 1])
+            return out
+        self.stages["V_K"] += t.size
+        known = last >= 0
+        since = t[known] - spikes[last[known]]
+        c = self.circuit
+        height = c.fire_voltage - c.reset_voltage
+        if c.tau_K > 0:
+            # beyond 600 time constants there is nothing left but slow denormals
+            out[known] = np.where(
+                since < 600 * c.tau_K,
+                height * np.exp(-np.minimum(since / c.tau_K, 600.0)),
+                0.0,
+            )
+        else:
+            out[known] = np.where(since == 0, height, 0.0)
+        return out

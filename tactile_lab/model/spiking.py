@@ -1,0 +1,190 @@
+"""Spikes within one piece of the integrator, Eqs. (10) and (11): all of them, no other.
+
+Below V_fire and where Q > V_fire, V_C2' = (Q - V_C2)/tau_L > 0: V_C2 rises strictly, so
+each such interval holds exactly one crossing before the next reset if V_C2 at its end
+reaches V_fire, and none otherwise. Where Q <= V_fire there can be none.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import inner
+from tactile_lab.model.integrator import (
+    T_EPS,
+    TAU_L,
+    V_FIRE,
+    V_RESET,
+    Y_SATURATED,
+    series_at,
+)
+
+VOLTAGE, REF, REF_LOW, RESUME, ERROR = range(5)
+"""Integrator state: V_C2 = VOLTAGE at REF + REF_LOW s after the piece's start, held
+until RESUME (negative: not held), with an estimated error."""
+COUNT, FIRST, LAST, PREVIOUS, SHORTEST, LONGEST = range(5, 11)
+LARGEST_ERROR, DOUBT, SATURATED, TOO_FAST, SEARCHES = range(11, 16)
+"""Spike statistics, s; estimated error of spike times, s; flags."""
+MEMORY = 16
+EPS = 2.3e-16
+SHORTEST_INTERVAL = 1e-9
+"""Spikes closer than this, s, are refused: no circuit, and no end of them."""
+
+
+@inner
+def grown(spikes: FloatArray, count: int) -> FloatArray:
+    """The array, or a copy of twice its size where it is full."""
+    if count < spikes.size:
+        return spikes
+    larger = np.empty(2 * spikes.size)
+    for i in range(count):
+        larger[i] = spikes[i]
+    return larger
+
+
+@inner
+def fire(t: float, error: float, S: FloatArray) -> None:
+    """Count a spike at absolute time t s."""
+    if S[COUNT] == 0.0:
+        S[FIRST] = t
+    if S[LAST] > -np.inf:
+        interval = t - S[LAST]
+        S[SHORTEST] = min(S[SHORTEST], interval)
+        S[LONGEST] = max(S[LONGEST], interval)
+    S[PREVIOUS] = S[LAST]
+    S[LAST] = t
+    S[COUNT] += 1.0
+    S[LARGEST_ERROR] = max(S[LARGEST_ERROR], error + EPS * abs(t))
+
+
+@inner
+def run_piece(
+    t: float,
+    s: float,
+    length: float,
+    q: FloatArray,
+    P: FloatArray,
+    degree: int,
+    fires: FloatArray,
+    Q_error: float,
+    y: float,
+    par: FloatArray,
+    S: FloatArray,
+    spikes: FloatArray,
+    keep: bool,
+    most: float,
+) -> FloatArray:
+    """Carry V_C2 through a piece that starts s after the segment's start at t.
+
+    `fires` holds pairs (from, to) of the intervals with Q > V_fire, s after the piece's
+    start, empty ones with to <= from. Returns the array of spikes, grown if need be.
+    """
+    tau = par[TAU_L]
+    to_x = 2.0 / length
+    V_f, V_r = par[V_FIRE], par[V_RESET]
+    for k in range(fires.size // 2):
+        a, b = fires[2 * k], fires[2 * k + 1]
+        while b > a:
+            if S[RESUME] >= 0.0:
+                if S[RESUME] >= b:
+                    break
+                S[REF], S[REF_LOW], S[VOLTAGE] = S[RESUME], 0.0, V_r
+                S[RESUME] = -1.0
+            ref = S[REF]
+            left = (b - ref) - S[REF_LOW]
+            if left <= 0.0:
+                break
+            V = S[VOLTAGE]
+            P_ref = series_at(P, degree, ref * to_x - 1.0)
+            above = V - (P[0] + P_ref)
+            need = V_f - V
+            low, high = 0.0, left
+            sure = False
+            d = max(a - ref, 0.0)
+            e = math.expm1(-d / tau)
+            slope = 0.0
+            if need > 0.0:
+                d = left
+                if -above > need:
+                    d = min(left, -tau * math.log1p(need / above))
+                missed, margin = False, 0.0
+                for _ in range(100):
+                    S[SEARCHES] += 1.0
+                    x = (ref + d) * to_x - 1.0
+                    e = math.expm1(-d / tau)
+                    w = above * e + (series_at(P, degree, x) - P_ref) - need
+                    slope = (q[0] + series_at(q, q.size - 1, x) - V_f - w) / tau
+                    if w < 0.0:
+                        if d >= left:
+                            missed = True
+                            margin = -w
+                            break
+                        low = d
+                    else:
+                        high = d
+                        sure = True
+                    change = -w / slope if slope > 0.0 else np.inf
+                    following = d + change
+                    if following >= high and not sure:
+                        following = left
+                    elif not low <= following <= high:
+                        following = 0.5 * (low + high)
+                    settled = abs(following - d) <= 1e-15 * d
+                    if abs(change) <= 1e-9 * d and slope * tau > 1e-2 * (V_f - V):
+                        settled = True
+                    if following >= left and not sure:
+                        settled = False
+                    d = following
+                    if settled:
+                        break
+                if missed:
+                    e = math.expm1(-left / tau)
+                    error = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V_f)
+                    if margin < error:
+                        S[DOUBT] = 1.0
+                    break
+            # a spike at ref + d, kept as a sum of two numbers
+            rough = ref + d
+            low_part = S[REF_LOW] + ((ref - rough) + d)
+            v = rough + low_part
+            carry = (rough - v) + low_part
+            at = t + (s + v)
+            x = v * to_x - 1.0
+            Q = q[0] + series_at(q, q.size - 1, x)
+            slope = (Q - V_f) / tau
+            error = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V_f)
+            time_error = error / max(slope, 1e-300)
+            time_error += EPS * d
+            if b - v < 2.0 * time_error and b < length:
+                S[DOUBT] = 1.0
+            fire(at, time_error, S)
+            if keep:
+                spikes = grown(spikes, int(S[COUNT]))
+                spikes[int(S[COUNT]) - 1] = at
+            if y < par[Y_SATURATED]:
+                S[SATURATED] = 1.0
+            S[ERROR] = time_error * (Q - V_r) / tau
+            S[REF], S[REF_LOW], S[VOLTAGE] = v, carry, V_r
+            if par[T_EPS] > 0.0:
+                S[RESUME] = v + carry + par[T_EPS]
+            closest = max(SHORTEST_INTERVAL, 4.0 * EPS * abs(at))
+            if (need == V_f - V_r and d + par[T_EPS] < closest) or S[COUNT] >= most:
+                S[TOO_FAST] = 1.0
+                return spikes
+    if S[RESUME] >= length:
+        S[RESUME] -= length
+        return spikes
+    if S[RESUME] >= 0.0:
+        S[REF], S[REF_LOW], S[VOLTAGE], S[RESUME] = S[RESUME], 0.0, V_r, -1.0
+    d = (length - S[REF]) - S[REF_LOW]
+    if d > 0.0:
+        P_ref = series_at(P, degree, S[REF] * to_x - 1.0)
+        e = math.expm1(-d / tau)
+        V = S[VOLTAGE]
+        S[VOLTAGE] = V + (V - P[0] - P_ref) * e + (series_at(P, degree, 1.0) - P_ref)
+        S[ERROR] = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V)
+    S[REF] = S[REF_LOW] = 0.0
+    return spikes

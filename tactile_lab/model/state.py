@@ -1,0 +1,38 @@
+"""All that the model remembers between two slices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """The circuit at one instant, after any jump or reset there; can be pickled.
+
+    Attributes:
+        time: s, absolute.
+        force: N.
+        V_P: piezoelectric voltage, V.
+        V_C1: voltage of node A, V.
+        V_C2: voltage of the integrator, V.
+        resume: end of a reset in progress, s; V_C2 is held until then.
+        last_spike: time of the last spike, s, None before the first.
+        previous_spike: time of the one before, s.
+        spikes: number of spikes so far.
+        error_V_C1: estimated error of V_C1 so far, V.
+        error_V_C2: estimated error of V_C2 so far, V.
+        left_out: stages not advanced up to `time`; their values are older.
+    """
+
+    time: float
+    force: float
+    V_P: float
+    V_C1: float
+    V_C2: float
+    resume: float | None = None
+    last_spike: float | None = None
+    previous_spike: float | None = None
+    spikes: int = 0
+    error_V_C1: float = 0.0
+    error_V_C2: float = 0.0
+    left_out: tuple[str, ...] = ()

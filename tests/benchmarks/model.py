@@ -1,0 +1,87 @@
+"""The model's speed: ratios within one run. `python tests/benchmarks/model.py`."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.compare import general
+from tactile_lab.model.compare.scenes import accuracy_scenes
+from tactile_lab.model.simulate import simulate
+from tactile_lab.waveform import Waveform
+
+
+def least(action: Callable[[], object], repeats: int) -> float:
+    """Least wall time of several calls, s."""
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - began)
+    return min(times)
+
+
+def start_up(code: str) -> float:
+    """Least wall time of a new Python process, s."""
+    return least(lambda: subprocess.run([sys.executable, "-c", code], check=True), 4)
+
+
+def main() -> None:
+    """Print one line per goal."""
+    sensor, silent = Circuit(), Waveform.constant(0.0)
+    print("against CVODE Adams at 1e-9 (least of several, interleaved):")
+    for scene in accuracy_scenes()[:6]:
+        own, other = [], []
+        for _ in range(3):
+            own.append(
+                least(lambda s=scene: simulate(s.circuit, s.force, until=s.until), 20)
+            )
+            other.append(
+                least(lambda s=scene: general.cvode(s, "Adams", 1e-9, 60.0), 1)
+            )
+        print(
+            f"  {scene.name:9s} ours {min(own) * 1e3:7.3f} ms, CVODE "
+            f"{min(other) * 1e3:8.1f} ms, ratio {min(other) / min(own):.0f}"
+        )
+    scene = accuracy_scenes()[1]
+    found = simulate(scene.circuit, scene.force, until=scene.until, keep=("V_C1",))
+    spent = least(
+        lambda: simulate(scene.circuit, scene.force, until=13.0, keep=("V_C1",)), 50
+    )
+    steps = found.stages["V_C1"]
+    print(f"per step of V_C1, all included: {spent / steps * 1e6:.1f} us ({steps})")
+    fast = Circuit(C2=1e-15, V_GS=2.0)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.perf_counter()
+    many = simulate(fast, silent, until=0.8, keep=("statistics",))
+    spent = time.perf_counter() - began
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    statistics = many.solution.statistics
+    assert statistics is not None
+    print(
+        f"{statistics.count} spikes counted in {spent:.2f} s: "
+        f"{spent / statistics.count * 1e6:.2f} us a spike, "
+        f"{(after - before) / 1024:.1f} MB more memory"
+    )
+    short = least(lambda: simulate(sensor, silent, until=10.0), 50)
+    long = least(lambda: simulate(sensor, silent, until=1e6), 50)
+    print(f"1e6 s of silence over 10 s of silence: {long / short:.2f}")
+    numba = start_up("import numba")
+    first = start_up(
+        "from tactile_lab.model.simulate import simulate\n"
+        "from tactile_lab.model.circuit import Circuit\n"
+        "from tactile_lab.waveform import Waveform\n"
+        "simulate(Circuit(), Waveform.constant(0.2), until=1.0)"
+    )
+    print(
+        f"new process: import numba {numba:.2f} s, first simulation {first:.2f} s, "
+        f"beyond numba {first - numba:.2f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""The paper's circuit does what the equations say, and refuses nonsense."""
+
+import numpy as np
+import pytest
+
+from tactile_lab.errors import ParameterError
+from tactile_lab.model.advance import advance, rest
+from tactile_lab.model.circuit import I_C, Circuit, rest_V_C1, rest_V_C2
+from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.waveform import Waveform
+
+SANITY = Waveform.through([(0, 0), (1, 0), (1.01, 0.15), (11, 0.15), (11.01, 0)])
+
+
+def test_rest_point_is_the_one_of_table_1():
+    circuit = Circuit()
+    V_C1 = rest_V_C1(circuit)
+    assert V_C1 == pytest.approx(4.347038, abs=5e-7)
+    assert float(I_C(circuit, V_C1)) == pytest.approx(2.896e-9, rel=2e-4)
+    assert rest_V_C2(circuit, V_C1) == pytest.approx(1.448, abs=5e-4)
+
+
+def test_150_millinewton_gives_the_known_spikes():
+    result = simulate(Circuit(), SANITY, until=13.0)
+    assert result.spike_times.size == 37
+    assert result.spike_times[0] == pytest.approx(1.0533804034882868, abs=1e-8)
+    assert result.spike_times[-1] == pytest.approx(4.933638227816434, abs=1e-8)
+
+
+def test_slices_give_the_spikes_of_the_whole():
+    whole = simulate(Circuit(), SANITY, until=3.0).spike_times
+    state, spikes = rest(Circuit()), []
+    for until in np.arange(0.25, 3.01, 0.25):
+        state, outputs = advance(Circuit(), state, SANITY, until)
+        spikes.extend(outputs.spike_times)
+    assert spikes == pytest.approx(whole, abs=1e-8)
+
+
+def test_stages_nothing_asks_for_are_left_out():
+    result = simulate(Circuit(), SANITY, until=2.0, keep=("V_C1",))
+    assert result.spike_times is None
+    assert result.error.spike_time is None
+    assert result.stages["V_C1"] > 0
+    assert result.stages["V_C2"] == result.stages["spikes"] == 0
+    assert "V_C2" in result.left_out
+    with pytest.raises(ParameterError, match="not kept"):
+        result.sample("V_C2", np.array([1.0]))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"C1": 0.0}, {"C1": float("nan")}, {"R3": -1.0}, {"V_GS": float("inf")},
+        {"V_reset": 4.0}, {"t1": "base"}, {"firing": "x"}, {"saturation": True},
+        {"t_eps": -1.0}, {"R_k": -1.0}, {"d": 1.0}, {"C2": 1e-200}, {"m": True},
+    ],
+)  # fmt: skip
+def test_impossible_parameters_are_named(wrong):
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        Circuit(**wrong)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tolerance": 1e-30}, {"tolerance": float("nan")}, {"until": -1.0},
+        {"until": float("inf")}, {"keep": ("V_X",)},
+        {"start": Start(V_P=0, V_C1=0, V_C2=4.0)},
+        {"start": Start(V_P=float("nan"), V_C1=0, V_C2=0)},
+    ],
+)  # fmt: skip
+def test_impossible_options_are_refused(options):
+    with pytest.raises(ParameterError):
+        simulate(Circuit(), SANITY, **options)

@@ -1,0 +1,109 @@
+"""Against the 40-digit reference: right spikes, and an honest error estimate."""
+
+from decimal import Decimal
+
+import numpy as np
+import pytest
+
+from tactile_lab.model.campaign import compare, random_case
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.compare.extremes import grazing
+from tactile_lab.model.reference import constant_firing, reference
+from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.waveform import Waveform
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4, 5, 7, 8])
+def test_random_scenes_have_errors_below_the_estimate(seed):
+    comparison = compare(random_case(seed), samples=15)
+    assert comparison.honest, comparison
+
+
+def error_of(circuit, force, until, start=None):
+    times = np.linspace(0, until, 17)
+    found = simulate(
+        circuit, force, until=until, start=start, keep=("spikes", "V_C1", "V_C2")
+    )
+    exact = reference(circuit, force, until, start=start, times=times.tolist())
+    assert found.spike_times.size == len(exact.spike_times)
+    spikes = [
+        abs(float(Decimal(a) - b))
+        for a, b in zip(found.spike_times.tolist(), exact.spike_times, strict=True)
+    ]
+    V_C1 = [
+        abs(float(Decimal(a) - b))
+        for a, b in zip(found.sample("V_C1", times).tolist(), exact.V_C1, strict=True)
+    ]
+    V_C2 = [
+        abs(float(Decimal(a) - b))
+        for a, b in zip(found.sample("V_C2", times).tolist(), exact.V_C2, strict=True)
+    ]
+    return max(spikes, default=0.0), max(V_C1), max(V_C2)
+
+
+@pytest.mark.parametrize(
+    ("circuit", "force", "until", "start"),
+    [
+        (Circuit(), Waveform.through([(0, 0), (0.1, 0), (0.1, 0.3)]), 0.2, None),
+        (Circuit(), Waveform.through([(0.1, 0), (0.1 + 1e-12, 0.2)]), 0.4, None),
+        (Circuit(firing="put"), Waveform.through([(0, 0), (0.01, 0.2)]), 0.4, None),
+        (
+            Circuit(t1="direct", I_T1s=2.873e-20),
+            Waveform.through([(0, 0), (0.01, 0.03)]),
+            0.02,
+            None,
+        ),
+        (Circuit(), Waveform.constant(0), 0.3, Start(V_P=0.3, V_C1=0, V_C2=0)),
+        (Circuit(C2=1.5e-12), Waveform.through([(0, 0), (1e-3, 0.2)]), 8e-3, None),
+        (Circuit(tau=0.05), Waveform.through([(0, 0), (0.1, 0.4)]), 0.5, None),
+        (Circuit(V_reset=-2.0, t_eps=3e-3), Waveform.through([(0, 0), (0, 0.2)]), 0.3,
+         None),
+    ],
+    ids="jump ramp put direct cold fast decay reset".split(),
+)  # fmt: skip
+def test_errors_are_near_machine_precision(circuit, force, until, start):
+    spike_time, V_C1, V_C2 = error_of(circuit, force, until, start)
+    assert spike_time < 2e-14
+    assert V_C1 < 1e-12
+    assert V_C2 < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("circuit", "until"),
+    [(Circuit(C2=1e-15, V_GS=2.0), 0.01), (Circuit(V_GS=1.6), 1e4)],
+)
+def test_long_firing_keeps_time_to_the_last_digits(circuit, until):
+    exact = constant_firing(circuit)
+    found = simulate(circuit, Waveform.constant(0), until=until, keep=("statistics",))
+    statistics = found.solution.statistics
+    assert found.spike_times is None
+    assert statistics.count == int(Decimal(until) / exact) > 1e5
+    gap = abs(float(Decimal(statistics.last) - statistics.count * exact))
+    assert gap <= found.error.spike_time < 1e-9
+    assert statistics.mean_rate == pytest.approx(1 / float(exact), rel=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-12, -1e-12, -1e-6])
+def test_a_spike_that_only_just_happens_or_not_is_decided(gap):
+    found = simulate(**_grazing(gap))
+    assert found.spike_times.size == (gap > 0)
+
+
+def _grazing(gap):
+    case = grazing(gap).problem
+    return {"circuit": case.circuit, "force": case.force, "until": case.until}
+
+
+def test_what_cannot_be_decided_is_said():
+    found = simulate(**_grazing(1e-17))
+    assert any("cannot be decided" in text for text in found.warnings)
+
+
+def test_a_coarser_tolerance_takes_fewer_steps_and_says_so():
+    force = Waveform.through([(0, 0), (0.01, 0.15)])
+    fine = simulate(Circuit(), force, until=2.0, tolerance=1e-11)
+    coarse = simulate(Circuit(), force, until=2.0, tolerance=1e-3)
+    assert coarse.stages["V_C1"] < 0.7 * fine.stages["V_C1"]
+    assert coarse.error.V_C1 > 10 * fine.error.V_C1
+    gap = np.max(np.abs(coarse.spike_times - fine.spike_times))
+    assert gap <= coarse.error.spike_time
