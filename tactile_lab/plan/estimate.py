@@ -1,0 +1,105 @@
+"""What a run will cost: time, samples, disk, current, heat, and how finely it sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_lab.bench import Channel, CoilLimits
+from tactile_lab.plan.heat import heat_along
+from tactile_lab.plan.needs import Needs
+from tactile_lab.plan.timeline import Timeline
+from tactile_lab.plugins import update_interval
+from tactile_lab.scene.scene import Scene
+from tactile_lab.waveform import Waveform
+
+BYTES_PER_SAMPLE = 2
+COMPRESSION = 6.0
+"""How much smaller 8-bit codes with a code of noise become (measured: 6.1 to 6.7)."""
+CODES = 127
+"""Steps of an 8-bit converter from 0 to full scale."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What running a scene takes; SI units.
+
+    Attributes:
+        duration: of the experiment, s.
+        streamed: part of it during which samples are taken, s.
+        trials: how many.
+        samples_per_channel: taken of each enabled channel.
+        samples_stored: of all stored channels together.
+        disk_raw, disk: bytes before and after compression.
+        peak_force, peak_current: largest magnitudes, N and A.
+        heat, heat_budget: largest leaky I^2 t and what is allowed, A^2 s.
+        update_interval: time between two set-points of the coil, s; None where no
+            coil is opened.
+        step_current, step_force: largest change from one set-point to the next, A, N.
+        resolution: one code of each enabled channel, in the signal's unit.
+    """
+
+    duration: float
+    streamed: float
+    trials: int
+    samples_per_channel: int
+    samples_stored: int
+    disk_raw: int
+    disk: int
+    peak_force: float
+    peak_current: float
+    heat: float
+    heat_budget: float
+    update_interval: float | None
+    step_current: float
+    step_force: float
+    resolution: dict[str, float]
+
+
+def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Estimate:
+    """What running `scene` takes."""
+    coil, current = scene.bench.coil, drive.current
+    assert current is not None
+    interval = update_interval(coil) if needed.coil and coil is not None else None
+    limits = CoilLimits() if coil is None else coil.limits
+    samples = round(drive.streamed * scene.record.sample_rate)
+    if not needed.channels:
+        samples = 0
+    raw = samples * len(needed.stored) * BYTES_PER_SAMPLE
+    step = 0.0 if interval is None else largest_step(current, interval)
+    return Estimate(
+        duration=drive.duration,
+        streamed=drive.streamed,
+        trials=len(drive.steps),
+        samples_per_channel=samples,
+        samples_stored=samples * len(needed.stored),
+        disk_raw=raw,
+        disk=round(raw / COMPRESSION),
+        peak_force=drive.force.peak,
+        peak_current=current.peak,
+        heat=heat_along(current, limits)[1],
+        heat_budget=limits.heat,
+        update_interval=interval,
+        step_current=step,
+        step_force=step * abs(scene.bench.magnet.newtons_per_ampere),
+        resolution={c.signal: resolution(c) for c in needed.channels},
+    )
+
+
+def resolution(channel: Channel) -> float:
+    """One code of an 8-bit converter on that channel, in the signal's unit."""
+    return channel.range / CODES * abs(channel.scale)
+
+
+def largest_step(wave: Waveform, interval: float) -> float:
+    """Largest change of `wave` within `interval` s, wherever the update grid lies.
+
+    A piecewise-linear wave changes most between two instants of which one is a point
+    of it.
+    """
+    before = np.concatenate([wave.time, wave.time - interval])
+    left = np.nextafter(wave.time, -np.inf)  # the value just before a jump
+    before = np.concatenate([before, left])
+    change = np.abs(wave.at(before + interval) - wave.at(before))
+    return float(change.max(initial=0.0))

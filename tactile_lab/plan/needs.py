@@ -1,0 +1,123 @@
+"""What a scene needs: the closure of what it records and plays.
+
+The runner, the benches and `plan` all ask here, so that what is not needed is not
+opened, enabled, streamed, stored or computed by any of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tactile_lab.bench import Channel
+from tactile_lab.errors import SceneError
+from tactile_lab.plan.asked import asked_signals
+from tactile_lab.plan.timeline import timeline
+from tactile_lab.plugins import check_scope, scope_capability
+from tactile_lab.scene.scene import Scene
+from tactile_lab.signals import SIGNALS
+
+SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
+"""Signals that exist as samples of a scope channel and in no other way."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Needs:
+    """What one run of a scene opens, enables and keeps.
+
+    Attributes:
+        coil: whether the current source is opened: not where no trial asks for force.
+        field_meter: whether the teslameter is opened.
+        channels: scope channels to enable, in the bench's order; none: no scope.
+        stored: signals of those that are stored sample by sample.
+        detect_on: signal spikes are detected on ("V_K", or "V_C2" by its resets where
+            no V_K is wired); None where no spikes are asked for.
+        model: recorded signals that no instrument measures: computed from the applied
+            current and labelled "model".
+        guaranteed_rate: streaming rate the scope's maker guarantees for so many
+            channels, S/s; infinite where it is not known.
+    """
+
+    coil: bool
+    field_meter: bool
+    channels: tuple[Channel, ...]
+    stored: tuple[str, ...]
+    detect_on: str | None
+    model: tuple[str, ...]
+    guaranteed_rate: float
+
+
+def needs(scene: Scene) -> Needs:
+    """The closure of `scene`.
+
+    Raises:
+        SceneError: something asked for is not wired or not there on this bench, or the
+            threshold lies outside the range of the channel it is looked for on.
+        LimitError: the scope cannot stream so, or the coil cannot play it.
+    """
+    asked = asked_signals(scene)
+    scope = scene.bench.scope
+    wired = {c.signal: c for c in scope.channels} if scope is not None else {}
+    wanted = {name for name in SAMPLED if name in asked}
+    if "I_DS" in asked:
+        # derived from V_C1 by Eq. (16) where no channel measures it
+        wanted.add("I_DS" if "I_DS" in wired else "V_C1")
+    detect_on = None
+    if asked & {"spikes", "rate"}:
+        detect_on = "V_K" if "V_K" in wired or "V_C2" not in wired else "V_C2"
+    streamed = wanted | ({detect_on} if detect_on else set())
+    for name in sorted(streamed - set(wired)):
+        raise SceneError(
+            f"{scene.name} needs {name}, but bench {scene.bench.name} wires it to no "
+            f"scope channel (wired: {', '.join(wired) or 'nothing'}). Add it to "
+            "[[scope.channels]] or record less."
+        )
+    if "field" in asked and scene.bench.field_meter is None:
+        raise SceneError(
+            f"{scene.name} records the field, but bench {scene.bench.name} has no "
+            "[field_meter]."
+        )
+    channels = tuple(c for name, c in wired.items() if name in streamed)
+    if detect_on == "V_K":
+        _check_threshold(scene, wired["V_K"])
+    rate = float("inf")
+    if channels:
+        assert scope is not None
+        rate = check_scope(scope, channels, scene.record.sample_rate)
+        if detect_on is not None and not scope_capability(scope).gapless:
+            raise SceneError(
+                f"{scene.name} looks for spikes on {detect_on}, but scope "
+                f"{scope.driver} of bench {scene.bench.name} has gaps between its "
+                "records and would miss some. Use a streaming scope or record "
+                "neither spikes nor rate."
+            )
+    recorded = set(scene.record.signals)
+    return Needs(
+        coil=timeline(scene, through_coil=True).drives,
+        field_meter="field" in asked,
+        channels=channels,
+        stored=tuple(
+            name
+            for name in wired
+            if name in recorded
+            or (name == "V_C1" and "I_DS" in recorded and "I_DS" not in wired)
+        ),
+        detect_on=detect_on,
+        model=tuple(
+            name
+            for name in scene.record.signals
+            if SIGNALS[name].source == "model" and name not in wired
+        ),
+        guaranteed_rate=rate,
+    )
+
+
+def _check_threshold(scene: Scene, channel: Channel) -> None:
+    top = (channel.range - channel.offset) * channel.scale
+    low = scene.detect.threshold - scene.detect.hysteresis
+    bottom = (-channel.range - channel.offset) * channel.scale
+    if scene.detect.threshold >= top or low <= bottom:
+        raise SceneError(
+            f"[detect] threshold {scene.detect.threshold:g} V less hysteresis "
+            f"{scene.detect.hysteresis:g} V lies outside what the V_K channel sees, "
+            f"{bottom:g} V to {top:g} V."
+        )

@@ -1,0 +1,160 @@
+"""The plan of a scene: all that can be said of a run before anything is opened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tactile_lab.plan.estimate import Estimate, estimate
+from tactile_lab.plan.needs import Needs, needs
+from tactile_lab.plan.reasons import Reasons, leaves_out, uses
+from tactile_lab.plan.timeline import Timeline, timeline
+from tactile_lab.plan.warn import assumptions, warnings
+from tactile_lab.quantity import show
+from tactile_lab.scene.scene import Scene
+from tactile_lab.signals import BENCH_ONLY
+
+if TYPE_CHECKING:
+    from tactile_lab.model.simulate import Result
+
+GRID = 4000
+"""Points at which the preview is looked at."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plan:
+    """What a run of a scene takes, needs, leaves out, and where it falls short.
+
+    Attributes:
+        scene: what is planned.
+        timeline: its trials, as the coil will play them.
+        needs: what is opened, enabled and stored.
+        uses, leaves_out: (what, why).
+        estimate: time, samples, disk, current, heat, resolution.
+        assumptions: what the numbers rest on.
+        warnings: where the scene cannot deliver.
+        preview: the model under the planned force, only what is recorded; None where
+            it was not asked for.
+    """
+
+    scene: Scene
+    timeline: Timeline
+    needs: Needs
+    uses: Reasons
+    leaves_out: Reasons
+    estimate: Estimate
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
+    preview: Result | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The documented JSON object (docs/json.md)."""
+        cost, scene = self.estimate, self.scene
+        return {
+            "scene": scene.name,
+            "protocol": scene.protocol.name,
+            "bench": {"name": scene.bench.name, "simulated": scene.bench.simulated},
+            "needs": [{"what": what, "why": why} for what, why in self.uses],
+            "leaves_out": [{"what": what, "why": why} for what, why in self.leaves_out],
+            "channels": [channel.signal for channel in self.needs.channels],
+            "stored": list(self.needs.stored),
+            "duration_s": cost.duration,
+            "streamed_s": cost.streamed,
+            "trials": cost.trials,
+            "samples": {
+                "per_channel": cost.samples_per_channel,
+                "stored": cost.samples_stored,
+            },
+            "disk_bytes": {"raw": cost.disk_raw, "compressed": cost.disk},
+            "peak_force_N": cost.peak_force,
+            "peak_current_A": cost.peak_current,
+            "heat_A2s": {"used": cost.heat, "budget": cost.heat_budget},
+            "coil_update": self._coil_update(),
+            "resolution": dict(cost.resolution),
+            "preview": self._preview(),
+            "assumptions": list(self.assumptions),
+            "warnings": list(self.warnings),
+        }
+
+    def _coil_update(self) -> dict[str, float] | None:
+        cost = self.estimate
+        if cost.update_interval is None:
+            return None
+        return {
+            "interval_s": cost.update_interval,
+            "rate_Hz": 1 / cost.update_interval,
+            "step_A": cost.step_current,
+            "step_N": cost.step_force,
+        }
+
+    def _preview(self) -> dict[str, Any] | None:
+        if self.preview is None:
+            return None
+        spikes = self.preview.spike_times
+        return {
+            "spikes": None if spikes is None else int(spikes.size),
+            "stages": dict(self.preview.stages),
+            "left_out": list(self.preview.left_out),
+        }
+
+
+def plan(scene: Scene, *, preview: bool = True) -> Plan:
+    """The plan of `scene`; opens nothing and writes nothing.
+
+    Args:
+        scene: what to plan.
+        preview: also compute the model under the planned force, where anything
+            recorded needs it.
+
+    Raises:
+        SceneError: the scene cannot be run on its bench.
+        LimitError: a force, the coil's heat or the sample rate lies beyond a limit.
+    """
+    drive = timeline(scene, through_coil=True)
+    needed = needs(scene)
+    told = warnings(scene, needed, drive)
+    result = _model(scene, drive) if preview else None
+    if result is not None:
+        told = (*told, *result.warnings, *_clipped(scene, needed, result))
+    return Plan(
+        scene=scene,
+        timeline=drive,
+        needs=needed,
+        uses=uses(scene, needed),
+        leaves_out=leaves_out(scene, needed, drive),
+        estimate=estimate(scene, needed, drive),
+        assumptions=assumptions(scene),
+        warnings=told,
+        preview=result,
+    )
+
+
+def _model(scene: Scene, drive: Timeline) -> Result | None:
+    keep = [name for name in scene.record.signals if name not in BENCH_ONLY]
+    if not keep:
+        return None
+    from tactile_lab.plan.preview import model
+
+    return model(scene, drive.force, drive.duration, keep)
+
+
+def _clipped(scene: Scene, needed: Needs, result: Result) -> tuple[str, ...]:
+    """Signals the model expects outside what their channel can see."""
+    times = np.linspace(0.0, result.duration, GRID)
+    lines = []
+    for channel in needed.channels:
+        if channel.signal not in ("V_C1", "V_C2"):
+            continue
+        if channel.signal not in scene.record.signals:
+            continue
+        values = result.sample(channel.signal, times) / channel.scale
+        low, high = -channel.range - channel.offset, channel.range - channel.offset
+        if channel.coupling == "DC" and (values.min() < low or values.max() > high):
+            lines.append(
+                f"{channel.signal} will leave its channel's range, {show(low, 'V')} "
+                f"to {show(high, 'V')}: the model has {show(values.min(), 'V')} to "
+                f"{show(values.max(), 'V')}. Change range or offset in the bench file."
+            )
+    return tuple(lines)

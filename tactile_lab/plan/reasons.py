@@ -1,0 +1,80 @@
+"""What a scene needs and what it leaves out, each with its reason, for people."""
+
+from __future__ import annotations
+
+from tactile_lab.plan.needs import Needs
+from tactile_lab.plan.timeline import Timeline
+from tactile_lab.scene.scene import Scene
+from tactile_lab.signals import SIGNALS
+
+Reasons = tuple[tuple[str, str], ...]
+
+
+def uses(scene: Scene, needed: Needs) -> Reasons:
+    """(what, why) of everything a run opens, enables, computes or reads."""
+    bench, stored = scene.bench, needed.stored
+    found: list[tuple[str, str]] = []
+    if needed.coil and bench.coil is not None:
+        found.append(("coil source", f"{bench.coil.dialect} plays the force"))
+    if needed.channels and bench.scope is not None:
+        names = ", ".join(c.input for c in needed.channels)
+        found.append(("scope", f"{bench.scope.driver}, inputs {names}"))
+    for channel in needed.channels:
+        name = channel.signal
+        why = "stored" if name in stored else "streamed, not stored"
+        if name == needed.detect_on:
+            why += "; spikes are detected on it"
+        if name == "V_C1" and name not in scene.record.signals:
+            why += "; I_DS is derived from it, Eq. (16)"
+        found.append((f"channel {channel.input}: {name}", why))
+    if needed.field_meter and bench.field_meter is not None:
+        found.append(("teslameter", f"{bench.field_meter.dialect} reads the field"))
+    for name in scene.record.signals:
+        if name in needed.model:
+            found.append(
+                (name, "model, from the applied current; no instrument has it")
+            )
+        elif name == "force":
+            found.append((name, "derived from the applied current and the magnet"))
+        elif name == "spikes":
+            found.append((name, f"detected on {needed.detect_on} as it streams"))
+        elif name == "rate":
+            found.append((name, "derived from the spikes"))
+    if bench.simulated:
+        found.append(("plant", "computes coil, magnet, sensor and noise"))
+    for path in scene.files:
+        found.append((path.name, "file the scene names"))
+    return tuple(found)
+
+
+def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
+    """(what, why) of all that is neither opened, enabled, stored nor computed."""
+    bench = scene.bench
+    found: list[tuple[str, str]] = []
+    if not needed.coil:
+        found.append(("coil source", "no trial asks for a force"))
+    if not needed.channels:
+        found.append(("scope", "no recorded signal comes from it"))
+    if not needed.field_meter:
+        found.append(("teslameter", "field is not recorded"))
+    enabled = {channel.signal for channel in needed.channels}
+    for channel in bench.scope.channels if bench.scope is not None else ():
+        if channel.signal not in enabled:
+            found.append(
+                (f"channel {channel.input}: {channel.signal}", "nothing needs it")
+            )
+        elif channel.signal not in needed.stored:
+            found.append(
+                (f"samples of {channel.signal}", "needed as they stream, not recorded")
+            )
+    if needed.detect_on is None:
+        found.append(("spike detection", "neither spikes nor rate are recorded"))
+    for name in SIGNALS:
+        if name not in scene.record.signals and name not in enabled:
+            found.append((name, "not recorded"))
+    if any(step.trial.pause for step in drive.steps):
+        found.append(("samples of pauses", "recovery is neither streamed nor stored"))
+    if not bench.simulated:
+        found.append(("simulated instruments", "the bench is real"))
+    found.append(("window", "Qt is loaded by `tactile-lab gui` alone"))
+    return tuple(found)

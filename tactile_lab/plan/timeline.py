@@ -1,0 +1,207 @@
+"""Driving a protocol's generator with the model's outcomes: what a run will ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
+from tactile_lab.plan.heat import heat_along
+from tactile_lab.plan.limited import limited
+from tactile_lab.plan.outcome import ModelOutcome, Step, joined
+from tactile_lab.plugins import update_interval
+from tactile_lab.quantity import show
+from tactile_lab.scene.scene import Scene
+from tactile_lab.trial import Outcome, Trial
+from tactile_lab.waveform import Waveform
+
+MOST_TRIALS = 10_000
+"""A protocol that asks for more never ends, as far as planning is concerned."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """All trials of a scene, one after another.
+
+    Attributes:
+        steps: in order.
+        force: of the whole run, N against s from 0.
+        duration: s, planned pauses included.
+        warnings: where the coil cannot follow.
+    """
+
+    steps: tuple[Step, ...]
+    force: Waveform
+    duration: float
+    warnings: tuple[str, ...]
+
+    @property
+    def streamed(self) -> float:
+        """Time during which samples are taken, s: all but planned pauses."""
+        return sum(step.trial.length for step in self.steps if not step.trial.pause)
+
+    @property
+    def drives(self) -> bool:
+        """Whether any trial asks the coil for a current other than 0 A."""
+        return any(
+            step.force.peak > 0 or (step.current is not None and step.current.peak > 0)
+            for step in self.steps
+        )
+
+    @property
+    def current(self) -> Waveform | None:
+        """Current of the whole run, A; None where the force is taken as given."""
+        played = [(s.start, s.current) for s in self.steps if s.current is not None]
+        return joined(played) if len(played) == len(self.steps) else None
+
+
+@lru_cache(maxsize=8)
+def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
+    """All trials of `scene`, each outcome computed by the model if it is looked at.
+
+    Driven once per scene: asking again gives the same object.
+
+    Args:
+        scene: what to drive.
+        through_coil: apply calibration, limits, slew and update grid, as `run` does;
+            otherwise take each force as given, as `simulate` does.
+
+    Raises:
+        LimitError: a force lies beyond the coil, or the coil would get too hot (only
+            `through_coil`).
+        SceneError: the protocol fails, asks for nothing, or never ends; or the coil
+            cannot follow and the scene says ``coil.strict = true``.
+    """
+    driver = _Driver(scene, through_coil)
+    trials = scene.protocol.trials()
+    name = f"protocol {scene.protocol.name}"
+    try:
+        trial = next(trials, None)
+        while trial is not None:
+            outcome = driver.take(trial)
+            if len(driver.steps) >= MOST_TRIALS:
+                raise SceneError(f"{name} asks for more than {MOST_TRIALS} trials.")
+            try:
+                trial = trials.send(outcome)
+            except StopIteration:
+                trial = None
+    except ParameterError as reason:
+        raise SceneError(f"{name} cannot be played: {reason}") from reason
+    except LimitError as reason:
+        raise LimitError(f"{scene.path or scene.name}: {reason}") from reason
+    except TactileLabError:
+        raise
+    except Exception as reason:
+        raise SceneError(f"{name} fails: {type(reason).__name__}: {reason}") from reason
+    finally:
+        trials.close()
+    if not driver.steps:
+        raise SceneError(f"{name} asks for no trial.")
+    return driver.timeline()
+
+
+class _Driver:
+    """Collects trials and answers each with what the model makes of it."""
+
+    def __init__(self, scene: Scene, through_coil: bool) -> None:
+        self.scene = scene
+        self.through_coil = through_coil
+        self.steps: list[Step] = []
+        self._limited: list[tuple[str, str]] = []
+        self._time = 0.0
+        self._amperes = 0.0
+        self._heat = 0.0
+        self._interval: float | None = None
+
+    def take(self, trial: Trial) -> Outcome:
+        length = trial.length
+        if not (np.isfinite(length) and length > 0):
+            raise SceneError(
+                f'trial "{trial.label}" lasts {length} s; it must be longer.'
+            )
+        force, current = trial.force, trial.current
+        magnet = self.scene.bench.magnet
+        if self.through_coil:
+            force, current = self._played(trial, length)
+        elif current is not None:
+            force = _cut(magnet.force_for(current), length)
+        else:
+            force = _cut(force, length)
+        step = Step(trial, self._time, force, current)
+        self.steps.append(step)
+        self._time += length
+        return ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)
+
+    def _played(self, trial: Trial, length: float) -> tuple[Waveform, Waveform]:
+        coil, magnet = self.scene.bench.coil, self.scene.bench.magnet
+        if coil is None:
+            asked = trial.current or trial.force
+            if asked.peak == 0:
+                return Waveform.through([(0, 0), (length, 0)]), Waveform.through(
+                    [(0, 0), (length, 0)]
+                )
+            raise SceneError(
+                f"bench {self.scene.bench.name} has no [coil], but the protocol asks "
+                "for a force."
+            )
+        limits = coil.limits
+        if trial.current is None:
+            asked = _cut(trial.force, length)
+            try:
+                wanted = magnet.current_for(asked, limits.current)
+            except LimitError as reason:
+                raise LimitError(f'trial "{trial.label}": {reason}') from reason
+        else:
+            wanted = _cut(trial.current, length)
+            if wanted.peak > limits.current * (1 + 1e-12):
+                raise LimitError(
+                    f'trial "{trial.label}": current {show(wanted.peak, "A")} is '
+                    f"beyond the coil's limit of {show(limits.current, 'A')}."
+                )
+        if self._interval is None:
+            self._interval = update_interval(coil)
+        current, warning = limited(wanted, limits.slew, self._interval, self._amperes)
+        if warning is not None:
+            text = f'the coil cannot follow trial "{trial.label}": {warning}'
+            if self.scene.coil.strict:
+                raise SceneError(f"{text} (coil.strict = true refuses that).")
+            self._limited.append((trial.label, warning))
+        current = _cut(current, length)
+        self._amperes = float(current.value[-1])
+        self._heat, _, spent = heat_along(current, limits, self._heat)
+        if spent is not None:
+            raise LimitError(
+                f'trial "{trial.label}" spends the coil\'s heat budget of '
+                f"{limits.heat:g} A² s (above {show(limits.continuous, 'A')}) "
+                f"{show(spent, 's')} after its start. Ask for less force, a shorter "
+                "hold, or a longer rest before it."
+            )
+        return magnet.force_for(current), current
+
+    def timeline(self) -> Timeline:
+        force = joined([(step.start, step.force) for step in self.steps])
+        return Timeline(tuple(self.steps), force, self._time, tuple(self._told()))
+
+    def _told(self) -> Iterator[str]:
+        if self._limited:
+            label, warning = self._limited[-1]
+            more = len(self._limited) - 1
+            others = f" and {more} other{'s' if more > 1 else ''}" if more else ""
+            yield (
+                f'the coil cannot follow trial "{label}"{others}: {warning}; the '
+                "limited waveform is used"
+            )
+
+
+def _cut(wave: Waveform, length: float) -> Waveform:
+    """`wave` from 0 to `length` s: held outside its points, jumps at both ends kept."""
+    inside = (wave.time >= 0) & (wave.time <= length)
+    time, value = wave.time[inside], wave.value[inside]
+    if not time.size or time[0] > 0:
+        time, value = np.r_[0.0, time], np.r_[wave.at(0.0), value]
+    if time[-1] < length:
+        time, value = np.r_[time, length], np.r_[value, wave.at(length)]
+    return Waveform(time, value)

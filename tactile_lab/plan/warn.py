@@ -1,0 +1,141 @@
+"""Where a scene cannot deliver what it asks for: warnings, and stated assumptions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from tactile_lab.magnetics import A2_PRINTED
+from tactile_lab.plan.needs import Needs
+from tactile_lab.plan.timeline import Timeline
+from tactile_lab.quantity import show
+from tactile_lab.scene.scene import Scene
+
+SAMPLES_PER_DECAY = 6
+"""Samples per time constant of a spike from which its amplitude can be read."""
+
+
+def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
+    """Everything worth a person's attention before the run."""
+    return (
+        *drive.warnings,
+        *_spike_sampling(scene, needed),
+        *_noise(scene, needed, drive.streamed),
+        *_scope(scene, needed),
+        *_magnet(scene),
+    )
+
+
+def spike_width(scene: Scene) -> float:
+    """Time a spike stays above the threshold, s; 0 if it never reaches it."""
+    circuit = scene.circuit
+    height = circuit.fire_voltage - circuit.reset_voltage
+    if height <= scene.detect.threshold:
+        return 0.0
+    return circuit.tau_K * math.log(height / scene.detect.threshold)
+
+
+def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
+    if needed.detect_on != "V_K":
+        if needed.detect_on is not None:
+            yield (
+                f"no V_K is wired: spikes are found as resets of {needed.detect_on}."
+            )
+        return
+    rate, width = scene.record.sample_rate, spike_width(scene)
+    interval = 1 / rate
+    if width == 0:
+        height = scene.circuit.fire_voltage - scene.circuit.reset_voltage
+        yield (
+            f"no spike is high enough: V_K rises to {show(height, 'V')}, the "
+            f"threshold is {show(scene.detect.threshold, 'V')}. Lower it."
+        )
+    elif interval > width:
+        yield (
+            f"V_K at {show(rate, 'S/s')} misses about {1 - width / interval:.0%} of "
+            f"the spikes: they stay above {show(scene.detect.threshold, 'V')} for "
+            f"{show(width, 's', 2)}, one sample takes {show(interval, 's')}. Sample at "
+            f"{show(_round_up(2 / width), 'S/s')} or faster."
+        )
+    elif interval > scene.circuit.tau_K / SAMPLES_PER_DECAY:
+        decay = scene.circuit.tau_K
+        yield (
+            f"V_K at {show(rate, 'S/s')} gives counts and times to "
+            f"±{show(interval, 's')}, not amplitudes: a spike decays in "
+            f"{show(decay, 's', 2)}. Amplitudes need "
+            f"{show(SAMPLES_PER_DECAY / decay, 'S/s', 2)}."
+        )
+
+
+def _noise(scene: Scene, needed: Needs, streamed: float) -> Iterator[str]:
+    if not scene.bench.simulated or needed.detect_on != "V_K":
+        return
+    sigma = scene.simulated.noise.get("V_K", 0.0)
+    if sigma <= 0:
+        return
+    above = 0.5 * math.erfc(scene.detect.threshold / sigma / math.sqrt(2))
+    expected = above * scene.record.sample_rate * streamed
+    if expected > 0.5:
+        yield (
+            f"noise of {show(sigma, 'V')} on V_K reaches the threshold of "
+            f"{show(scene.detect.threshold, 'V')} about {expected:.3g} times and adds "
+            "spikes. Raise the threshold."
+        )
+
+
+def _scope(scene: Scene, needed: Needs) -> Iterator[str]:
+    rate = scene.record.sample_rate
+    if rate > needed.guaranteed_rate:
+        yield (
+            f"{show(rate, 'S/s')} on {len(needed.channels)} channels is beyond the "
+            f"{show(needed.guaranteed_rate, 'S/s')} guaranteed on any USB port; the "
+            "run ends as faulted if samples are lost."
+        )
+
+
+def _magnet(scene: Scene) -> Iterator[str]:
+    magnet = scene.bench.magnet
+    if magnet.calibration is None and math.isclose(magnet.A2, A2_PRINTED):
+        yield (
+            "A2 = 2.25e-3 m² is Table 1's value as printed; a 15 mm x 15 mm core has a "
+            "tenth of it, and a tenth of the force. Measure a calibration."
+        )
+
+
+def _round_up(rate: float) -> float:
+    """`rate` rounded up to 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(rate))
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= rate)
+
+
+def assumptions(scene: Scene) -> tuple[str, ...]:
+    """What the numbers rest on, one line each."""
+    bench, magnet = scene.bench, scene.bench.magnet
+    per_ampere = f"{show(magnet.newtons_per_ampere, 'N', 4)} per ampere"
+    if magnet.calibration is not None:
+        lines = [
+            f"force from the calibration {magnet.calibration.path.name}: {per_ampere}"
+        ]
+    else:
+        lines = [
+            f"force from Eq. (2): r = {show(magnet.r, 'm')}, A1 = {magnet.A1:g} m², "
+            f"A2 = {magnet.A2:g} m², B1 = {show(magnet.B1, 'T')}, "
+            f"B2 = {show(magnet.B2_per_ampere, 'T')} per ampere: {per_ampere}"
+        ]
+    if not bench.simulated:
+        return tuple(lines)
+    world = scene.simulated
+    if bench.coil is not None:
+        baud = f" at {bench.coil.baud} baud" if bench.coil.baud else ""
+        lines.append(
+            f"simulated source: {bench.coil.dialect}{baud}, wire and parse time pass"
+        )
+    shift = world.input_bias * scene.circuit.R_L
+    lines.append(
+        f"followers: input bias {show(world.input_bias, 'A')} shifts V_C2 by "
+        f"{show(shift, 'V', 2)}, offset {show(world.follower_offset, 'V')}, "
+        f"{'3 MHz and 13 V/µs' if world.follower else 'infinitely fast'}"
+    )
+    noise = ", ".join(f"{name} {show(sd, 'V')}" for name, sd in world.noise.items())
+    lines.append(f"noise (seed {world.seed}): {noise}; 8-bit codes")
+    return tuple(lines)

@@ -1,0 +1,1 @@
+"""Scene and bench files: what one run uses, validated, in SI."""

@@ -1,0 +1,312 @@
+"""Bench files: which instruments there are, how they are wired, and the geometry.
+
+A bench file has the same tables as a scene's ``[bench]``. Without one, the built-in
+simulated bench of this module is used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from tactile_lab.bench import Channel, CoilLimits
+from tactile_lab.calibration import read_calibration
+from tactile_lab.magnetics import Magnet
+from tactile_lab.plugins import nearest
+from tactile_lab.quantity import Unit
+from tactile_lab.scene.tables import Table
+
+Length = Annotated[float, Unit("m", above=0.0)]
+Area = Annotated[float, Unit("m^2", above=0.0)]
+Field_ = Annotated[float, Unit("T", above=0.0)]
+FieldPerCurrent = Annotated[float, Unit("T/A")]
+Resistance = Annotated[float, Unit("Ohm", above=0.0)]
+PositiveVoltage = Annotated[float, Unit("V", above=0.0)]
+PositiveCurrent = Annotated[float, Unit("A", above=0.0)]
+Slew = Annotated[float, Unit("A/s", above=0.0)]
+Heat = Annotated[float, Unit("A^2 s", above=0.0)]
+Positive = Annotated[float, Unit("s", above=0.0)]
+AnyVoltage = Annotated[float, Unit("V")]
+
+WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS")
+"""Signals a scope channel can carry."""
+
+
+class LimitsTable(Table):
+    """``[coil.limits]``; each narrows what model and coil allow."""
+
+    current: PositiveCurrent = 2.0
+    slew: Slew = 5.0
+    compliance: PositiveVoltage = 14.0
+    continuous: PositiveCurrent = 0.6
+    heat: Heat = 30.0
+    recovery: Positive = 60.0
+    resistance: Resistance | None = None
+
+
+class CoilSpec(Table):
+    """``[coil]`` of a bench: the current source.
+
+    Attributes:
+        dialect: id of a row in drivers/dialects, or path of a TOML file with one.
+        port: serial port or pyserial URL.
+        baud: symbols a second; the row's own unless given.
+        limits: see `CoilLimits`.
+    """
+
+    dialect: str = "kepco-bop"
+    port: str = "sim://coil"
+    baud: int | None = Field(default=None, ge=50, le=4_000_000)
+    limits_table: LimitsTable = Field(default=LimitsTable(), alias="limits")
+
+    @property
+    def limits(self) -> CoilLimits:
+        """Limits as drivers take them, SI."""
+        table = self.limits_table
+        return CoilLimits(
+            **{name: getattr(table, name) for name in type(table).model_fields}
+        )
+
+
+class ChannelTable(Table):
+    """One entry of ``[[scope.channels]]``.
+
+    Attributes:
+        signal: what is wired to it.
+        input: the scope's name for the input.
+        range: full scale, V.
+        offset: analogue offset added before digitising, V.
+        coupling: "DC" or "AC".
+        scale: signal unit per volt; 10 for a 10:1 probe.
+        shunt: instead of `scale` for coil_current: the shunt's resistance, Ohm.
+    """
+
+    signal: str
+    input: str = Field(min_length=1)
+    range: PositiveVoltage = 5.0
+    offset: AnyVoltage = 0.0
+    coupling: Literal["DC", "AC"] = "DC"
+    scale: float = 1.0
+    shunt: Resistance | None = None
+
+    @field_validator("signal")
+    @classmethod
+    def _known(cls, signal: str) -> str:
+        if signal not in WIRED:
+            hint = nearest(signal, WIRED)
+            raise ValueError(
+                f'no scope channel can carry "{signal}"; {hint + " " if hint else ""}'
+                f"Known: {', '.join(WIRED)}."
+            )
+        return signal
+
+    @model_validator(mode="after")
+    def _scaled(self) -> ChannelTable:
+        if self.scale == 0:
+            raise ValueError("scale must not be 0")
+        if self.shunt is not None and self.signal != "coil_current":
+            raise ValueError("shunt belongs to the signal coil_current")
+        if self.shunt is not None and self.scale != 1.0:
+            raise ValueError("give either shunt or scale, not both")
+        return self
+
+    def channel(self) -> Channel:
+        """The channel as drivers take it, SI."""
+        return Channel(
+            signal=self.signal,
+            input=self.input,
+            range=self.range,
+            offset=self.offset,
+            coupling=self.coupling,
+            scale=self.scale if self.shunt is None else 1 / self.shunt,
+        )
+
+
+class ScopeSpec(Table):
+    """``[scope]``: the digitiser.
+
+    Attributes:
+        driver: "ps3000a" or "usbtmc".
+        dialect: for usbtmc, the row of the model.
+        library: path of the vendor's library; the usual places unless given.
+        serial: serial number, where several are attached.
+        allow_usb2: accept a USB 2 port.
+        allow_usb_power: accept running without the power supply.
+        wiring: entries of ``[[scope.channels]]``.
+    """
+
+    driver: Literal["ps3000a", "usbtmc"] = "ps3000a"
+    dialect: str | None = None
+    library: str | None = None
+    serial: str | None = None
+    allow_usb2: bool = False
+    allow_usb_power: bool = False
+    wiring: tuple[ChannelTable, ...] = Field(default=(), alias="channels")
+
+    @field_validator("wiring")
+    @classmethod
+    def _once_each(cls, wiring: tuple[ChannelTable, ...]) -> tuple[ChannelTable, ...]:
+        for what in ("signal", "input"):
+            seen = [getattr(entry, what) for entry in wiring]
+            for name in seen:
+                if seen.count(name) > 1:
+                    raise ValueError(f'{what} "{name}" is wired twice')
+        return wiring
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """All wired channels as drivers take them."""
+        return tuple(entry.channel() for entry in self.wiring)
+
+
+class FieldMeterSpec(Table):
+    """``[field_meter]``: the teslameter.
+
+    Attributes:
+        dialect: id of a row in drivers/dialects, or path of a TOML file with one.
+        port: serial port or pyserial URL.
+        baud: symbols a second; the row's own unless given.
+        interval: time between two readings, s.
+    """
+
+    dialect: str = "lakeshore-425"
+    port: str = "sim://field_meter"
+    baud: int | None = Field(default=None, ge=50, le=4_000_000)
+    interval: Positive = 0.2
+
+
+class MagnetTable(Table):
+    """``[magnet]``: geometry of Eq. (2), or a calibration (see `Magnet`)."""
+
+    r: Length
+    A1: Area = 2.827e-5
+    A2: Area = 2.25e-3
+    B1: Field_ = 0.163
+    B2_per_ampere: FieldPerCurrent = 0.011
+    calibration: str | None = None
+
+
+class HandSet(Table):
+    """``[hand_set]``: circuit voltages set by hand, which decide the threshold."""
+
+    V_GS: AnyVoltage | None = None
+    V_S: AnyVoltage | None = None
+    V_th: AnyVoltage | None = None
+
+
+class BenchTable(Table):
+    """A whole bench file; in a scene's ``[bench]`` also `file`, its path.
+
+    Attributes:
+        file: bench file that the other tables change; scenes only.
+        name: for people.
+        simulated: compute the physics instead of opening instruments.
+        notes: kept with each run.
+    """
+
+    file: str | None = None
+    name: str = "bench"
+    simulated: bool = False
+    notes: str = ""
+    coil: CoilSpec | None = None
+    scope: ScopeSpec | None = None
+    field_meter: FieldMeterSpec | None = None
+    magnet: MagnetTable
+    hand_set: HandSet = HandSet()
+
+    @model_validator(mode="after")
+    def _reachable(self) -> BenchTable:
+        for name in ("coil", "field_meter"):
+            spec = getattr(self, name)
+            if spec is not None and not self.simulated and spec.port.startswith("sim:"):
+                raise ValueError(
+                    f"[{name}] port is missing: real instruments need one, such as "
+                    '"/dev/ttyUSB0" or "COM3"; simulated = true needs none'
+                )
+        coil, meter = self.coil, self.field_meter
+        if coil is not None and meter is not None and coil.port == meter.port:
+            raise ValueError(
+                f'[coil] and [field_meter] both have port = "{coil.port}"; a port has '
+                "one instrument, so correct one of them"
+            )
+        return self
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BenchSpec:
+    """What a bench file says, ready to be used; nothing of it is opened.
+
+    Attributes:
+        name: for people.
+        simulated: physics is computed.
+        path: the bench file, None for the built-in simulated bench.
+        coil, scope, field_meter: None where the bench has none.
+        magnet: force per current.
+        hand_set: circuit voltages set by hand, by name, V.
+        notes: for people.
+        table: the file's contents, for the resolved scene.
+    """
+
+    name: str
+    simulated: bool
+    path: Path | None
+    coil: CoilSpec | None
+    scope: ScopeSpec | None
+    field_meter: FieldMeterSpec | None
+    magnet: Magnet
+    hand_set: dict[str, float]
+    notes: str
+    table: BenchTable
+
+    @classmethod
+    def of(cls, table: BenchTable, path: Path | None, folder: Path) -> BenchSpec:
+        """The bench described by `table`; its files are found relative to `folder`.
+
+        Raises:
+            SceneError: the calibration file cannot be used.
+        """
+        values = {name: getattr(table.magnet, name) for name in ("r", "A1", "A2", "B1")}
+        table = _with_rows(table, folder)
+        calibration = None
+        if table.magnet.calibration is not None:
+            calibration = read_calibration(
+                (folder / table.magnet.calibration).resolve()
+            )
+            placed = table.magnet.model_copy(
+                update={"calibration": str(calibration.path)}
+            )
+            table = table.model_copy(update={"magnet": placed})
+        return cls(
+            name=table.name,
+            simulated=table.simulated,
+            path=path,
+            coil=table.coil,
+            scope=table.scope,
+            field_meter=table.field_meter,
+            magnet=Magnet(
+                **values,
+                B2_per_ampere=table.magnet.B2_per_ampere,
+                calibration=calibration,
+            ),
+            hand_set={
+                name: getattr(table.hand_set, name)
+                for name in HandSet.model_fields
+                if getattr(table.hand_set, name) is not None
+            },
+            notes=table.notes,
+            table=table,
+        )
+
+
+def _with_rows(table: BenchTable, folder: Path) -> BenchTable:
+    """`table` with dialect files of the user's own found relative to `folder`."""
+    placed = {}
+    for name in ("coil", "scope", "field_meter"):
+        spec = getattr(table, name)
+        if spec is not None and (spec.dialect or "").endswith(".toml"):
+            path = str((folder / spec.dialect).resolve())
+            placed[name] = spec.model_copy(update={"dialect": path})
+    return table.model_copy(update=placed)

@@ -1,0 +1,110 @@
+"""Reading files a scene names: text with clear refusals, and numeric columns."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import SceneError
+
+LARGEST_FILE = 256 * 2**20
+"""Bytes; a scene's force table may be long, but not endless."""
+
+
+def read_text(path: Path, what: str = "File") -> str:
+    """The text of a UTF-8 file.
+
+    Raises:
+        SceneError: missing, a folder, not readable, too large, or not text.
+    """
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError as reason:
+        raise SceneError(f"{what} {path} does not exist.") from reason
+    except IsADirectoryError as reason:
+        raise SceneError(f"{what} {path} is a folder; a file is needed.") from reason
+    except (OSError, ValueError) as reason:
+        told = getattr(reason, "strerror", None) or reason
+        raise SceneError(f"{what} {path} cannot be read: {told}.") from reason
+    if len(raw) > LARGEST_FILE:
+        raise SceneError(f"{what} {path} is larger than {LARGEST_FILE >> 20} MiB.")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as reason:
+        raise SceneError(
+            f"{what} {path} is not text (UTF-8): byte {reason.start} cannot be read."
+        ) from reason
+    if not text.strip():
+        raise SceneError(f"{what} {path} is empty.")
+    return text
+
+
+def read_columns(
+    path: Path, headers: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], NDArray[np.float64], list[int]]:
+    """Numeric columns of a CSV file.
+
+    Args:
+        path: the file; lines that are empty or start with # are passed over.
+        headers: allowed headers; the first line must be one of them.
+
+    Returns:
+        The header found, an array of shape (rows, columns), and each row's line number.
+
+    Raises:
+        SceneError: not readable, another header, a row of another length, or a value
+            that is not a finite number; the line is named.
+    """
+    reader = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
+    wanted = " or ".join(",".join(names) for names in headers)
+    header: tuple[str, ...] | None = None
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    try:
+        for cells in reader:
+            cells = [cell.strip() for cell in cells]
+            if not any(cells) or cells[0].startswith("#"):
+                continue
+            at = f"{path}, line {reader.line_num}"
+            if header is None:
+                header = tuple(cells)
+                if header not in headers:
+                    raise SceneError(
+                        f'{at}: the header is "{",".join(cells)[:60]}"; it must be '
+                        f"{wanted}."
+                    )
+                continue
+            rows.append(_numbers(cells, header, at))
+            lines.append(reader.line_num)
+    except csv.Error as reason:
+        raise SceneError(f"{path}, line {reader.line_num}: {reason}.") from reason
+    if header is None or not rows:
+        raise SceneError(f"{path} holds no rows under the header {wanted}.")
+    return header, np.array(rows, dtype=np.float64), lines
+
+
+def _numbers(cells: list[str], header: tuple[str, ...], at: str) -> list[float]:
+    if len(cells) != len(header):
+        raise SceneError(
+            f"{at}: {len(cells)} values where {len(header)} are needed "
+            f"({','.join(header)})."
+        )
+    row = []
+    for name, cell in zip(header, cells, strict=True):
+        try:
+            number = float(cell)
+        except ValueError as reason:
+            raise SceneError(
+                f'{at}: {name} is "{cell[:40]}", not a number.'
+            ) from reason
+        if not math.isfinite(number):
+            raise SceneError(f"{at}: {name} is {cell}; give a finite number.")
+        row.append(number)
+    return row

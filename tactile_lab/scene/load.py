@@ -1,0 +1,280 @@
+"""From a scene file, a protocol file or nothing to a validated `Scene`."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from tactile_lab.errors import ParameterError, SceneError
+from tactile_lab.plugins import (
+    nearest,
+    protocol_class,
+    protocol_from_file,
+    scene_names,
+    scene_path,
+)
+from tactile_lab.scene import overrides as options
+from tactile_lab.scene.bench_file import BenchSpec, BenchTable
+from tactile_lab.scene.columns import read_text
+from tactile_lab.scene.complaint import Blame, complaint, validated, written
+from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.sensor import SensorTable
+from tactile_lab.scene.tables import CoilUse, Detect, Record, Simulated
+from tactile_lab.trial import Protocol
+
+TABLES = ("protocol", "bench", "sensor", "record", "detect", "coil", "simulated")
+DEMO = "demo"
+SIMULATED = "sim"
+"""Name of the built-in simulated bench."""
+
+
+def load(
+    path: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    bench: str | None = None,
+) -> Scene:
+    """The scene in `path`; opens no instrument and writes nothing.
+
+    Args:
+        path: a scene (TOML), a protocol file (.py), the name of a scene that ships, or
+            None for the demo.
+        overrides: ``table.key=value`` texts that change single keys.
+        bench: path of a bench file, or "sim" for the built-in simulated bench; replaces
+            the scene's own ``[bench]``.
+
+    Raises:
+        SceneError: something cannot be used as written; names file, key, value, what is
+            allowed and the nearest valid key.
+    """
+    file = _find(path)
+    if file.suffix == ".py":
+        data: dict[str, Any] = {"protocol": {"name": file.stem, "source": file.name}}
+    else:
+        data = _read(file, "Scene")
+    origins = {}
+    if bench is not None:
+        data["bench"] = (
+            {} if bench == SIMULATED else {"file": str(Path(bench).resolve())}
+        )
+        origins["bench.file"] = f"--bench {bench}"
+    origins |= options.apply(data, overrides)
+    return resolve(data, file, origins)
+
+
+def resolve(
+    data: Mapping[str, Any], path: Path, origins: Mapping[str, str] | None = None
+) -> Scene:
+    """The scene that `data`, the contents of `path`, describes (see `load`)."""
+    blame = _blame(str(path), origins or {})
+    for name, table in data.items():
+        if name not in TABLES:
+            hint = nearest(name, TABLES)
+            what = f"table [{name}]" if isinstance(table, dict) else f'key "{name}"'
+            raise SceneError(
+                f"{blame((name,))}: a scene has no {what}; {hint + ' ' if hint else ''}"
+                f"Tables: {', '.join(TABLES)}."
+            )
+        if not isinstance(table, dict):
+            raise complaint((name,), "this must be a table, not a value.", blame)
+    _refuse_not_finite(data, blame)
+    frozen = _lists_to_tuples(data)
+    folder = path.parent
+    spec = _bench(frozen.get("bench", {}), folder, blame)
+    sensor = validated(SensorTable, frozen.get("sensor", {}), ("sensor",), blame)
+    try:
+        circuit = sensor.circuit(spec.hand_set)
+        start = sensor.start_voltages(circuit)
+    except (ParameterError, ValueError) as reason:
+        raise complaint(("sensor",), str(reason), blame) from reason
+    protocol, source = _protocol(frozen.get("protocol"), folder, blame)
+    record = validated(Record, frozen.get("record", {}), ("record",), blame)
+    if not record.signals:
+        if "signals" in frozen.get("record", {}):
+            raise complaint(("record", "signals"), "name at least one signal.", blame)
+        record = record.model_copy(update={"signals": tuple(protocol.signals)})
+    return Scene(
+        name=path.stem,
+        path=path,
+        bench=spec,
+        circuit=circuit,
+        start=start,
+        protocol=protocol,
+        protocol_source=source,
+        record=record,
+        detect=validated(Detect, frozen.get("detect", {}), ("detect",), blame),
+        simulated=validated(
+            Simulated,
+            {"noise": {}, **frozen.get("simulated", {})},
+            ("simulated",),
+            blame,
+        ),
+        coil=validated(CoilUse, frozen.get("coil", {}), ("coil",), blame),
+        sensor=sensor,
+    )
+
+
+def load_bench(path: str | Path) -> BenchSpec:
+    """The bench file `path`, or the built-in simulated bench for "sim".
+
+    Raises:
+        SceneError: it cannot be used as written.
+    """
+    table = {} if str(path) == SIMULATED else {"file": str(path)}
+    return _bench(table, Path(), _blame(str(path), {}))
+
+
+def _find(path: str | Path | None) -> Path:
+    if path is None:
+        return scene_path(DEMO)
+    file = Path(path)
+    if str(path) in scene_names() and not file.is_file():
+        return scene_path(str(path))
+    try:
+        there = file.exists()
+    except (OSError, ValueError) as reason:
+        raise SceneError(
+            f"Scene {str(path)[:80]!r} is no usable path: {reason}."
+        ) from reason
+    if not there:
+        names = ", ".join(scene_names())
+        hint = nearest(str(path), scene_names())
+        raise SceneError(
+            f"Scene {path} does not exist; {hint + ' ' if hint else ''}"
+            f"Scenes that ship: {names}."
+        )
+    return file
+
+
+def _read(path: Path, what: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_text(path, what))
+    except RecursionError as reason:
+        raise SceneError(
+            f"{path} is not usable TOML: it is nested too deeply."
+        ) from reason
+    except SceneError:
+        raise
+    except ValueError as reason:
+        raise SceneError(f"{path} is not TOML: {reason}.") from reason
+
+
+def _blame(name: str, origins: Mapping[str, str]) -> Blame:
+    def origin(at: tuple[str, ...]) -> str:
+        for depth in range(len(at), 0, -1):
+            option = origins.get(".".join(at[:depth]))
+            if option is not None:
+                return option
+        return name
+
+    return origin
+
+
+def _refuse_not_finite(data: Any, blame: Blame, at: tuple[str, ...] = ()) -> None:
+    for key, value in _items(data):
+        here = (*at, key)
+        if isinstance(value, float) and not math.isfinite(value):
+            raise complaint(here, f"{value} is not finite; give a finite value.", blame)
+        _refuse_not_finite(value, blame, here)
+
+
+def _items(data: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(data, dict):
+        yield from data.items()
+    elif isinstance(data, list):
+        yield from ((f"number {i + 1}", value) for i, value in enumerate(data))
+
+
+def _lists_to_tuples(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _lists_to_tuples(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return tuple(_lists_to_tuples(value) for value in data)
+    return data
+
+
+def _protocol(
+    table: dict[str, Any] | None, folder: Path, blame: Blame
+) -> tuple[Protocol, Path | None]:
+    if table is None or "name" not in table:
+        raise SceneError(
+            f"{blame(('protocol', 'name'))}: [protocol] name is missing; write for "
+            'example name = "pulses".'
+        )
+    fields = dict(table)
+    name, source = fields.pop("name"), fields.pop("source", None)
+    for key, value in (("name", name), ("source", source)):
+        if value is not None and not isinstance(value, str):
+            raise complaint(
+                ("protocol", key), f"{written(value)}: a text is needed.", blame
+            )
+    try:
+        if source is None:
+            kind = protocol_class(name)
+        else:
+            kind = protocol_from_file(folder / source)
+    except SceneError as reason:
+        key = "name" if source is None else "source"
+        raise complaint(("protocol", key), str(reason), blame) from reason
+    if kind.name != name:
+        raise complaint(
+            ("protocol", "name"), f'{source} holds "{kind.name}", not "{name}".', blame
+        )
+    protocol = validated(kind, fields, ("protocol",), blame)
+    try:
+        return protocol.located(folder), source and (folder / source).resolve()
+    except SceneError as reason:
+        raise complaint(("protocol",), str(reason), blame) from reason
+
+
+def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
+    """The bench file (or the built-in bench) with the scene's own keys over it."""
+    inline = {key: value for key, value in table.items() if key != "file"}
+    file = table.get("file")
+    if file is None:
+        if inline.get("simulated") is False:
+            raise complaint(
+                ("bench", "simulated"),
+                'a scene reaches instruments only by a bench file: write file = "..." '
+                "or give --bench FILE.",
+                blame,
+            )
+        text = resources.files("tactile_lab.scene") / "simulated_bench.toml"
+        under, path = tomllib.loads(text.read_text(encoding="utf-8")), None
+    else:
+        if not isinstance(file, str):
+            raise complaint(
+                ("bench", "file"), f"{written(file)}: a text is needed.", blame
+            )
+        path = (folder / file).resolve()
+        under = _read(path, "Bench file")
+        if "file" in under:
+            raise SceneError(f'{path}: a bench file has no key "file".')
+        _refuse_not_finite(under, _blame(str(path), {}))
+        validated(BenchTable, _lists_to_tuples(under), (), _blame(str(path), {}))
+        if inline.get("simulated") is False and under.get("simulated") is True:
+            raise complaint(
+                ("bench", "simulated"), f"{file} is a simulated bench.", blame
+            )
+    merged = _merged(_lists_to_tuples(under), inline)
+    spec = validated(BenchTable, merged, ("bench",), blame)
+    try:
+        # a calibration named by the scene lies beside the scene, else beside the bench
+        own = "calibration" in inline.get("magnet", {}) or path is None
+        return BenchSpec.of(spec, path, folder if own else path.parent)  # type: ignore[union-attr]
+    except SceneError as reason:
+        raise complaint(
+            ("bench", "magnet", "calibration"), str(reason), blame
+        ) from reason
+
+
+def _merged(under: Any, over: Any) -> Any:
+    if not (isinstance(under, dict) and isinstance(over, dict)):
+        return over
+    return {
+        **under,
+        **{key: _merged(under.get(key), value) for key, value in over.items()},
+    }

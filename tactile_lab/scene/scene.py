@@ -1,0 +1,94 @@
+"""A scene: all that one run uses, validated, in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.scene.sensor import SensorTable, StartVoltages
+from tactile_lab.scene.tables import CoilUse, Detect, Record, Simulated
+from tactile_lab.scene.toml_text import to_toml
+from tactile_lab.trial import Protocol
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scene:
+    """What one run uses; nothing of it is opened.
+
+    Attributes:
+        name: the file's name without its ending.
+        path: the scene or protocol file; None only for scenes made in Python.
+        bench: instruments, wiring, geometry.
+        circuit: the sensor's parameters.
+        start: voltages at time 0, None for the equilibrium.
+        protocol: typed parameters and trials.
+        protocol_source: the user's Python file it came from, None for one that ships.
+        record: signals kept and sample rate.
+        detect: how spikes are found on V_K.
+        simulated: physics of a simulated bench.
+        coil: how to treat a force the coil cannot follow.
+        sensor: the ``[sensor]`` table as written.
+    """
+
+    name: str
+    path: Path | None
+    bench: BenchSpec
+    circuit: Circuit
+    start: StartVoltages | None
+    protocol: Protocol
+    protocol_source: Path | None
+    record: Record
+    detect: Detect
+    simulated: Simulated
+    coil: CoilUse
+    sensor: SensorTable
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files beside the scene itself that it was made from; kept with a run."""
+        named = [self.bench.path, self.protocol_source]
+        if self.bench.magnet.calibration is not None:
+            named.append(self.bench.magnet.calibration.path)
+        file = getattr(self.protocol, "file", None)
+        if isinstance(file, str):
+            named.append(Path(file))
+        return tuple(path for path in named if path is not None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All keys, expanded; quantities as exact texts, file names absolute."""
+        protocol = {"name": self.protocol.name}
+        if self.protocol_source is not None:
+            protocol["source"] = str(self.protocol_source)
+        bench = _dump(self.bench.table)
+        if self.bench.path is not None:
+            bench["file"] = str(self.bench.path)
+        return {
+            "protocol": {**protocol, **_dump(self.protocol)},
+            "record": _dump(self.record),
+            "detect": _dump(self.detect),
+            "sensor": self._sensor(),
+            "coil": _dump(self.coil),
+            "simulated": _dump(self.simulated),
+            "bench": bench,
+        }
+
+    def to_toml(self) -> str:
+        """The resolved scene: loading it gives this scene again."""
+        return to_toml(self.to_dict())
+
+    def _sensor(self) -> dict[str, Any]:
+        own = {
+            name: getattr(self.circuit, name)
+            for name in SensorTable.model_fields
+            if name not in ("preset", "start")
+        }
+        full = SensorTable(preset=self.sensor.preset, start=self.sensor.start, **own)
+        return _dump(full)
+
+
+def _dump(table: Any) -> dict[str, Any]:
+    dumped: dict[str, Any] = table.model_dump(by_alias=True, exclude_none=True)
+    return dumped

@@ -1,0 +1,136 @@
+"""The smaller tables of a scene: what to record, detect, simulate, and how strictly."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from tactile_lab.plugins import nearest
+from tactile_lab.quantity import Current, Pause, SampleRate, Unit, Voltage
+from tactile_lab.signals import SIGNALS
+
+Noise = Annotated[float, Unit("V", least=0.0)]
+Level = Annotated[float, Unit("V", above=0.0)]
+HalfWidth = Annotated[float, Unit("A", least=0.0)]
+Pull = Annotated[float, Unit("N", least=0.0)]
+Hysteresis = Annotated[float, Unit("V", least=0.0)]
+
+
+class Table(BaseModel):
+    """A table of a scene: strict, frozen, unknown keys refused."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False
+    )
+
+
+class Record(Table):
+    """``[record]``: which signals are kept and how fast the scope samples.
+
+    Attributes:
+        signals: names from `tactile_lab.signals.SIGNALS`; the protocol's own choice
+            unless given.
+        sample_rate: of every enabled scope channel, S/s.
+    """
+
+    signals: tuple[str, ...] = ()
+    sample_rate: SampleRate = 1e6
+
+    @field_validator("signals")
+    @classmethod
+    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name not in SIGNALS:
+                hint = nearest(name, SIGNALS)
+                raise ValueError(
+                    f'signal "{name}" does not exist; {hint + " " if hint else ""}'
+                    f"Known: {', '.join(SIGNALS)}."
+                )
+        return tuple(dict.fromkeys(names))
+
+
+class Detect(Table):
+    """``[detect]``: how spikes are found on the streamed V_K.
+
+    Attributes:
+        threshold: a spike starts where V_K reaches it, V.
+        hysteresis: V_K must fall this far below the threshold before the next, V.
+        refractory: nothing is found for so long after a spike, s.
+    """
+
+    threshold: Level = 0.5
+    hysteresis: Hysteresis = 0.1
+    refractory: Pause = 50e-6
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Detect:
+        if self.hysteresis >= self.threshold:
+            raise ValueError(
+                f"hysteresis {self.hysteresis:g} V must be below the threshold "
+                f"{self.threshold:g} V, or V_K could never re-arm the detector."
+            )
+        return self
+
+
+class Simulated(Table):
+    """``[simulated]``: the physics of the simulated bench; no effect on a real one.
+
+    A 0 switches a part off.
+
+    Attributes:
+        seed: of all noise; the same seed gives the same stored samples.
+        noise: standard deviation per channel at the scope's input, V.
+        follower: voltage followers' bandwidth (3 MHz) and slew rate (13 V/us).
+        follower_offset: offset voltage of the followers, V.
+        input_bias: a follower's input bias into V_C2, A; 65 pA through R_L is 32 mV.
+        hum: amplitude of 50 Hz mains hum on every channel, V.
+        coil_lag: the coil's L/R, s.
+        eddy_lag: lag of the field behind the current, s.
+        hysteresis: half-width of the core's loop, A; 0.03 A to 0.07 A for mild steel.
+        attraction: the magnet's pull on the core, N; the same at every current.
+        clock_error: relative error of the scope's sample clock; 50e-6 is 50 ppm. More
+            than the 100 ppm allowed a driver would take for lost samples.
+    """
+
+    seed: int = Field(default=1, ge=0, le=2**63 - 1)
+    noise: dict[str, Noise] = Field(default={})
+    follower: bool = True
+    follower_offset: Voltage = 0.0
+    input_bias: Current = 65e-12
+    hum: Noise = 0.0
+    coil_lag: Pause = 1.1e-3
+    eddy_lag: Pause = 3e-3
+    hysteresis: HalfWidth = 0.0
+    attraction: Pull = 0.0
+    clock_error: float = Field(default=0.0, ge=-1e-4, le=1e-4)
+
+    default_noise: ClassVar[dict[str, float]] = {
+        "V_C1": 5e-3,
+        "V_C2": 5e-3,
+        "V_K": 20e-3,
+        "coil_current": 0.5e-3,
+        "I_DS": 5e-3,
+    }
+
+    @field_validator("noise")
+    @classmethod
+    def _channels(cls, noise: dict[str, float]) -> dict[str, float]:
+        for name in noise:
+            if name not in cls.default_noise:
+                hint = nearest(name, cls.default_noise)
+                raise ValueError(
+                    f'"{name}" is no scope signal; {hint + " " if hint else ""}'
+                    f"Known: {', '.join(cls.default_noise)}."
+                )
+        return {**cls.default_noise, **noise}
+
+
+class CoilUse(Table):
+    """``[coil]``: what to do with a force the coil cannot follow.
+
+    Attributes:
+        strict: refuse a waveform faster than slew or update grid, do not limit it.
+    """
+
+    strict: bool = False

@@ -1,0 +1,198 @@
+"""Plans: what is needed, left out, estimated and warned of."""
+
+import json
+
+import pytest
+
+from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.plan.needs import needs
+from tactile_lab.plan.plan import plan
+from tactile_lab.plan.text import text
+from tactile_lab.scene.load import load
+
+
+def left_out(planned):
+    return {what for what, _ in planned.leaves_out}
+
+
+def test_the_demo_needs_four_channels_and_no_teslameter():
+    planned = plan(load())
+    assert [c.signal for c in planned.needs.channels] == [
+        "V_C1",
+        "V_C2",
+        "V_K",
+        "coil_current",
+    ]
+    assert planned.needs.stored == ("V_C1", "V_C2", "V_K", "coil_current")
+    assert not planned.needs.field_meter
+    assert "teslameter" in left_out(planned)
+    cost = planned.estimate
+    assert (cost.duration, cost.trials) == (18.0, 4)
+    assert cost.samples_per_channel == 18_000_000
+    assert cost.disk_raw == 18_000_000 * 4 * 2
+    assert cost.peak_current == pytest.approx(0.997, abs=1e-3)
+    assert 0 < cost.heat < cost.heat_budget == 30.0
+    assert 15 < 1 / cost.update_interval < 40
+    assert cost.step_current == pytest.approx(
+        cost.peak_current / 0.25 * cost.update_interval
+    )
+    assert cost.resolution["V_K"] == pytest.approx(39e-3, abs=0.5e-3)
+    assert cost.resolution["V_C1"] == pytest.approx(15.7e-3, abs=0.1e-3)
+
+
+def test_spikes_only_streams_v_k_and_stores_no_samples():
+    planned = plan(load("spikes_only"))
+    assert [c.signal for c in planned.needs.channels] == ["V_K"]
+    assert planned.needs.stored == ()
+    assert planned.needs.detect_on == "V_K"
+    assert planned.estimate.samples_stored == planned.estimate.disk_raw == 0
+    assert planned.preview.stages["V_K"] == 0
+    assert planned.preview.stages["spikes"] > 0
+    assert {"channel A: V_C1", "samples of V_K"} <= left_out(planned)
+
+
+def test_v_c1_only_leaves_the_integrator_and_the_spikes_out():
+    planned = plan(load("v_c1_only"))
+    assert [c.signal for c in planned.needs.channels] == ["V_C1"]
+    assert planned.needs.detect_on is None
+    assert planned.preview.stages["V_C1"] > 0
+    assert planned.preview.stages["V_C2"] == planned.preview.stages["spikes"] == 0
+    assert planned.preview.stages["I_C"] == 0
+    assert "spike detection" in left_out(planned)
+
+
+def test_field_only_computes_nothing_of_the_model():
+    planned = plan(load(None, ['record.signals=["field"]']))
+    assert planned.preview is None
+    assert planned.needs.field_meter
+    assert planned.needs.channels == ()
+    assert "scope" in left_out(planned)
+
+
+def test_drain_current_is_derived_from_v_c1():
+    needed = needs(load(None, ['record.signals=["I_DS"]']))
+    assert needed.stored == ("V_C1",)
+    assert needed.model == ()
+    assert needs(load(None, ['record.signals=["V_P", "I_C"]'])).model == ("V_P", "I_C")
+
+
+def warned(*overrides):
+    return " ".join(plan(load(None, overrides), preview=False).warnings)
+
+
+def test_amplitudes_need_a_faster_rate():
+    told = warned("record.sample_rate=1 MS/s")
+    assert "counts and times to ±1 µs, not amplitudes" in told
+    assert "not amplitudes" not in warned("record.sample_rate=5 MS/s")
+
+
+def test_a_rate_that_misses_spikes_is_warned_of():
+    assert "misses about 44% of the spikes" in warned("record.sample_rate=0.2 MS/s")
+    assert "misses" not in warned("record.sample_rate=0.5 MS/s")
+    quiet = warned("record.sample_rate=0.2 MS/s", 'record.signals=["V_C1"]')
+    assert "misses" not in quiet, "nobody looks for spikes there"
+
+
+def test_noise_above_the_threshold_is_warned_of():
+    assert "adds spikes" in warned("simulated.noise.V_K=200 mV")
+    assert "adds spikes" not in warned("simulated.noise.V_K=20 mV")
+
+
+def test_spikes_that_never_reach_the_threshold_are_warned_of():
+    assert "no spike is high enough" in warned("detect.threshold=4 V")
+
+
+def test_the_printed_a2_is_warned_of_and_a_real_core_is_not():
+    assert "Table 1's value as printed" in warned()
+    real = warned("bench.magnet.A2=2.25e-4 m^2", 'protocol.levels=["10 mN"]')
+    assert "printed" not in real
+
+
+def test_a_real_core_refuses_the_demo_and_names_what_it_reaches():
+    with pytest.raises(LimitError, match=r"reachable is −40\.12 mN to 40.12 mN"):
+        plan(load(None, ["bench.magnet.A2=2.25e-4 m^2"]))
+
+
+def test_a_signal_that_will_leave_its_range_is_warned_of():
+    scene = load(None, ['protocol.levels=["350 mN"]', "protocol.ramp=0.4 s"])
+    told = " ".join(plan(scene).warnings)
+    assert "V_C1 will leave its channel's range" in told
+
+
+def test_a_rate_no_scope_has_is_refused():
+    with pytest.raises(LimitError, match="sample interval"):
+        plan(load(None, ["record.sample_rate=1 TS/s"]))
+    assert "guaranteed" in warned("record.sample_rate=10 MS/s")
+
+
+def test_an_unwired_signal_and_a_missing_meter_are_refused(tmp_path):
+    bench = tmp_path / "b.toml"
+    bench.write_text(
+        'simulated = true\n[coil]\n[magnet]\nr = "6 mm"\n'
+        '[[scope.channels]]\nsignal = "V_C1"\ninput = "A"\n'
+    )
+    with pytest.raises(SceneError, match="wires it to no"):
+        plan(load(None, bench=str(bench)))
+    with pytest.raises(SceneError, match="field_meter"):
+        plan(load(None, ['record.signals=["field"]'], bench=str(bench)))
+
+
+def test_without_v_k_spikes_are_found_as_resets(tmp_path):
+    bench = tmp_path / "b.toml"
+    bench.write_text(
+        'simulated = true\n[coil]\n[magnet]\nr = "6 mm"\n'
+        '[[scope.channels]]\nsignal = "V_C2"\ninput = "A"\n'
+    )
+    planned = plan(load("spikes_only", bench=str(bench)), preview=False)
+    assert planned.needs.detect_on == "V_C2"
+    assert any("resets of V_C2" in line for line in planned.warnings)
+
+
+def test_a_threshold_outside_the_channel_is_refused():
+    with pytest.raises(SceneError, match="threshold"):
+        plan(load(None, ["detect.threshold=6 V"]))
+
+
+def test_assumptions_are_stated():
+    told = " ".join(plan(load(), preview=False).assumptions)
+    for fact in (
+        "r = 6 mm",
+        "A2 = 0.00225",
+        "11 mT per ampere",
+        "19200 baud",
+        "200.6 mN",
+    ):
+        assert fact in told
+
+
+def test_json_is_plain_and_complete():
+    data = plan(load("spikes_only")).to_dict()
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert data["coil_update"]["rate_Hz"] == 1 / data["coil_update"]["interval_s"]
+
+
+def test_text_names_both_lists():
+    shown = text(plan(load("v_c1_only"), preview=False))
+    assert "needs\n" in shown
+    assert "leaves out\n" in shown
+    assert "REAL" not in shown
+
+
+def test_no_force_means_no_coil():
+    planned = plan(load("monitor"))
+    assert not planned.needs.coil
+    assert "coil source" in left_out(planned)
+    assert planned.to_dict()["coil_update"] is None
+    assert "set-points" not in text(planned)
+
+
+def test_a_bench_without_a_coil_can_watch_but_not_push(tmp_path):
+    bench = tmp_path / "b.toml"
+    bench.write_text(
+        'simulated = true\n[magnet]\nr = "6 mm"\n'
+        '[[scope.channels]]\nsignal = "V_K"\ninput = "A"\n'
+    )
+    watch = ['record.signals=["spikes"]']
+    assert not plan(load("monitor", watch, bench=str(bench)), preview=False).needs.coil
+    with pytest.raises(SceneError, match=r"has no \[coil\]"):
+        plan(load("demo", watch, bench=str(bench)))
