@@ -1,0 +1,192 @@
+"""What is attached to this computer, and which dialect row each instrument fits."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from serial.tools import list_ports
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import dialect_ids, load_dialect
+from drivers.dialect_row import CoilDialect, Dialect, Wire
+from drivers.serial_link import SerialLink
+from drivers.teslameter import Teslameter
+from drivers.usb_presence import present
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import RealClock
+from tactile_lab.errors import InstrumentError, NoReplyError, NotFoundError
+
+DIALOUT = (
+    "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """One port or device.
+
+    Attributes:
+        address: what a bench file calls it; bus and address for a USB device.
+        kind: "serial" or "usb".
+        title: what the system knows of it.
+        identity: what it answered when asked for its name; None if it was not asked
+            or did not answer.
+        fits: driver and rows that fit; empty if none is known.
+        problem: what stands in its way, with the remedy, or None.
+    """
+
+    address: str
+    kind: str
+    title: str
+    identity: str | None = None
+    fits: tuple[str, ...] = ()
+    problem: str | None = None
+
+
+def attached(*, ask: bool = True, ports: Iterable[str] = ()) -> list[dict[str, Any]]:
+    """Serial ports and USB devices, as plain data.
+
+    Args:
+        ask: send each USB serial adapter the harmless `*IDN?`, in every framing a
+            shipped row has.
+        ports: addresses to ask, whatever they are, instead of looking for ports.
+    """
+    chosen = tuple(ports)
+    if chosen:
+        found = [_serial(address, "named by you", ask=True) for address in chosen]
+    else:
+        found = [
+            _serial(one.device, _title(one), ask=ask and one.vid is not None)
+            for one in sorted(list_ports.comports())
+        ]
+        found += _usb()
+    return [asdict(one) for one in found]
+
+
+def try_out(
+    address: str,
+    dialect: str,
+    *,
+    baud: int | None = None,
+    transcript: Path | None = None,
+) -> dict[str, str]:
+    """Open the instrument at `address` as a run would, read its settings, close it.
+
+    No current is set and no output switched on. The bytes go to `transcript`.
+
+    Raises:
+        SceneError: no such row, or the transcript cannot be written.
+        InstrumentError: it does not answer as the row says.
+        UnsafeError: a source's output could not be verified off.
+    """
+    row = load_dialect(dialect)
+    clock = RealClock()
+    device: CoilSource | Teslameter
+    if isinstance(row, CoilDialect):
+        device = CoilSource(row, address, CoilLimits(), clock, baud=baud, guarded=False)
+    else:
+        device = Teslameter(row, address, clock, baud=baud)
+    if transcript is not None:
+        device.record(transcript)
+    try:
+        device.open()
+        return device.settings()
+    finally:
+        device.close()
+
+
+def ask_name(address: str) -> tuple[str | None, str | None]:
+    """(name, problem) of what answers at `address`, asked in every shipped framing."""
+    tried = set()
+    problem: str | None = "nothing answered *IDN? in any framing of the shipped rows"
+    for row in map(load_dialect, dialect_ids()):
+        if row.serial in tried or row.identify != "*IDN?":
+            continue
+        tried.add(row.serial)
+        link = SerialLink(address, _quick(row.serial), RealClock(), what="instrument")
+        try:
+            link.open()
+        except NoReplyError:
+            continue
+        except NotFoundError as reason:
+            return None, str(reason)
+        except InstrumentError as reason:
+            problem = str(reason)
+            continue
+        finally:
+            link.close()
+        return link.identity, None
+    return None, problem
+
+
+def fitting(identity: str) -> tuple[str, ...]:
+    """Ids of the rows for an instrument of that name; a plain one if no other fits."""
+    rows: list[Dialect] = [load_dialect(name) for name in dialect_ids()]
+    fits = [row for row in rows if re.search(row.match, identity)]
+    special = [row.id for row in fits if row.match != "."]
+    plain = [row.id for row in fits if row.match == "." and not special]
+    return tuple(special + plain)
+
+
+def _quick(wire: Wire) -> Wire:
+    return wire.model_copy(update={"timeout": 0.3})
+
+
+def _serial(address: str, title: str, *, ask: bool) -> Found:
+    here = address.startswith("/dev/")
+    if here and os.path.exists(address) and not os.access(address, os.R_OK | os.W_OK):
+        return Found(
+            address=address,
+            kind="serial",
+            title=title,
+            problem=f"{address} may not be opened by this user; {DIALOUT}",
+        )
+    if not ask:
+        return Found(address=address, kind="serial", title=title)
+    identity, problem = ask_name(address)
+    fits = () if identity is None else fitting(identity)
+    if identity is not None and not fits:
+        problem = "no shipped row is for it; write one (docs/how-to/add-a-dialect.md)"
+    return Found(
+        address=address,
+        kind="serial",
+        title=title,
+        identity=identity,
+        fits=fits,
+        problem=problem,
+    )
+
+
+def _title(port: Any) -> str:
+    named = port.description and port.description != "n/a"
+    parts = [port.description if named else "serial port"]
+    if port.vid is not None:
+        parts.append(f"USB {port.vid:04x}:{port.pid:04x}")
+    if port.serial_number:
+        parts.append(f"serial number {port.serial_number}")
+    return ", ".join(parts)
+
+
+def _usb() -> list[Found]:
+    try:
+        devices = present()
+    except InstrumentError as reason:
+        return [Found(address="usb", kind="usb", title="USB", problem=str(reason))]
+    return [
+        Found(
+            address=f"bus {one.bus} device {one.address}",
+            kind="usb",
+            title=f"{one.title or 'unnamed'} {one.vendor:04x}:{one.product:04x}, "
+            f"{one.link}",
+            identity=one.serial or None,
+            fits=("ps3000a",) if one.is_picoscope else ("usbtmc",),
+            problem=one.problem,
+        )
+        for one in devices
+        if one.is_picoscope or one.usbtmc
+    ]

@@ -1,0 +1,94 @@
+"""The way out: ramp to 0 A, output off, read back; every step tried, nothing raised."""
+
+from __future__ import annotations
+
+from drivers.coil_wire import CoilWire
+from tactile_lab.bench import OffReport
+from tactile_lab.clock import Clock
+from tactile_lab.errors import TactileLabError
+from tactile_lab.quantity import show
+
+OFF_CURRENT = 0.005
+"""Largest current that counts as none, A."""
+
+LONGEST_RAMP = 0.5
+"""Longest time the ramp to zero may take, s; a larger current ramps faster."""
+
+VERIFICATIONS = 3
+"""Times the safe state is commanded and read back before giving up."""
+
+SETTLE = 0.02
+"""Time the current has to die away before it is read back, s."""
+
+RECONNECT = 1.0
+"""How long to try to open a lost port again before each attempt, s."""
+
+UNKNOWN = "OUTPUT STATE UNKNOWN - switch the coil source off at the instrument. "
+
+
+def switch_off(
+    wire: CoilWire, clock: Clock, *, setpoint: float | None, slew: float, ramp: bool
+) -> OffReport:
+    """Bring the source to 0 A and output off, and say whether that was verified.
+
+    Args:
+        wire: the source, connected or not.
+        clock: time the ramp is played in.
+        setpoint: last known, A; None when unknown.
+        slew: of the ramp, A/s.
+        ramp: False goes to 0 A at once.
+    """
+    trouble: list[str] = []
+    if not wire.talk.reconnected(trouble, RECONNECT):
+        return OffReport(False, None, UNKNOWN + " | ".join(trouble))
+    if ramp and setpoint != 0.0:
+        _ramp_down(wire, clock, setpoint, slew, trouble)
+    steps = (*wire.row.stop_lines, wire.row.set_line(0.0), *wire.row.off)
+    current: float | None = None
+    for _ in range(VERIFICATIONS):
+        if not wire.talk.reconnected(trouble, RECONNECT):
+            break
+        wire.talk.insist(steps, trouble)
+        wire.talk.link.pause(SETTLE)
+        try:
+            on = wire.output_is_on()
+            current = wire.current_when_off()
+        except TactileLabError as reason:
+            trouble.append(f"read-back: {reason}")
+            continue
+        if not on and abs(current) <= OFF_CURRENT:
+            return OffReport(
+                True, current, f"Output off, {show(current, 'A')} read back."
+            )
+        state = "on" if on else "off"
+        trouble.append(f"read-back: output {state}, {show(current, 'A')}")
+    return OffReport(False, current, UNKNOWN + " | ".join(dict.fromkeys(trouble)))
+
+
+def _taken_over(wire: CoilWire) -> float:
+    """Set-point to ramp down from, A, after a list that may be playing was ended."""
+    if wire.row.list is None:
+        return wire.setpoint()
+    flowing = wire.current()
+    wire.set_current(flowing)
+    for line in wire.row.stop_lines:
+        wire.talk.command(line)
+    return flowing
+
+
+def _ramp_down(
+    wire: CoilWire,
+    clock: Clock,
+    setpoint: float | None,
+    slew: float,
+    trouble: list[str],
+) -> None:
+    """Steps to zero at the slew limit; given up at the first failure."""
+    try:
+        start = _taken_over(wire) if setpoint is None else setpoint
+        duration = min(abs(start) / slew, LONGEST_RAMP)
+        begun = clock.now()
+        while (passed := clock.now() - begun) < duration:
+            wire.set_current(start * (1 - passed / duration))
+    except TactileLabError as reason:
+        trouble.append(f"ramp: {reason}")

@@ -1,0 +1,194 @@
+"""Whether this computer can run an experiment: each finding with its remedy."""
+
+from __future__ import annotations
+
+import os
+import platform
+import struct
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+from drivers.attached import attached
+from drivers.dialect import coil_dialect
+from drivers.guard import Guard
+from drivers.picosdk import load
+from tactile_lab.errors import InstrumentError
+
+NEEDED = ("numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb")
+DISK_TRIAL = 64 * 1024 * 1024
+"""Bytes written to measure the disk."""
+
+LATE = 0.02
+"""A thread that wakes later than this after its time is a note, s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One thing looked at.
+
+    Attributes:
+        topic: what.
+        state: "ok", "note" (matters for hardware only) or "problem".
+        text: what was found.
+        remedy: what to do, or None.
+    """
+
+    topic: str
+    state: Literal["ok", "note", "problem"]
+    text: str
+    remedy: str | None = None
+
+
+def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
+    """Look at everything, as plain data; opens no port and no instrument.
+
+    Args:
+        folder: where runs are stored.
+        needed_rate: what a run must be able to store, bytes/s.
+    """
+    looks: tuple[Callable[[], Finding], ...] = (
+        python,
+        packages,
+        picosdk,
+        guard,
+        wake_up,
+        lambda: disk(folder, needed_rate),
+    )
+    return [asdict(finding) for finding in (*(look() for look in looks), *ports())]
+
+
+def python() -> Finding:
+    """Interpreter, its width and the system."""
+    bits = struct.calcsize("P") * 8
+    text = f"Python {platform.python_version()}, {bits} bits, {platform.platform()}"
+    if bits != 64:
+        return Finding(
+            topic="python",
+            state="problem",
+            text=text,
+            remedy="install a 64-bit Python: PicoSDK's library must be as wide",
+        )
+    return Finding(topic="python", state="ok", text=text)
+
+
+def packages() -> Finding:
+    """Packages a run needs."""
+    missing, versions = [], []
+    for name in NEEDED:
+        try:
+            versions.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            missing.append(name)
+    if missing:
+        return Finding(
+            topic="packages",
+            state="problem",
+            text=f"missing: {', '.join(missing)}",
+            remedy="pip install -e .",
+        )
+    return Finding(topic="packages", state="ok", text=", ".join(versions))
+
+
+def picosdk() -> Finding:
+    """Whether PicoScope's library is where it is looked for."""
+    try:
+        library = load()
+    except InstrumentError as reason:
+        return Finding(
+            topic="picosdk",
+            state="note",
+            text="PicoScope's library ps3000a cannot be used",
+            remedy=" ".join(str(reason).split()),
+        )
+    return Finding(topic="picosdk", state="ok", text=str(library))
+
+
+def guard() -> Finding:
+    """Whether the guard process starts, and how long that takes."""
+    row = coil_dialect("kepco-bop")
+    one = Guard("/dev/null", row, row.serial)
+    began = time.monotonic()
+    try:
+        one.start()
+        took = time.monotonic() - began
+        one.stop()
+    except (InstrumentError, OSError) as reason:
+        return Finding(
+            topic="guard",
+            state="problem",
+            text=f"the guard process does not start: {reason}",
+            remedy="without it no current source is energised; look at the message",
+        )
+    return Finding(topic="guard", state="ok", text=f"starts in {took:.2f} s")
+
+
+def wake_up() -> Finding:
+    """How late a waiting thread wakes, which sets the jitter of set-points."""
+    late = []
+    for _ in range(40):
+        wanted = time.monotonic() + 0.005
+        time.sleep(0.005)
+        late.append(time.monotonic() - wanted)
+    worst = max(late)
+    text = f"a waiting thread wakes up to {1e3 * worst:.1f} ms late"
+    if worst > LATE:
+        return Finding(
+            topic="timing",
+            state="note",
+            text=text,
+            remedy="close other programs; set-points will jitter as much",
+        )
+    return Finding(topic="timing", state="ok", text=text)
+
+
+def disk(folder: Path, needed: float) -> Finding:
+    """How fast the disk under `folder` takes data, against `needed` bytes/s."""
+    there = folder.absolute()
+    while not there.exists():
+        there = there.parent
+    block = os.urandom(1024 * 1024)
+    try:
+        with tempfile.TemporaryFile(dir=there) as file:
+            began = time.monotonic()
+            for _ in range(DISK_TRIAL // len(block)):
+                file.write(block)
+            file.flush()
+            os.fsync(file.fileno())
+            rate = DISK_TRIAL / (time.monotonic() - began)
+    except OSError as reason:
+        return Finding(
+            topic="disk",
+            state="problem",
+            text=f"{there} cannot be written to: {reason}",
+            remedy="choose another folder with --out",
+        )
+    text = f"{there} takes {rate / 1e6:.0f} MB/s; a run needs {needed / 1e6:.0f} MB/s"
+    if rate < 2 * needed:
+        return Finding(
+            topic="disk",
+            state="problem",
+            text=text,
+            remedy="store runs on a faster disk (--out), or lower the sample rate",
+        )
+    return Finding(topic="disk", state="ok", text=text)
+
+
+def ports() -> list[Finding]:
+    """Permissions and links of what is attached."""
+    found = attached(ask=False)
+    findings = [
+        Finding(topic="port", state="problem", text=one["title"], remedy=one["problem"])
+        for one in found
+        if one["problem"]
+    ]
+    fine = [one["address"] for one in found if not one["problem"]]
+    text = f"usable: {', '.join(fine)}" if fine else "no instrument's port is attached"
+    return [
+        *findings,
+        Finding(topic="ports", state="ok" if fine else "note", text=text),
+    ]

@@ -1,0 +1,251 @@
+"""Dialects: how one model of instrument speaks, as a row of data.
+
+A row is everything the generic serial drivers know of a model; `drivers.dialect`
+reads rows from TOML files.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+from tactile_lab.bench import CoilLimits
+from tactile_lab.errors import SceneError
+from tactile_lab.quantity import Current, Duration, Pause, Voltage, show
+
+MARGIN = 1.5
+"""Factor by which the promised update interval exceeds the typical one."""
+
+
+def _pattern(text: str) -> str:
+    try:
+        re.compile(text)
+    except re.error as reason:
+        raise ValueError(f"{text!r} is not a regular expression: {reason}") from reason
+    return text
+
+
+Pattern = Annotated[str, AfterValidator(_pattern)]
+
+
+def _frozen(value: object) -> object:
+    """TOML arrays as tuples."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+Lines = Annotated[tuple[str, ...], BeforeValidator(_frozen)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Wire(_Strict):
+    """Serial settings and framing of a model.
+
+    Attributes:
+        baud: symbols a second.
+        xonxoff, rtscts, dsrdtr: flow control.
+        dtr: level of DTR when opened; None leaves it to the system.
+        send_end, reply_end: line terminators.
+        min_gap: rest between the end of an answer and the next line, s.
+        latency: time the instrument takes to act on a line, s; typical, for plans.
+        timeout: longest wait for an answer, s.
+        max_line: longest line in characters, terminator included.
+        echo: the instrument repeats each line before it answers.
+        strip: control characters to drop from answers.
+        preamble: characters sent before the first line of a (re)synchronisation.
+    """
+
+    baud: int = Field(default=9600, ge=50)
+    bytesize: Literal[7, 8] = 8
+    parity: Literal["N", "E", "O"] = "N"
+    stopbits: Literal[1, 2] = 1
+    xonxoff: bool = False
+    rtscts: bool = False
+    dsrdtr: bool = False
+    dtr: bool | None = None
+    send_end: str = "\n"
+    reply_end: str = "\n"
+    min_gap: Pause = 0.0
+    latency: Pause = 0.010
+    timeout: Duration = 0.2
+    max_line: int = Field(default=127, ge=16)
+    echo: bool = False
+    strip: str = ""
+    preamble: str = ""
+
+    @property
+    def character_time(self) -> float:
+        """Time one character takes on the wire, s."""
+        bits = 1 + self.bytesize + (self.parity != "N") + self.stopbits
+        return bits / self.baud
+
+
+class ListMode(_Strict):
+    """Lines with which a model plays a list of currents by its own clock.
+
+    Attributes:
+        clear, start, stop: lines.
+        points: template of the first part, `{values}` comma-separated.
+        append: template of further parts; None where `points` appends.
+        dwell: template, `{t}` s per point.
+        count: template, `{n}` repetitions; never sent with 0, which means for ever.
+        max_points, points_per_line: what the memory and one line hold.
+        shortest, longest: dwell, s.
+    """
+
+    clear: Lines = ()
+    points: str
+    append: str | None = None
+    dwell: str
+    count: str
+    start: Lines
+    stop: Lines
+    max_points: int
+    points_per_line: int
+    shortest: Duration
+    longest: Duration
+
+
+class Dialect(_Strict):
+    """What every row has.
+
+    Attributes:
+        id: name used in bench files.
+        title: for people.
+        match: pattern the answer to `identify` must match.
+        unverified: facts of this row that no one has checked on an instrument yet.
+        init: lines after identification.
+        optional: lines before `init` whose refusal is accepted.
+        release: lines before the port is closed.
+        error: query of the error queue; None where there is none.
+        error_ok: pattern of its answer when there is no error.
+        number: pattern whose group 1 is a numeric answer.
+    """
+
+    id: str
+    title: str
+    match: Pattern
+    unverified: Lines = ()
+    serial: Wire = Wire()
+    identify: str = "*IDN?"
+    optional: Lines = ()
+    init: Lines = ()
+    release: Lines = ()
+    error: str | None = None
+    error_ok: Pattern = r"^[+-]?0\b"
+    number: Pattern = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[A-Za-z]*$"
+
+
+class CoilDialect(Dialect):
+    """How a current source speaks. Templates use `{i}` A and `{v}` V, fixed-point.
+
+    Attributes:
+        polarity: "both", or "positive" for a source that cannot reverse.
+        current: largest magnitude the model gives, A.
+        voltage: largest compliance the model takes, V.
+        digits: decimals of the current on the wire.
+        limit, limit_query: set and read the compliance.
+        set, set_query: set and read the set-point.
+        on, off, on_query: the output.
+        on_match, off_match: its answer when on and when off; any other is no answer.
+        measure_current, measure_voltage: measured values.
+        current_match, voltage_match: where they stand in the answers, if not alone.
+        measures_when_off: the model measures with its output off; else verifying off
+            relies on output state and set-point.
+        join: text that joins a line and the error query into one; "": two lines.
+        list: list mode, None where the model has none worth using.
+    """
+
+    role: Literal["coil"]
+    polarity: Literal["both", "positive"]
+    current: Current
+    voltage: Voltage
+    digits: int = Field(default=5, ge=2, le=8)
+    limit: str
+    limit_query: str
+    set: str
+    set_query: str
+    on: Lines
+    off: Lines
+    on_query: str
+    on_match: Pattern = r"^\s*\+?(1|ON)\s*$"
+    off_match: Pattern = r"^\s*\+?(0|OFF)\s*$"
+    measure_current: str
+    measure_voltage: str
+    current_match: Pattern | None = None
+    voltage_match: Pattern | None = None
+    measures_when_off: bool = True
+    join: str = ";:"
+    list: ListMode | None = None
+
+    def check_limits(self, limits: CoilLimits) -> None:
+        """Refuse limits beyond what the model can do.
+
+        Raises:
+            SceneError: the current or the compliance is.
+        """
+        for name, limit, most, unit in (
+            ("current", limits.current, self.current, "A"),
+            ("compliance", limits.compliance, self.voltage, "V"),
+        ):
+            if limit > most:
+                raise SceneError(
+                    f"[coil.limits] {name} = {show(limit, unit)} is beyond the "
+                    f"{show(most, unit)} of {self.title}. Write "
+                    f'{name} = "{most:g} {unit}" or less.'
+                )
+
+    def set_line(self, current: float) -> str:
+        """Line that sets `current` (A); never an exponent, never a negative zero."""
+        return self.set.format(i=round(current, self.digits) + 0.0)
+
+    @property
+    def stop_lines(self) -> tuple[str, ...]:
+        """Lines that end a list that may be playing; () without list mode."""
+        return () if self.list is None else self.list.stop
+
+    def limit_line(self, voltage: float) -> str:
+        """Line that sets the compliance `voltage` (V)."""
+        return self.limit.format(v=voltage)
+
+    def verified(self, line: str) -> tuple[str, ...]:
+        """`line` with the error query behind it, as one line or two."""
+        if self.error is None:
+            return (line,)
+        if not self.join:
+            return (line, self.error)
+        return (line + self.join + self.error,)
+
+    def promised_interval(self, baud: int | None = None) -> float:
+        """Update interval to plan with, s: wire time, gap and latency with margin."""
+        wire = self.serial.model_copy(update={"baud": baud or self.serial.baud})
+        lines = self.verified(self.set_line(-self.current))
+        sent = sum(len(line) + len(wire.send_end) for line in lines)
+        answer = len('0,"No error"\r\n') if self.error else 0
+        typical = (sent + answer) * wire.character_time
+        return MARGIN * (typical + len(lines) * (wire.latency + wire.min_gap))
+
+
+class MeterDialect(Dialect):
+    """How a teslameter speaks.
+
+    Attributes:
+        field: query of the field.
+        scale: tesla per unit of the answer.
+        multiplier: query of a prefix letter (empty, u, m, k) that scales the answer.
+        overload: pattern of an answer that says the range is exceeded.
+        report: queries whose answers are kept with the run, by name.
+        interval: shortest time between two readings, s.
+    """
+
+    role: Literal["field meter"]
+    field: str
+    scale: float = 1.0
+    multiplier: str | None = None
+    overload: Pattern = r"(?i)^\s*O(V)?L"
+    report: dict[str, str] = Field(default={})
+    interval: Pause = 0.1

@@ -1,0 +1,205 @@
+"""The guard process: switches a coil source off when its owner dies or hangs.
+
+Run by path with its settings as one JSON line on standard input, then single bytes:
+arm, beat, disarm, quit, take over. It knows pyserial and the standard library only, so
+that it starts fast and nothing else can stop it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import serial
+
+ARM, BEAT, DISARM, QUIT, TAKE_OVER = b"a", b".", b"d", b"q", b"t"
+
+PATIENCE = 60.0
+"""Time for which a port that cannot be opened or verified is tried again, s."""
+
+RETRY = 0.005
+"""Pause between two attempts to open the port, s."""
+
+MOST_LINES = 12
+"""Lines to read for an answer; echoes and late answers may come before it."""
+
+STALL = 0.2
+"""Lateness of the guard's own waking that excuses one silence, s."""
+
+try:
+    from termios import error as termios_error
+except ImportError:  # Windows has no termios
+    termios_error = OSError  # type: ignore[misc, assignment]
+
+PORT_ERRORS = (serial.SerialException, OSError, termios_error)
+
+
+class Ears:
+    """Listens to the owner's bytes in a thread of its own."""
+
+    def __init__(self) -> None:
+        self.changed = threading.Condition()
+        self.armed = False
+        self.last = time.monotonic()
+        self.leave = False
+        self.take_over = False
+        self.ended = False
+
+    def listen(self) -> None:
+        """Read until the pipe ends."""
+        while data := os.read(0, 4096):
+            with self.changed:
+                self.last = time.monotonic()
+                for i in range(len(data)):
+                    self._heard(data[i : i + 1])
+                self.changed.notify()
+        with self.changed:
+            self.ended = True
+            self.changed.notify()
+
+    def _heard(self, word: bytes) -> None:
+        if word in (ARM, DISARM):
+            self.armed = word == ARM
+        elif word == QUIT:
+            self.leave = True
+        elif word == TAKE_OVER:
+            self.take_over = True
+
+
+def wait_for_danger(ears: Ears, silence: float) -> str | None:
+    """Why the output must be switched off, or None when the owner left in peace."""
+    with ears.changed:
+        while True:
+            if ears.take_over:
+                return "the owner could not verify the output off and let go of it"
+            if ears.leave:
+                return None
+            if ears.ended:
+                return "the owner died" if ears.armed else None
+            left = ears.last + silence - time.monotonic()
+            if ears.armed and left <= 0:
+                return f"the owner was silent for {silence:g} s"
+            asked = time.monotonic()
+            timeout = left if ears.armed else None
+            ears.changed.wait(timeout)
+            if timeout is not None and time.monotonic() - asked > timeout + STALL:
+                ears.last = time.monotonic()  # it was this process that slept
+
+
+def kill_hung(owner: int) -> bool:
+    """Kill a hung owner: while it lives it holds the port's lock."""
+    if os.name == "posix" and os.getppid() != owner:
+        return False  # gone already; its number may be another's by now
+    try:
+        os.kill(owner, getattr(signal, "SIGKILL", signal.SIGTERM))
+    except OSError:
+        return False
+    return True
+
+
+def prepared(told: dict[str, Any]) -> serial.SerialBase:
+    """The source's port, not opened: what opening needs is imported by then."""
+    port: serial.SerialBase = serial.serial_for_url(
+        told["port"], do_not_open=True, **told["settings"]
+    )
+    return port
+
+
+def switch_off(told: dict[str, Any], port: serial.SerialBase, log: Log) -> bool:
+    """Send and verify output-off, again and again while patience lasts."""
+    give_up = time.monotonic() + PATIENCE
+    reasons: set[str] = set()
+    while time.monotonic() < give_up:
+        try:
+            with port:
+                port.write(told["send"].encode("ascii"))
+                port.write(told["query"].encode("ascii"))
+                answers = []
+                for _ in range(MOST_LINES):
+                    answer = port.read_until(told["reply_end"].encode("ascii"))
+                    if not answer:
+                        break
+                    text = answer.decode("ascii", "replace").strip("\r\n\x11\x13\x00 ")
+                    if re.search(told["off_match"], text):
+                        log.write(f"output verified off ({text!r})")
+                        return True
+                    answers.append(text)
+                raise OSError(f"not verified off, it answers {answers}")
+        except PORT_ERRORS as reason:
+            if str(reason) not in reasons:
+                reasons.add(str(reason))
+                log.write(f"trying again: {reason}")
+            time.sleep(RETRY)
+    log.write("OUTPUT STATE UNKNOWN - switch the coil source off at the instrument")
+    return False
+
+
+class Log:
+    """Appends lines to a file and repeats them on standard error.
+
+    Args:
+        path: of the file; its folder is made.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._path = Path(path)
+
+    def write(self, text: str) -> None:
+        """One line, with date and this process's id."""
+        line = f"{time.strftime('%Y-%m-%dT%H:%M:%S%z')} guard {os.getpid()}: {text}\n"
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(line)
+        except OSError as reason:
+            line += f"(this could not be logged: {reason})\n"
+        try:
+            sys.stderr.write(line)
+            sys.stderr.flush()
+        except OSError:
+            return  # the terminal is gone; there is nobody left to tell
+
+
+def main() -> int:
+    """Guard until the owner leaves; 0 when the output is known to be off."""
+    for name in ("SIGINT", "SIGHUP", "SIGTERM"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    told = json.loads(_first_line())
+    log = Log(told["log"])
+    port = prepared(told)
+    ears = Ears()
+    threading.Thread(target=ears.listen, daemon=True).start()
+    os.write(1, b"ready\n")
+    reason = wait_for_danger(ears, told["silence"])
+    if reason is None:
+        return 0
+    begun = time.monotonic()
+    killed = "silent" in reason and kill_hung(told["owner"])
+    off = switch_off(told, port, log)
+    log.write(
+        f"{reason}{'; it was killed' if killed else ''}; port {told['port']}, "
+        f"{'off' if off else 'NOT verified off'} after {time.monotonic() - begun:.3f} s"
+    )
+    return 0 if off else 1
+
+
+def _first_line() -> bytes:
+    line = b""
+    while not line.endswith(b"\n"):
+        more = os.read(0, 1)
+        if not more:
+            sys.exit(0)
+        line += more
+    return line
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""Opening a serial port with pyserial, and saying why it cannot be opened."""
+
+from __future__ import annotations
+
+import errno
+import os
+from typing import Any
+
+import serial
+
+from drivers.dialect_row import Wire
+from tactile_lab.errors import InstrumentError, NotFoundError
+
+try:
+    from termios import error as termios_error
+except ImportError:  # Windows has no termios
+    termios_error = OSError  # type: ignore[misc, assignment]
+
+PORT_ERRORS = (serial.SerialException, OSError, termios_error)
+"""What pyserial raises when a port fails; `termios.error` is not an `OSError`."""
+
+
+def port_settings(port: str, wire: Wire) -> dict[str, Any]:
+    """Arguments with which pyserial opens `port`; a write timeout is always set."""
+    is_url = "://" in port
+    # a pseudo-terminal has no frame format; Linux refuses to be asked for one twice
+    framed = is_url or not os.path.realpath(port).startswith("/dev/pts/")
+    return {
+        "baudrate": wire.baud,
+        "bytesize": wire.bytesize if framed else 8,
+        "parity": wire.parity if framed else "N",
+        "stopbits": wire.stopbits,
+        "xonxoff": wire.xonxoff,
+        "rtscts": wire.rtscts,
+        "dsrdtr": wire.dsrdtr,
+        "timeout": wire.timeout,
+        "write_timeout": wire.timeout,
+        "exclusive": None if is_url else True,
+    }
+
+
+def open_port(port: str, wire: Wire, what: str) -> serial.Serial:
+    """The port at `port` (any address pyserial takes), held by this program alone.
+
+    Args:
+        port: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `sim://...`.
+        wire: settings.
+        what: the instrument's role, for messages.
+
+    Raises:
+        NotFoundError: no such port, or no right to use it.
+        InstrumentError: another program holds it.
+    """
+    try:
+        opened: serial.Serial = serial.serial_for_url(
+            port, do_not_open=True, **port_settings(port, wire)
+        )
+        if wire.dtr is not None:
+            opened.dtr = wire.dtr
+        opened.open()
+    except (*PORT_ERRORS, ValueError) as reason:
+        raise _told(port, what, reason) from reason
+    return opened
+
+
+def release(port: serial.SerialBase) -> None:
+    """Close a port, also one whose far end is gone."""
+    # pyserial's socket:// forgets to close a socket whose peer is gone
+    left_open = getattr(port, "_socket", None)
+    try:
+        port.close()
+        if left_open is not None:
+            left_open.close()
+    except PORT_ERRORS:
+        return  # an unplugged port has nothing left to close
+
+
+def _told(port: str, what: str, reason: Exception) -> InstrumentError:
+    number = getattr(reason, "errno", None)
+    start = f"The {what} at {port} cannot be opened ({reason})."
+    if number in (errno.EAGAIN, errno.EBUSY):
+        return InstrumentError(f"{start} Another program holds the port; close it.")
+    if number in (errno.EACCES, errno.EPERM):
+        return NotFoundError(
+            f"{start} You may not use the port; on Linux join the group dialout "
+            "(sudo usermod -aG dialout $USER) and log in again."
+        )
+    return NotFoundError(
+        f"{start} Check that it is plugged in and that the bench file names its "
+        "port; `tactile-lab devices` lists what is there."
+    )

@@ -1,0 +1,127 @@
+"""A serial teslameter; its dialect is a row of data."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from drivers.conversation import Conversation
+from drivers.dialect_row import MeterDialect
+from drivers.serial_link import SerialLink, Spy
+from tactile_lab.bench import Reading
+from tactile_lab.clock import Clock
+from tactile_lab.errors import BadReplyError, LimitError
+
+MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
+"""Meaning of the prefix letters some meters answer separately."""
+
+
+class Teslameter:
+    """A field meter behind a serial port.
+
+    Args:
+        dialect: how the model speaks.
+        port: address for pyserial.
+        clock: the bench's time.
+        baud: instead of the row's.
+        spy: told of every byte, or None.
+    """
+
+    def __init__(
+        self,
+        dialect: MeterDialect,
+        port: str,
+        clock: Clock,
+        *,
+        baud: int | None = None,
+        spy: Spy | None = None,
+    ) -> None:
+        self.dialect = dialect
+        wire = dialect.serial
+        if baud is not None:
+            wire = wire.model_copy(update={"baud": baud})
+        link = SerialLink(
+            port, wire, clock, what="teslameter", identify=dialect.identify, spy=spy
+        )
+        self._clock = clock
+        self._talk = Conversation(link, dialect)
+
+    @property
+    def identity(self) -> str:
+        """What the meter answered when asked who it is."""
+        return self._talk.link.identity or "not connected"
+
+    @property
+    def interval(self) -> float:
+        """Shortest time between two readings, s."""
+        return self.dialect.interval
+
+    def record(self, path: Path) -> None:
+        """Write every byte to a transcript at `path`, until closed; before `open`.
+
+        Raises:
+            SceneError: the file cannot be written.
+        """
+        self._talk.link.record(path)
+
+    def open(self) -> None:
+        """Connect, identify, set unit and range.
+
+        Raises:
+            NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
+            BadReplyError: another instrument answers.
+        """
+        self._talk.link.open()
+        try:
+            self._talk.recognise()
+            self._talk.clear_errors()
+            for line in (*self.dialect.optional, *self.dialect.init):
+                self._talk.command(line)
+        except BaseException:
+            self._talk.link.close()
+            raise
+
+    def read(self) -> Reading:
+        """Magnetic flux density, T.
+
+        Raises:
+            LimitError: the field exceeds the meter's range.
+            BadReplyError: the answer is no number, twice.
+        """
+        answer = self._talk.query(self.dialect.field)
+        if re.search(self.dialect.overload, answer):
+            raise LimitError(
+                f"The field exceeds the teslameter's range (it answers {answer!r}). "
+                "Choose a larger range or autorange."
+            )
+        value = self._talk.parsed(answer)
+        if value is None:
+            value = self._talk.number(self.dialect.field)
+        return Reading(self._clock.now(), value * self._factor())
+
+    def settings(self) -> dict[str, str]:
+        """Settings read back, for the run's record."""
+        link = self._talk.link
+        known = {
+            "identity": self.identity,
+            "dialect": self.dialect.id,
+            "port": link.port,
+            "baud": str(link.wire.baud),
+        }
+        asked = {k: self._talk.query(line) for k, line in self.dialect.report.items()}
+        return known | asked
+
+    def close(self) -> None:
+        """Let go of the port; idempotent."""
+        if self._talk.link.is_open:
+            self._talk.offer(self.dialect.release)
+            self._talk.link.close()
+        self._talk.link.end_record()
+
+    def _factor(self) -> float:
+        if self.dialect.multiplier is None:
+            return self.dialect.scale
+        letter = self._talk.query(self.dialect.multiplier).strip().lower()
+        if letter not in MULTIPLIERS:
+            raise BadReplyError(f"The teslameter's multiplier {letter!r} is unknown.")
+        return self.dialect.scale * MULTIPLIERS[letter]

@@ -1,0 +1,182 @@
+"""Figures of the serial instruments: time to output-off, set-points a second, faults.
+
+    python tests/benchmarks/serial_bench.py [--kills N] [--out docs/serial-figures.md]
+
+The source is served from this process; each owner is a process of its own, killed at a
+seeded random instant of a waveform.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import random
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import serial_faults  # beside this file
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.serial_servers import PtyServer, SerialServer, TcpServer
+from sim_backend.serial_wires import FarEnd
+from sim_backend.serve import CoilOnly
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import RealClock
+from tactile_lab.magnetics import Magnet
+
+OWNER = """
+import sys
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import RealClock
+clock = RealClock()
+coil = CoilSource(coil_dialect("kepco-bop"), sys.argv[1], CoilLimits(), clock)
+coil.open()
+coil.energise()
+print("live", flush=True)
+k = 0
+while True:
+    coil.set_current(0.3 if k // 25 % 2 else -0.3)
+    coil.beat()
+    clock.sleep_until(clock.now() + max(0.01, coil.update_interval))
+    k += 1
+"""
+
+
+def served(
+    kind: str, baud: int | None
+) -> tuple[SimCoilSource, SerialServer, RealClock]:
+    """A Kepco at the far end of a `pty` or `tcp` wire, paced if `baud` is given."""
+    clock = RealClock()
+    source = SimCoilSource(CoilOnly(Magnet(r=6e-3)), "kepco-bop", clock)
+    wire = coil_dialect("kepco-bop").serial
+    change = {"baud": baud} if baud else {"latency": 0.0}
+    end = FarEnd(source, wire.model_copy(update=change), clock, "coil")
+    paced = baud is not None
+    server = (
+        PtyServer(end, paced=paced) if kind == "pty" else TcpServer(end, paced=paced)
+    )
+    server.start()
+    return source, server, clock
+
+
+def times_to_off(kind: str, baud: int | None, how: int, times: int) -> list[float]:
+    """Seconds from signal `how` to output off, for each of `times` owners."""
+    chance, found = random.Random(1), []
+    with tempfile.TemporaryDirectory() as state:
+        for _ in range(times):
+            source, server, clock = served(kind, baud)
+            owner = subprocess.Popen(
+                [sys.executable, "-c", OWNER, server.url],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=os.environ | {"XDG_STATE_HOME": state},
+            )
+            assert owner.stdout is not None
+            assert owner.stdout.readline() == b"live\n"
+            time.sleep(chance.uniform(0.0, 0.6))
+            since = clock.now()
+            owner.send_signal(how)
+            while source.output_on and clock.now() < since + 10:
+                time.sleep(0.0005)
+            assert not source.output_on, "the output stayed on"
+            off = [d for d in source.deeds if d.what == "output"][-1]
+            found.append(off.time - since)
+            logged(Path(state), len(found))
+            owner.kill()
+            owner.wait()
+            owner.stdout.close()
+            server.close()
+    return found
+
+
+def logged(state: Path, times: int) -> None:
+    """Wait until so many guards are done; one at work would open the next terminal."""
+    log = state / "tactile-lab" / "guard.log"
+    while not log.exists() or log.read_text().count(" after ") < times:
+        time.sleep(0.002)
+
+
+def rates(kind: str, baud: int | None, seconds: float) -> tuple[float, float, float]:
+    """(verified set-points a second, p50 s, p99 s) of one round trip."""
+    _, server, clock = served(kind, baud)
+    coil = CoilSource(
+        coil_dialect("kepco-bop"),
+        server.url,
+        CoilLimits(),
+        clock,
+        baud=baud,
+        guarded=False,
+    )
+    coil.open()
+    coil.energise()
+    trips = []
+    end = clock.now() + seconds
+    while (begun := clock.now()) < end:
+        coil.set_current(0.1)
+        trips.append(clock.now() - begun)
+    coil.close()
+    server.close()
+    cuts = statistics.quantiles(trips, n=100)
+    return len(trips) / seconds, cuts[49], cuts[98]
+
+
+def main() -> None:
+    """Measure, print, and write the table."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--kills", type=int, default=50)
+    options.add_argument("--seconds", type=float, default=2.0)
+    options.add_argument("--out", type=Path)
+    chosen = options.parse_args()
+    lines = [
+        "# Serial instruments in figures",
+        "",
+        f"`tests/benchmarks/serial_bench.py --kills {chosen.kills}`, "
+        f"{time.strftime('%Y-%m-%d')}, {platform.python_version()}, "
+        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}.",
+        "",
+        "| owner's end | wire | kills | median to off, ms | worst, ms |",
+        "|---|---|---|---|---|",
+    ]
+    few = max(3, chosen.kills // 5)
+    for name, how, kind, baud, times in (
+        ("SIGKILL", signal.SIGKILL, "pty", None, chosen.kills),
+        ("SIGKILL", signal.SIGKILL, "tcp", None, few),
+        ("SIGKILL", signal.SIGKILL, "pty", 9600, few),
+        ("SIGSTOP (hangs)", signal.SIGSTOP, "pty", None, few),
+    ):
+        found = times_to_off(kind, baud, how, times)
+        wire = f"{kind}, {baud} baud" if baud else f"{kind}, unpaced"
+        lines.append(
+            f"| {name} | {wire} | {times} | {1e3 * statistics.median(found):.0f} | "
+            f"{1e3 * max(found):.0f} |"
+        )
+    lines += [
+        "",
+        "| wire | verified set-points a second | p50, ms | p99, ms |",
+        "|---|---|---|---|",
+    ]
+    for kind, baud in (
+        ("pty", None), ("tcp", None), ("pty", 9600), ("pty", 19200), ("pty", 115200),
+    ):  # fmt: skip
+        rate, p50, p99 = rates(kind, baud, chosen.seconds)
+        wire = f"{kind}, {baud} baud, 10 ms to act" if baud else f"{kind}, unpaced"
+        lines.append(f"| {wire} | {rate:.0f} | {1e3 * p50:.2f} | {1e3 * p99:.2f} |")
+    lines += ["", *serial_faults.table()]
+    text = "\n".join(lines) + "\n"
+    print(text)
+    if chosen.out is not None:
+        chosen.out.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+import math
+from dataclasses import dataclass
+
+import pytest
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.serial_wires import FarEnd, plug_in, unplug
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import SimulatedClock
+
+
+class Resistor:
+    """A plant without dynamics: 5 Ohm, 11 mT/A."""
+
+    def __init__(self):
+        self.amperes = 0.0
+        self.on = False
+        self.resistance = 5.0
+
+    def set_current(self, time, amperes):
+        self.amperes = amperes
+
+    def output(self, time, on):
+        self.on = on
+
+    def coil_current(self, time):
+        return self.amperes if self.on and math.isfinite(self.resistance) else 0.0
+
+    def coil_voltage(self, time):
+        return self.coil_current(time) * self.resistance
+
+    def field(self, time):
+        return 11e-3 * self.coil_current(time)
+
+
+@dataclass
+class SerialBench:
+    clock: SimulatedClock
+    plant: Resistor
+    source: SimCoilSource
+    end: FarEnd
+    coil: CoilSource
+
+    def drive(self, current, updates=12):
+        for _ in range(updates):
+            self.clock.sleep_until(self.clock.now() + self.coil.update_interval)
+            self.coil.set_current(current)
+
+    @property
+    def sets(self):
+        return [deed for deed in self.source.deeds if deed.what == "set"]
+
+
+@pytest.fixture
+def resistor():
+    return Resistor()
+
+
+@pytest.fixture
+def serial_bench(resistor):
+    """A Kepco at 19200 baud on the simulated clock; this thread takes part."""
+    row = coil_dialect("kepco-bop")
+    clock = SimulatedClock()
+    source = SimCoilSource(resistor, row.id, clock)
+    wire = row.serial.model_copy(update={"baud": 19200})
+    end = plug_in(source, wire, clock, "coil")
+    coil = CoilSource(row, end.url, CoilLimits(), clock, baud=19200)
+    with clock.taking_part("test"):
+        yield SerialBench(clock, resistor, source, end, coil)
+        coil.close()
+    unplug(end)

@@ -1,0 +1,76 @@
+"""What is attached, against served instruments."""
+
+import pytest
+
+from drivers.attached import ask_name, attached, fitting, try_out
+from drivers.diagnosis import diagnose, disk
+from drivers.transcript import read_transcript
+from sim_backend.serve import ServedBench
+from tactile_lab.errors import BadReplyError
+
+
+@pytest.fixture
+def served():
+    bench = ServedBench(coil="pty", teslameter="tcp:0")
+    bench.start()
+    yield bench.addresses
+    bench.close()
+
+
+def test_each_instrument_is_recognised(served):
+    coil, meter = attached(ports=[served["coil"], served["teslameter"]])
+    assert coil["identity"].startswith("KEPCO") and coil["fits"] == ("kepco-bop",)
+    assert meter["identity"].startswith("LSCI")
+    assert meter["fits"] == ("lakeshore-425",)
+    assert coil["problem"] is None and meter["problem"] is None
+
+
+def test_a_port_that_is_not_there():
+    (found,) = attached(ports=["/dev/ttyUSB77"])
+    assert found["identity"] is None and "plugged in" in found["problem"]
+
+
+def test_silence_is_told(served):
+    bench = ServedBench(coil="pty")  # not started: nobody answers
+    name, problem = ask_name(bench.addresses["coil"])
+    bench.close()
+    assert name is None and "nothing answered" in problem
+
+
+def test_a_stranger_gets_the_plain_row_only():
+    assert fitting("ACME,THING,1,1") == ("scpi-generic",)
+    assert fitting("KEITHLEY INSTRUMENTS INC.,MODEL 2400,1,C30") == ("keithley-2400",)
+
+
+def test_trying_out_sets_nothing_and_writes_every_byte(served, tmp_path):
+    path = tmp_path / "talk.txt"
+    settings = try_out(served["coil"], "kepco-bop", transcript=path)
+    assert settings["output"] == "off" and settings["setpoint_A"] == "0"
+    sent = [one.data for one in read_transcript(path) if one.sent]
+    assert not any(b"OUTP 1" in data for data in sent)
+    assert {data for data in sent if data.startswith(b"CURR ")} == {
+        b"CURR 0.00000;:SYST:ERR?\n"
+    }
+
+
+def test_the_wrong_row_is_refused(served):
+    with pytest.raises(BadReplyError, match="Name the right row"):
+        try_out(served["coil"], "keithley-2400")
+
+
+def test_every_finding_has_a_remedy_unless_it_is_fine(tmp_path):
+    findings = diagnose(tmp_path, 1.0)
+    assert {"python", "packages", "guard", "disk", "timing"} <= {
+        one["topic"] for one in findings
+    }
+    for one in findings:
+        assert one["state"] in ("ok", "note", "problem")
+        if one["state"] == "problem":
+            assert one["remedy"]
+    assert next(o for o in findings if o["topic"] == "guard")["state"] == "ok"
+
+
+def test_a_disk_that_is_too_slow_or_not_there(tmp_path):
+    slow = disk(tmp_path / "not" / "yet", 1e15)
+    assert slow.state == "problem" and "faster disk" in slow.remedy
+    assert disk(tmp_path, 1.0).state == "ok"

@@ -1,0 +1,231 @@
+import itertools
+import math
+
+import pytest
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect, meter_dialect
+from drivers.teslameter import Teslameter
+from sim_backend.serial_wires import plug_in
+from sim_backend.teslameter import SimTeslameter
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import (
+    InstrumentError,
+    InterlockError,
+    LimitError,
+    NoReplyError,
+)
+
+KEPCO = coil_dialect("kepco-bop")
+
+
+@pytest.fixture
+def bench(serial_bench):
+    it = serial_bench
+    return it.clock, it.plant, it.source, it.coil
+
+
+def steps(far):
+    return [deed for deed in far.deeds if deed.what == "set"]
+
+
+def test_plays_a_current_and_reads_it_back(bench):
+    clock, _plant, far, coil = bench
+    coil.open()
+    assert coil.identity.startswith("KEPCO")
+    coil.energise()
+    for _ in range(10):
+        clock.sleep_until(clock.now() + coil.update_interval)
+        coil.set_current(0.5)
+    assert far.setpoint == pytest.approx(0.5)
+    clock.sleep_until(clock.now() + 0.2)
+    assert coil.read_current().value == pytest.approx(0.5)
+    assert coil.read_voltage().value == pytest.approx(2.5)
+
+
+def test_update_interval_is_wire_time_and_latency_with_margin(bench):
+    *_, coil = bench
+    coil.open()
+    assert coil.update_interval == pytest.approx(
+        KEPCO.promised_interval(19200), rel=0.1
+    )
+    assert 1 / coil.update_interval > 20
+
+
+def test_never_on_before_limit_and_zero(bench):
+    _clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    order = [deed.what for deed in far.deeds]
+    on = next(i for i, d in enumerate(far.deeds) if d.what == "output" and d.value)
+    assert "limit" in order[:on]
+    assert far.compliance == 14.0
+    assert [d.value for d in far.deeds[:on] if d.what == "set"][-1] == 0.0
+
+
+def test_steps_never_exceed_the_slew_limit(bench):
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    clock.sleep_until(clock.now() + 5)
+    for wanted in [1.5, 1.5, 1.5, -1.5] * 4:
+        clock.sleep_until(clock.now() + coil.update_interval)
+        coil.set_current(wanted)
+    coil.safe_off()
+    for before, after in itertools.pairwise(steps(far)):
+        change = abs(after.value - before.value)
+        assert change <= coil.limits.slew * (after.time - before.time) + 3e-3
+
+
+@pytest.mark.parametrize("current", [2.1, -2.1, math.nan, math.inf])
+def test_refuses_what_may_never_be_set(bench, current):
+    *_, far, coil = bench
+    coil.open()
+    coil.energise()
+    before = list(far.deeds)
+    with pytest.raises(LimitError):
+        coil.set_current(current)
+    assert far.deeds == before
+
+
+def test_refuses_to_set_with_the_output_off(bench):
+    *_, coil = bench
+    coil.open()
+    with pytest.raises(LimitError, match="energise"):
+        coil.set_current(0.1)
+
+
+def test_safe_off_ramps_and_verifies_and_may_be_repeated(bench):
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    for _ in range(20):
+        clock.sleep_until(clock.now() + coil.update_interval)
+        coil.set_current(1.0)
+    begun, seen = clock.now(), len(far.deeds)
+    report = coil.safe_off()
+    assert report.verified and report.current == 0.0
+    assert not far.output_on and far.setpoint == 0.0
+    assert clock.now() - begun < 0.6
+    assert len(far.deeds) - seen > 4
+    assert coil.safe_off().verified
+
+
+def test_heat_budget_trips_and_stays_latched(bench):
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    begun = clock.now()
+    with pytest.raises(InterlockError, match="heat budget"):
+        for _ in range(1000):
+            clock.sleep_until(clock.now() + coil.update_interval)
+            coil.set_current(2.0)
+    assert 8.2 < clock.now() - begun < 9.5
+    assert not far.output_on
+    with pytest.raises(InterlockError):
+        coil.energise()
+    clock.sleep_until(clock.now() + 60)
+    coil.acknowledge()
+    coil.energise()
+
+
+def test_an_open_circuit_trips(bench):
+    clock, plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    for _ in range(10):
+        clock.sleep_until(clock.now() + coil.update_interval)
+        coil.set_current(0.5)
+    plant.resistance = math.inf
+    clock.sleep_until(clock.now() + 0.2)
+    with pytest.raises(InterlockError, match="open"):
+        for _ in range(5):
+            coil.read_current()
+    assert not far.output_on
+
+
+def test_output_on_at_connect_is_ramped_down(bench):
+    _clock, _plant, far, coil = bench
+    far.switch(True)
+    far.set_current(1.0)
+    coil.open()
+    assert not far.output_on and far.setpoint == 0.0
+    assert "already on" in coil.warnings[0]
+    assert len(steps(far)) > 4
+
+
+def test_wrong_baud_is_no_reply(serial_bench):
+    wrong = CoilSource(
+        KEPCO, serial_bench.end.url, CoilLimits(), serial_bench.clock, baud=9600
+    )
+    with pytest.raises(NoReplyError, match="baud"):
+        wrong.open()
+
+
+def test_two_programs_on_one_port(serial_bench):
+    serial_bench.coil.open()
+    second = CoilSource(
+        KEPCO, serial_bench.end.url, CoilLimits(), serial_bench.clock, baud=19200
+    )
+    with pytest.raises(InstrumentError, match="Another program"):
+        second.open()
+
+
+def test_a_hot_coil_warns_then_trips(serial_bench):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.clock.sleep_until(it.clock.now() + 0.2)
+    it.coil.read_current()
+    for resistance in (5.5, 5.8):
+        it.plant.resistance = resistance
+        it.clock.sleep_until(it.clock.now() + 1.1)
+        it.coil.read_current()
+    assert it.coil.resistance_ratio == pytest.approx(1.16)
+    assert "41 K warmer" in it.coil.warnings[0]
+    it.plant.resistance = 6.3
+    it.clock.sleep_until(it.clock.now() + 1.1)
+    with pytest.raises(InterlockError, match="cool"):
+        it.coil.read_current()
+    assert not it.source.output_on
+
+
+@pytest.mark.parametrize(("resistance", "why"), [(11.0, "loose"), (3.0, "shorted")])
+def test_a_jump_of_the_resistance_trips(serial_bench, resistance, why):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.clock.sleep_until(it.clock.now() + 0.2)
+    it.coil.read_current()
+    it.plant.resistance = resistance
+    it.clock.sleep_until(it.clock.now() + 1.1)
+    with pytest.raises(InterlockError, match=why):
+        it.coil.read_current()
+    assert not it.source.output_on
+
+
+def test_the_limits_in_force_are_the_narrowest():
+    coil = CoilSource(
+        KEPCO, "sim://x", CoilLimits(current=50.0, compliance=99.0), SimulatedClock()
+    )
+    assert (coil.limits.current, coil.limits.compliance) == (5.0, 20.0)
+
+
+def test_teslameter_reads_tesla(resistor):
+    clock, plant = SimulatedClock(), resistor
+    plant.output(0, True)
+    plant.set_current(0, 0.5)
+    row = meter_dialect("lakeshore-425")
+    end = plug_in(SimTeslameter(plant, row.id, clock), row.serial, clock, "meter")
+    meter = Teslameter(row, end.url, clock)
+    with clock.taking_part("test"):
+        meter.open()
+        assert meter.read().value == pytest.approx(5.5e-3, rel=1e-3)
+        assert meter.settings()["unit"] == "2"
+        plant.set_current(0, 1000.0)
+        with pytest.raises(LimitError, match="range"):
+            meter.read()
+        meter.close()

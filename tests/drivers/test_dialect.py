@@ -1,0 +1,147 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import (
+    coil_dialect,
+    dialect_ids,
+    load_dialect,
+    meter_dialect,
+    parse_dialect,
+)
+from drivers.dialect_row import CoilDialect
+from sim_backend.coil_source import MODELS, SimCoilSource
+from sim_backend.serial_wires import plug_in
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import LimitError, SceneError
+
+COILS = [i for i in dialect_ids() if isinstance(load_dialect(i), CoilDialect)]
+METERS = [i for i in dialect_ids() if i not in COILS]
+
+
+def test_every_coil_row_has_a_far_end():
+    assert sorted(COILS) == sorted(MODELS)
+
+
+@pytest.mark.parametrize("name", COILS)
+def test_each_row_drives_its_far_end(name, resistor):
+    row = coil_dialect(name)
+    clock = SimulatedClock()
+    source = SimCoilSource(resistor, name, clock)
+    end = plug_in(source, row.serial, clock, name)
+    coil = CoilSource(row, end.url, CoilLimits(), clock)
+    with clock.taking_part("test"):
+        coil.open()
+        coil.energise()
+        assert source.output_on
+        assert source.compliance == min(14.0, row.voltage)
+        for _ in range(15):
+            clock.sleep_until(clock.now() + coil.update_interval)
+            coil.set_current(0.4)
+        assert resistor.coil_current(clock.now()) == pytest.approx(0.4)
+        clock.sleep_until(clock.now() + 0.2)
+        assert coil.read_current().value == pytest.approx(0.4)
+        assert coil.read_voltage().value == pytest.approx(2.0)
+        assert coil.settings()["output"] == "on"
+        assert coil.safe_off().verified
+        assert not source.output_on
+        coil.close()
+        assert coil.warnings == []
+    errors = [e for e in source.parser.errors if "Undefined" in e[1]]
+    assert errors == []
+
+
+@pytest.mark.parametrize("name", COILS)
+def test_the_planned_interval_is_what_is_measured(name, resistor):
+    row = coil_dialect(name)
+    clock = SimulatedClock()
+    end = plug_in(SimCoilSource(resistor, name, clock), row.serial, clock, name)
+    coil = CoilSource(row, end.url, CoilLimits(), clock)
+    with clock.taking_part("test"):
+        coil.open()
+        assert coil.update_interval == pytest.approx(row.promised_interval(), rel=0.25)
+        coil.close()
+
+
+def test_a_source_of_one_polarity_refuses_the_other_sign(resistor):
+    row = coil_dialect("aim-tti-pl")
+    clock = SimulatedClock()
+    source = SimCoilSource(resistor, row.id, clock)
+    coil = CoilSource(row, plug_in(source, row.serial, clock).url, CoilLimits(), clock)
+    with clock.taking_part("test"):
+        coil.open()
+        coil.energise()
+        with pytest.raises(LimitError, match="cannot reverse its current"):
+            coil.set_current(-0.1)
+        coil.close()
+
+
+def test_an_unknown_row_names_the_nearest():
+    with pytest.raises(SceneError, match='did you mean "kepco-bop"'):
+        load_dialect("kepko-bop")
+
+
+def test_a_row_of_the_wrong_role():
+    with pytest.raises(SceneError, match="is a field meter"):
+        coil_dialect("lakeshore-425")
+    with pytest.raises(SceneError, match="is a coil"):
+        meter_dialect("kepco-bop")
+
+
+def text_of(name="kepco-bop"):
+    from importlib import resources
+
+    return resources.files("drivers").joinpath(f"dialects/{name}.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('set = "CURR {i:.5f}"', 'set = "CURR {amps:.5f}"'),
+        ('set = "CURR {i:.5f}"', 'sett = "CURR {i:.5f}"'),
+        ("baud = 9600", 'baud = "fast"'),
+        ("baud = 9600", "baud = 9600\nspeed = 1"),
+        ('current = "5 A"', "current = 5"),
+        ('current = "5 A"', 'current = "5 V"'),
+        ("match = '^KEPCO'", "match = '^(KEPCO'"),
+        ("max_line = 127", "max_line = 20"),
+        ('role = "coil"', 'role = "pump"'),
+        ("id =", "id"),
+    ],
+)
+def test_a_row_with_a_mistake_is_refused(old, new):
+    text = text_of()
+    assert old in text
+    with pytest.raises(SceneError):
+        parse_dialect(text.replace(old, new), "mine.toml")
+
+
+def test_a_row_of_ones_own(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(text_of().replace("kepco-bop", "mine"))
+    assert load_dialect(str(path)).id == "mine"
+    with pytest.raises(SceneError, match="cannot be read"):
+        load_dialect(str(tmp_path / "missing.toml"))
+
+
+@pytest.mark.parametrize("name", COILS)
+@given(share=st.floats(-1, 1, allow_subnormal=True))
+def test_numbers_on_the_wire_are_plain(name, share):
+    row = coil_dialect(name)
+    line = row.set_line(share * row.current)
+    number = line.split()[-1]
+    assert "e" not in number.lower() and "inf" not in number and "nan" not in number
+    assert float(number) == pytest.approx(share * row.current, abs=10.0**-row.digits)
+    assert not (float(number) == 0 and "-" in number)
+    assert len(number.lstrip("-").split(".")[0]) <= 4
+
+
+def test_limits_beyond_the_rating_are_refused():
+    row = coil_dialect("keithley-2400")
+    row.check_limits(CoilLimits(current=1.0))
+    with pytest.raises(SceneError, match=r"2 A is beyond the 1\.05 A of Keithley"):
+        row.check_limits(CoilLimits(current=2.0))
+    with pytest.raises(SceneError, match="compliance = 40 V"):
+        row.check_limits(CoilLimits(current=1.0, compliance=40.0))

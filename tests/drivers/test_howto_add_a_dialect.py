@@ -1,0 +1,23 @@
+"""The page docs/how-to/add-a-dialect.md, block by block."""
+
+import re
+import tomllib
+from pathlib import Path
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "add-a-dialect.md"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def test_the_page_works(tmp_path, monkeypatch):
+    blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
+    assert [kind for kind, _ in blocks] == ["toml", "text", "python", "toml", "python"]
+    monkeypatch.chdir(tmp_path)
+    name = ""
+    for kind, text in blocks:
+        if kind == "toml":
+            name = tomllib.loads(text)["id"]
+            Path(f"{name}.toml").write_text(text, encoding="utf-8")
+        elif kind == "text":
+            Path(f"{name}.txt").write_text(text, encoding="utf-8")
+        else:
+            exec(compile(text, str(PAGE), "exec"), {})

@@ -1,0 +1,96 @@
+"""Loss is found from counts, whatever the latency; health is not called loss."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.sample_count import SampleCount
+from tactile_lab.errors import SamplesLostError
+
+RATE = 1e6
+
+
+def counter() -> SampleCount:
+    return SampleCount(
+        started=1.0, interval=1 / RATE, depth=10**6, tolerance=0.01, drift=1e-4
+    )
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    latencies=st.lists(st.floats(0, 0.03), min_size=20, max_size=200),
+    drift=st.floats(-8e-5, 8e-5),
+)
+def test_latency_and_drift_are_no_loss(latencies: list[float], drift: float) -> None:
+    count = counter()
+    for k, latency in enumerate(latencies, start=1):
+        # each eighth poll sees little latency, as a real one does
+        latency = 0.001 if k % 8 == 0 else latency
+        now = 0.02 * k
+        arrived = max(0, int((now * (1 + drift) - latency) * RATE))
+        count.poll(1.0 + now, max(0, arrived - count.received))
+    assert count.received > 0
+
+
+@settings(max_examples=50, deadline=None)
+@given(lost=st.integers(20_000, 10**6), at=st.integers(10, 50))
+def test_loss_is_found_within_a_few_polls(lost: int, at: int) -> None:
+    count = counter()
+    for k in range(1, at):
+        count.poll(1.0 + 0.02 * k, 20_000)
+    total = 20_000 * (at - 1)
+    with pytest.raises(SamplesLostError, match="samples"):
+        for k in range(at, at + 80):
+            produced = 20_000 * k - lost
+            count.poll(1.0 + 0.02 * k, max(0, produced - total))
+            total = max(total, produced)
+
+
+@pytest.mark.parametrize("drift", [-5e-5, 5e-5])
+def test_a_few_samples_are_missed_where_there_is_no_latency(drift: float) -> None:
+    count = SampleCount(
+        started=0.0,
+        interval=1 / RATE,
+        depth=10**6,
+        tolerance=3e-6,
+        drift=1e-4,
+        window=1,
+    )
+    lost = 0
+    with pytest.raises(SamplesLostError, match=r"about [678] too few"):
+        for k in range(1, 10_000):
+            lost = 7 if k > 8_000 else 0
+            arrived = int(0.02 * k * (1 - drift) * RATE) - lost
+            count.poll(0.02 * k, arrived - count.received)
+    assert k == 8_001
+
+
+def test_many_small_gaps_add_up() -> None:
+    count = counter()
+    with pytest.raises(SamplesLostError, match="Samples are missing"):
+        for k in range(1, 2_000):
+            count.poll(1.0 + 0.02 * k, 20_000 - (k % 2) * 50)
+
+
+def test_a_poll_that_left_something_unread_is_not_judged() -> None:
+    count = SampleCount(
+        started=0.0, interval=1 / RATE, depth=10**6, tolerance=3e-6, window=1
+    )
+    count.poll(0.02, 20_000)
+    count.poll(0.04, 5_000, drained=False)
+    count.poll(0.06, 35_000)
+    count.finish()
+    with pytest.raises(SamplesLostError):
+        count.poll(0.08, 15_000)
+
+
+def test_the_end_is_looked_at_more_sharply() -> None:
+    count = counter()
+    for k in range(1, 50):
+        count.poll(1.0 + 0.02 * k, 20_000)
+    count.poll(2.00, 5_000)
+    count.poll(2.02, 20_000)
+    with pytest.raises(SamplesLostError, match="about 15000 too few"):
+        count.finish()

@@ -1,0 +1,248 @@
+"""Each serial fault, alone and lasting, in the middle of a waveform."""
+
+import itertools
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.faults import SerialFault
+from sim_backend.serial_wires import FarEnd
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import (
+    BadReplyError,
+    InstrumentError,
+    LinkLostError,
+    NoReplyError,
+    NotFoundError,
+    RefusedError,
+    UnsafeError,
+)
+
+PASSING = [
+    SerialFault(kind="late", amount=0.3),
+    SerialFault(kind="missing"),
+    *(SerialFault(kind="partial", amount=n) for n in range(14)),
+    SerialFault(kind="garbled"),
+    SerialFault(kind="echo"),
+    SerialFault(kind="no_terminator"),
+    SerialFault(kind="carriage_return"),
+    SerialFault(kind="flow_control", times=None),
+    SerialFault(kind="noise"),
+    SerialFault(kind="deaf"),
+    SerialFault(kind="stuck"),
+]
+
+
+def named(fault):
+    return f"{fault.kind}-{fault.form}-{fault.amount:g}"
+
+
+@pytest.mark.parametrize("fault", PASSING, ids=named)
+def test_one_bad_exchange_does_not_end_the_run(serial_bench, fault):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(fault)
+    it.drive(0.7)
+    assert it.end.faults.struck
+    assert it.source.setpoint == pytest.approx(0.7)
+    it.clock.sleep_until(it.clock.now() + 0.2)
+    assert it.coil.read_current().value == pytest.approx(0.7)
+    assert it.coil.safe_off().verified
+
+
+def test_an_answer_a_second_late_faults_and_ends_safely(serial_bench):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="late", amount=1.0))
+    with pytest.raises(NoReplyError):
+        it.drive(0.7)
+    assert it.coil.safe_off().verified
+    assert not it.source.output_on
+
+
+LASTING = [
+    "late",
+    "missing",
+    "garbled",
+    "echo",
+    "no_terminator",
+    "noise",
+    "deaf",
+    "stuck",
+]
+
+
+@pytest.mark.parametrize("kind", LASTING)
+def test_a_lasting_fault_is_told_and_not_called_safe(serial_bench, kind):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind=kind, times=None, amount=0.5))
+    with pytest.raises(InstrumentError, match="coil source at sim"):
+        it.drive(0.7)
+    begun = it.clock.now()
+    report = it.coil.safe_off()
+    assert not report.verified
+    assert "OUTPUT STATE UNKNOWN" in report.text
+    assert it.clock.now() - begun < 10
+    if kind not in ("deaf", "stuck"):  # the way out still worked
+        assert not it.source.output_on and it.source.setpoint == 0.0
+    it.end.faults.clear()
+    assert it.coil.safe_off().verified
+
+
+@pytest.mark.parametrize("form", ["usb", "closed", "reset"])
+@pytest.mark.parametrize("line", ["CURR [^M]", "MEAS", "OUTP 0", "OUTP\\?"])
+def test_unplugged_for_good(serial_bench, form, line):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="unplug", line=line, form=form))
+    if line.startswith("OUTP"):
+        report = it.coil.safe_off()
+    else:
+        with pytest.raises(LinkLostError, match="was lost"):
+            it.clock.sleep_until(it.clock.now() + 0.2)
+            it.coil.read_current()
+            it.drive(0.7)
+        report = it.coil.safe_off()
+    assert not report.verified
+    assert "switch the coil source off at the instrument" in report.text
+    it.coil.close()
+    with pytest.raises(NotFoundError):
+        it.coil.open()
+
+
+@pytest.mark.parametrize("form", ["usb", "closed", "reset"])
+def test_unplugged_and_back_is_made_safe_not_resumed(serial_bench, form):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(
+        SerialFault(kind="unplug", line="CURR [^M]", form=form, amount=0.01)
+    )
+    with pytest.raises(LinkLostError):
+        it.drive(0.7)
+    assert it.source.output_on  # the source itself goes on while unplugged
+    it.clock.sleep_until(it.clock.now() + 0.1)
+    assert it.coil.safe_off().verified
+    assert not it.source.output_on
+    assert it.plant.coil_current(0) == 0.0
+
+
+def test_an_error_of_the_instrument_is_passed_on(serial_bench):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.end.faults.add(SerialFault(kind="refused", line="CURR [^M]"))
+    with pytest.raises(RefusedError, match="-222"):
+        it.drive(0.7)
+    assert it.coil.safe_off().verified
+
+
+def test_no_compliance_no_output(serial_bench):
+    it = serial_bench
+    it.coil.open()
+    it.end.faults.add(SerialFault(kind="refused", line="VOLT 14"))
+    with pytest.raises(RefusedError):
+        it.coil.energise()
+    assert not it.source.output_on
+    assert not any(d.what == "output" and d.value for d in it.source.deeds)
+
+
+def test_output_that_cannot_be_switched_off_is_unsafe_at_connect(serial_bench):
+    it = serial_bench
+    it.source.switch(True)
+    it.end.faults.add(SerialFault(kind="refused", line="OUTP 0", times=None))
+    with pytest.raises(UnsafeError, match="output on"):
+        it.coil.open()
+
+
+def test_echo_at_connect_is_named(serial_bench):
+    it = serial_bench
+    it.end.faults.add(SerialFault(kind="echo", times=None))
+    with pytest.raises(BadReplyError, match="echo = true"):
+        it.coil.open()
+
+
+def test_a_row_with_echo_reads_past_it(serial_bench):
+    it = serial_bench
+    it.end.faults.add(SerialFault(kind="echo", times=None))
+    row = coil_dialect("kepco-bop")
+    wire = row.serial.model_copy(update={"echo": True})
+    row = row.model_copy(update={"serial": wire})
+    coil = CoilSource(row, it.end.url, CoilLimits(), it.clock, baud=19200)
+    coil.open()
+    coil.energise()
+    assert coil.safe_off().verified
+    coil.close()
+
+
+def test_another_instrument_on_the_port_is_refused(serial_bench):
+    it = serial_bench
+    row = coil_dialect("kepco-bop").model_copy(update={"match": "^KEITHLEY"})
+    coil = CoilSource(row, it.end.url, CoilLimits(), it.clock, baud=19200)
+    with pytest.raises(BadReplyError, match="KEPCO"):
+        coil.open()
+    assert it.source.deeds == []
+
+
+@settings(
+    max_examples=25,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(cuts=st.lists(st.integers(0, 60), max_size=8))
+def test_a_far_end_takes_any_split(resistor, cuts):
+    row = coil_dialect("kepco-bop")
+    message = b"VOLT 5;VOLT?;:CURR 0.25;CURR?;:SYST:ERR?\n\r\nOUTP?\r\n"
+    edges = sorted({0, len(message), *(min(c, len(message)) for c in cuts)})
+    clock = SimulatedClock()
+    end = FarEnd(SimCoilSource(resistor, row.id, clock), row.serial, clock, "x")
+    answers = []
+    with clock.taking_part("test"):
+        for a, b in itertools.pairwise(edges):
+            answers += [answer.data for answer in end.take(message[a:b])]
+    first = b'5.000;0.25000;0,"No error"\r\n'
+    assert answers == [first, b"0\r\n"]
+
+
+def test_a_stranger_found_on_reconnecting_is_told_nothing(serial_bench):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="unplug", line="CURR [^M]", amount=0.3))
+    with pytest.raises(LinkLostError):
+        it.drive(0.7)
+    stranger = SimCoilSource(it.plant, "keithley-2400", it.clock)
+    it.end.instrument = stranger
+    heard = []
+    stranger.line = lambda line: (
+        heard.append(line) or SimCoilSource.line(stranger, line)
+    )
+    assert not it.coil.safe_off().verified
+    assert set(heard) == {b"\x1b", b"*IDN?"}
+
+
+def test_a_source_that_was_never_reached_is_not_called_safe(serial_bench):
+    it = serial_bench
+    it.end.faults.add(SerialFault(kind="deaf", times=None))
+    with pytest.raises(NoReplyError):
+        it.coil.open()
+    begun = it.clock.now()
+    report = it.coil.safe_off()
+    assert not report.verified and "never reached" in report.text
+    assert it.clock.now() == begun

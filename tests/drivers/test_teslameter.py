@@ -1,0 +1,65 @@
+import pytest
+
+from drivers.dialect import dialect_ids, load_dialect
+from drivers.dialect_row import MeterDialect
+from drivers.teslameter import Teslameter
+from sim_backend.faults import SerialFault
+from sim_backend.serial_wires import plug_in
+from sim_backend.teslameter import MODELS, SimTeslameter
+from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import BadReplyError, LimitError
+
+METERS = [i for i in dialect_ids() if isinstance(load_dialect(i), MeterDialect)]
+
+
+def test_every_row_has_a_far_end():
+    assert sorted(METERS) == sorted(MODELS)
+
+
+@pytest.fixture(params=METERS)
+def meter(request, resistor):
+    row = load_dialect(request.param)
+    clock = SimulatedClock()
+    resistor.output(0, True)
+    end = plug_in(SimTeslameter(resistor, row.id, clock), row.serial, clock, "meter")
+    meter = Teslameter(row, end.url, clock)
+    with clock.taking_part("test"):
+        meter.open()
+        yield clock, resistor, end, meter
+        meter.close()
+
+
+@pytest.mark.parametrize("amperes", [0.0, 0.5, -0.5, 2.0, 20.0])
+def test_reads_tesla(meter, amperes):
+    _, plant, _, it = meter
+    plant.set_current(0, amperes)
+    assert it.read().value == pytest.approx(11e-3 * amperes, rel=1e-3, abs=1e-6)
+    assert it.settings()["identity"].startswith(("LSCI", "Lake"))
+
+
+def test_overload_is_told(meter):
+    _, plant, _, it = meter
+    plant.set_current(0, 1000.0)
+    with pytest.raises((LimitError, BadReplyError)):
+        it.read()
+
+
+@pytest.mark.parametrize("kind", ["missing", "partial", "garbled", "noise", "late"])
+def test_one_bad_exchange_is_repeated(meter, kind):
+    _, plant, end, it = meter
+    plant.set_current(0, 0.5)
+    end.faults.add(SerialFault(kind=kind, amount=0.35, line="FIELD|FETCH"))
+    assert it.read().value == pytest.approx(5.5e-3, rel=1e-3)
+    assert end.faults.struck == 1
+
+
+def test_readings_repeat_from_their_seed(resistor):
+    clock = SimulatedClock()
+    resistor.output(0, True)
+    both = []
+    for _ in range(2):
+        far = SimTeslameter(resistor, "lakeshore-425", clock, noise=1e-5, seed=3)
+        far.autorange = True
+        both.append([far.reading() for _ in range(5)])
+    assert both[0] == both[1]
+    assert len(set(both[0])) > 1

@@ -1,0 +1,93 @@
+"""Each row's conversation, recorded, replayed and fully consumed."""
+
+from pathlib import Path
+
+import pytest
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import dialect_ids, load_dialect
+from drivers.dialect_row import CoilDialect
+from drivers.teslameter import Teslameter
+from drivers.transcript import Transcript, read_transcript
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.replay import Replay
+from sim_backend.serial_wires import plug_in
+from sim_backend.teslameter import SimTeslameter
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import SceneError
+
+FOLDER = Path(__file__).parent / "transcripts"
+
+
+def converse(name, instrument, clock, spy=None):
+    """A short session with whatever stands at the far end."""
+    row = load_dialect(name)
+    url = plug_in(instrument, row.serial, clock, name).url
+    with clock.taking_part("test"):
+        if not isinstance(row, CoilDialect):
+            meter = Teslameter(row, url, clock, spy=spy)
+            meter.open()
+            reading = meter.read().value
+            meter.settings()
+            meter.close()
+            return reading
+        coil = CoilSource(row, url, CoilLimits(), clock, spy=spy)
+        coil.open()
+        coil.energise()
+        for _ in range(3):
+            clock.sleep_until(clock.now() + 0.1)
+            coil.set_current(0.25)
+        clock.sleep_until(clock.now() + 0.2)
+        reading = coil.read_current().value
+        coil.read_voltage()
+        coil.settings()
+        coil.close()
+        assert coil.warnings == []
+        return reading
+
+
+def far_end(name, plant, clock):
+    if isinstance(load_dialect(name), CoilDialect):
+        return SimCoilSource(plant, name, clock)
+    plant.output(0, True)
+    plant.set_current(0, 0.25)
+    return SimTeslameter(plant, name, clock)
+
+
+@pytest.mark.parametrize("name", dialect_ids())
+def test_the_row_says_exactly_this(name):
+    replay = Replay(FOLDER / f"{name}.txt")
+    reading = converse(name, replay, SimulatedClock())
+    replay.finish()
+    assert reading == pytest.approx(0.25 if reading > 0.1 else 2.75e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["kepco-bop", "lakeshore-421"])
+def test_what_is_recorded_replays(name, resistor, tmp_path):
+    clock = SimulatedClock()
+    spy = Transcript(tmp_path / "talk.txt", about=name)
+    recorded = converse(name, far_end(name, resistor, clock), clock, spy)
+    spy.close()
+    replay = Replay(tmp_path / "talk.txt")
+    assert converse(name, replay, SimulatedClock()) == recorded
+    replay.finish()
+
+
+def test_another_word_or_silence_is_noticed(tmp_path):
+    path = tmp_path / "talk.txt"
+    path.write_text('0.0 > "*IDN?\\n"\n0.1 < "ME\\r\\n"\n0.2 > "A\\n"\n')
+    replay = Replay(path)
+    assert replay.line(b"*IDN?") == b"ME\r\n"
+    with pytest.raises(AssertionError, match="1 lines"):
+        replay.finish()
+    with pytest.raises(AssertionError, match=r"has b'A'; b'B'"):
+        replay.line(b"B")
+
+
+@pytest.mark.parametrize("text", ["nonsense", '0.1 ? "x"', "0.1 > x", "x > 3"])
+def test_a_broken_transcript_is_named(tmp_path, text):
+    path = tmp_path / "talk.txt"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=r"talk\.txt, line 1"):
+        read_transcript(path)

@@ -1,0 +1,185 @@
+"""Facts about a lab's own current source that no document settled.
+
+Run ``TACTILE_LAB_HARDWARE=coil TACTILE_LAB_PORT=/dev/ttyUSB0 pytest -s
+tests/hardware/test_coil_source.py``, with TACTILE_LAB_DIALECT naming the row (default
+kepco-bop). The coil stays connected and takes at most 0.3 A for a few seconds.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect
+from drivers.serial_link import SerialLink
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import RealClock
+from tactile_lab.errors import InstrumentError
+
+pytestmark = [
+    pytest.mark.hardware,
+    pytest.mark.timeout(0),
+    pytest.mark.skipif(
+        os.environ.get("TACTILE_LAB_HARDWARE") != "coil",
+        reason="needs a current source; set TACTILE_LAB_HARDWARE=coil",
+    ),
+]
+PORT = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
+ROW = os.environ.get("TACTILE_LAB_DIALECT", "kepco-bop")
+LIMITS = CoilLimits(current=0.3, slew=2.0, compliance=5.0)
+
+
+def fact(name: str, value: object) -> None:
+    print(f"\nFACT {name}: {value}")
+
+
+@pytest.fixture
+def coil() -> Iterator[CoilSource]:
+    source = CoilSource(coil_dialect(ROW), PORT, LIMITS, RealClock())
+    source.open()
+    yield source
+    source.close()
+    assert source.warnings == []
+
+
+@pytest.fixture
+def link() -> Iterator[SerialLink]:
+    row = coil_dialect(ROW)
+    one = SerialLink(PORT, row.serial, RealClock(), what="coil source")
+    one.open()
+    yield one
+    one.close()
+
+
+def drive(coil: CoilSource, current: float, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        coil.set_current(current)
+        time.sleep(coil.update_interval)
+
+
+def wait(coil: CoilSource, seconds: float) -> None:
+    """Let time pass without being taken for hung by the guard."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        coil.beat()
+        time.sleep(0.1)
+
+
+def test_name_and_settings(coil: CoilSource) -> None:
+    fact("identity", coil.identity)
+    fact("settings", coil.settings())
+
+
+def test_latency(link: SerialLink) -> None:
+    row = coil_dialect(ROW)
+    times = []
+    for _ in range(50):
+        begun = time.monotonic()
+        answer = link.query(row.set_query)
+        times.append(time.monotonic() - begun)
+    characters = len(row.set_query) + len(answer) + 3
+    wire = characters * row.serial.character_time
+    fact("round trip, ms", f"{1e3 * statistics.median(times):.1f}")
+    fact("of it latency, ms", f"{1e3 * (statistics.median(times) - wire):.1f}")
+    fact("raw answer to the set-point query", repr(answer))
+
+
+def test_update_interval(coil: CoilSource) -> None:
+    fact("update interval, ms", f"{1e3 * coil.update_interval:.1f}")
+    fact("planned, ms", f"{1e3 * coil.dialect.promised_interval():.1f}")
+
+
+def test_zero_then_on_then_a_small_current(coil: CoilSource) -> None:
+    coil.energise()
+    fact("current at 0 A, output on", coil.read_current().value)
+    for current in (0.25, -0.25):
+        drive(coil, current, 1.0)
+        time.sleep(0.3)
+        measured, volts = coil.read_current().value, coil.read_voltage().value
+        fact(f"at {current} A: measured A, V, Ohm", (measured, volts, volts / measured))
+        assert measured == pytest.approx(current, rel=0.02, abs=0.005)
+    report = coil.safe_off()
+    fact("safe off", report)
+    assert report.verified
+
+
+def test_off_answers(coil: CoilSource) -> None:
+    """What the model measures with its output off."""
+    coil.energise()
+    drive(coil, 0.1, 0.5)
+    begun = time.monotonic()
+    assert coil.safe_off().verified
+    fact(
+        "time to verified off from 0.1 A, ms", f"{1e3 * (time.monotonic() - begun):.0f}"
+    )
+    fact("current read with the output off", coil.read_current())
+
+
+def test_error_answers(link: SerialLink) -> None:
+    row = coil_dialect(ROW)
+    if row.error is None:
+        pytest.skip("the row has no error query")
+    link.write("NONSENSE 1")
+    fact("answer after an unknown command", link.query(row.error))
+    link.write(row.set.format(i=99.0))
+    fact("answer after 99 A", link.query(row.error))
+    fact("and after that", link.query(row.error))
+
+
+def test_compound_lines(link: SerialLink) -> None:
+    """Whether a set-point and the error query go in one line, as the row has it."""
+    row = coil_dialect(ROW)
+    lines = row.verified(row.set_line(0.0))
+    fact("sent", lines)
+    for line in lines[:-1]:
+        link.write(line)
+    fact("answered", link.query(lines[-1]))
+
+
+@pytest.mark.parametrize("baud", [9600, 19200, 38400])
+def test_baud_rates(baud: int) -> None:
+    """Set the source to each rate at its panel; others do not answer."""
+    wire = coil_dialect(ROW).serial.model_copy(update={"baud": baud})
+    one = SerialLink(PORT, wire, RealClock(), what="coil source")
+    try:
+        one.open()
+        fact(f"{baud} baud", one.identity)
+    except InstrumentError as reason:
+        fact(f"{baud} baud", reason)
+    finally:
+        one.close()
+
+
+@pytest.mark.skipif(
+    os.environ.get("TACTILE_LAB_OPERATOR") != "1",
+    reason="someone must pull the cable; set TACTILE_LAB_OPERATOR=1",
+)
+def test_pulled_cable(coil: CoilSource) -> None:
+    coil.energise()
+    print("\nPull the serial cable now.")
+    with pytest.raises(InstrumentError) as seen:
+        drive(coil, 0.1, 30.0)
+    fact("pulled cable", f"{seen.value} (cause {seen.value.__cause__!r})")
+    print("\nPlug it in again within 10 s.")
+    wait(coil, 10.0)
+    assert coil.safe_off().verified
+
+
+@pytest.mark.skipif(coil_dialect(ROW).list is None, reason="the row has no list mode")
+def test_list(coil: CoilSource) -> None:
+    coil.energise()
+    currents = [0.002 * min(k, 100 - k) for k in range(101)]
+    begun = time.monotonic()
+    length = coil.play_list(currents, 0.01)
+    fact("upload of 101 points, s", f"{time.monotonic() - begun:.2f}")
+    wait(coil, length / 2)
+    fact("current half-way, A", coil.read_current().value)
+    wait(coil, length)
+    coil.end_list()
+    assert coil.safe_off().verified
