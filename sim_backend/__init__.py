@@ -1,0 +1,1 @@
+"""The far ends of the wires: the same drivers talk to computed physics."""

@@ -1,0 +1,167 @@
+"""The simulated bench: real drivers, one plant at the far ends of the wires."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect, meter_dialect
+from drivers.picoscope import PicoScope
+from drivers.teslameter import Teslameter
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.faults import SerialFault
+from sim_backend.options import PlantOptions
+from sim_backend.picoscope import Make
+from sim_backend.picoscope_faults import Fault
+from sim_backend.picosdk import FakePs3000a
+from sim_backend.plant import Plant
+from sim_backend.scope_source import Acquisition, Codes
+from sim_backend.serial_wires import plug_in
+from sim_backend.teslameter import SimTeslameter
+from tactile_lab.bench import Bench, Channel
+from tactile_lab.clock import Clock, RealClock, SimulatedClock
+from tactile_lab.errors import SceneError
+from tactile_lab.plan.needs import needs
+from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.tables import Simulated
+
+SIMULATED_POLL = 0.05
+"""Time between polls where nobody watches, s: fewer, larger blocks cost less."""
+
+
+class WiredPlant:
+    """The plant at the scope's inputs, as the bench file wires them.
+
+    Args:
+        plant: the physical world.
+        wiring: what is connected to which input.
+    """
+
+    def __init__(self, plant: Plant, wiring: tuple[Channel, ...]) -> None:
+        self._plant = plant
+        self._wiring = {channel.input: channel for channel in wiring}
+
+    def render(
+        self, acquisition: Acquisition, first: int, samples: int
+    ) -> tuple[Codes, tuple[bool, ...]]:
+        """Codes and over-range flags, as the scope is set and the plant is wired."""
+        channels = [
+            Channel(
+                signal=self._wiring[one.name].signal
+                if one.name in self._wiring
+                else "none",
+                input=one.name,
+                range=one.range,
+                offset=one.offset,
+                coupling=one.coupling,
+                scale=self._wiring[one.name].scale if one.name in self._wiring else 1.0,
+            )
+            for one in acquisition.inputs
+        ]
+        return self._plant.render(
+            first,
+            samples,
+            acquisition.interval,
+            acquisition.started,
+            channels,
+            acquisition.full_scale,
+            acquisition.shift,
+        )
+
+
+def plant_of(scene: Scene) -> Plant:
+    """The physical world of a scene's simulated bench."""
+    return Plant(
+        scene.circuit,
+        scene.bench.magnet,
+        options(scene.simulated),
+        scene.simulated.seed,
+    )
+
+
+def options(simulated: Simulated) -> PlantOptions:
+    """Parts of the world as the scene's ``[simulated]`` table switches them."""
+    return PlantOptions(
+        follower=simulated.follower,
+        offset=simulated.follower_offset,
+        bias=simulated.input_bias,
+        noise=simulated.noise,
+        hum=simulated.hum,
+        hysteresis=simulated.hysteresis,
+        attraction=simulated.attraction,
+        coil_lag=simulated.coil_lag,
+        eddy_lag=simulated.eddy_lag,
+        drift=simulated.clock_error,
+    )
+
+
+def open_bench(
+    scene: Scene,
+    *,
+    realtime: bool = False,
+    scope_faults: Sequence[Fault] = (),
+    coil_faults: Sequence[SerialFault] = (),
+    meter_faults: Sequence[SerialFault] = (),
+) -> Bench:
+    """Drivers and far ends of the instruments `scene` needs; nothing is opened.
+
+    Args:
+        scene: physics, wiring, dialects and what is needed of them.
+        realtime: live in this computer's time instead of a computed one.
+        scope_faults: what goes wrong with the scope, and when.
+        coil_faults: the same for the current source.
+        meter_faults: the same for the teslameter.
+
+    Raises:
+        SceneError: the bench file lacks an instrument the scene needs.
+    """
+    clock: Clock = RealClock() if realtime else SimulatedClock()
+    plant, spec, needed = plant_of(scene), scene.bench, needs(scene)
+    coil = scope = meter = None
+    if needed.coil:
+        if spec.coil is None:
+            raise SceneError("The scene drives the coil, but the bench has no [coil].")
+        row = coil_dialect(spec.coil.dialect)
+        wire = row.serial.model_copy(update={"baud": spec.coil.baud or row.serial.baud})
+        source = SimCoilSource(plant, row.id, clock)
+        far_end = plug_in(source, wire, clock, "coil", coil_faults)
+        coil = CoilSource(
+            row, far_end.url, spec.coil.limits, clock, baud=spec.coil.baud
+        )
+    if needed.channels:
+        if spec.scope is None:
+            raise SceneError(
+                "The scene needs scope channels; the bench has no [scope]."
+            )
+        library = FakePs3000a(
+            WiredPlant(plant, spec.scope.channels),
+            clock,
+            Make(clock_error=scene.simulated.clock_error),
+            scope_faults,
+        )
+        # equal clocks let the driver find a single lost sample; unequal ones do not
+        lag = 0.01 if scene.simulated.clock_error else None
+        scope = PicoScope(
+            clock=clock,
+            library=library,
+            lag_tolerance=lag,
+            poll_interval=0.02 if realtime else SIMULATED_POLL,
+        )
+    if needed.field_meter:
+        if spec.field_meter is None:
+            raise SceneError(
+                "The scene reads the field; the bench has no [field_meter]."
+            )
+        meter_row = meter_dialect(spec.field_meter.dialect)
+        probe = SimTeslameter(plant, meter_row.id, clock)
+        far_end = plug_in(probe, meter_row.serial, clock, "field-meter", meter_faults)
+        meter = Teslameter(meter_row, far_end.url, clock)
+    return Bench(
+        name=spec.name,
+        simulated=True,
+        clock=clock,
+        coil=coil,
+        scope=scope,
+        field_meter=meter,
+        accuracy=plant.accuracy,
+    )

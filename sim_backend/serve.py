@@ -1,0 +1,164 @@
+"""The simulated serial instruments for other programs: one coil behind both."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TextIO
+
+from drivers.dialect import coil_dialect, meter_dialect
+from drivers.dialect_row import Wire
+from sim_backend.coil_panel import Deed
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.driven_coil import DrivenCoil
+from sim_backend.options import PlantOptions
+from sim_backend.serial_servers import PtyServer, SerialServer, TcpServer
+from sim_backend.serial_wires import FarEnd, LineInstrument
+from sim_backend.teslameter import SimTeslameter
+from tactile_lab.clock import Clock, RealClock
+from tactile_lab.errors import InstrumentError, SceneError
+from tactile_lab.magnetics import Magnet
+
+BACKLOG = 1000
+"""Set-points the electromagnet remembers before it forgets the older half."""
+
+
+class CoilOnly(DrivenCoil):
+    """Coil and field without sensor or scope; safe for all threads.
+
+    Args:
+        magnet: field per current.
+        options: lags, heat and core of the electromagnet.
+    """
+
+    def __init__(self, magnet: Magnet, options: PlantOptions | None = None) -> None:
+        super().__init__((options or PlantOptions()).electromagnet())
+        self._magnet = magnet
+
+    def field(self, time: float) -> float:
+        """Flux density of the electromagnet, T."""
+        with self._lock:
+            return float(self._magnet.field(self._electromagnet.effective(time)))
+
+    def _command(self, time: float) -> None:
+        self._electromagnet.command(time, self._driven)
+        if self._electromagnet.commands > BACKLOG:
+            self._electromagnet.forget(BACKLOG // 2)
+
+
+class ServedBench:
+    """Simulated instruments at addresses other programs can open.
+
+    Args:
+        coil: `pty`, `tcp:PORT` (0 for any free port) or None for no source.
+        teslameter: the same for the teslameter.
+        coil_row, meter_row: ids of the dialect rows they speak.
+        baud: of the source instead of its row's.
+        paced: let bytes take the time the baud rate gives them, and the instruments
+            the time they take to act.
+        log: JSON line per thing the source was told, with the time since boot.
+        magnet: field per current; the built-in bench's unless given.
+        seed: of the teslameter's noise.
+
+    Raises:
+        SceneError: an address or row that cannot be served.
+        InstrumentError: the TCP port is taken.
+    """
+
+    def __init__(
+        self,
+        *,
+        coil: str | None = "pty",
+        teslameter: str | None = None,
+        coil_row: str = "kepco-bop",
+        meter_row: str = "lakeshore-425",
+        baud: int | None = None,
+        paced: bool = False,
+        log: Path | None = None,
+        magnet: Magnet | None = None,
+        seed: int = 1,
+    ) -> None:
+        clock: Clock = RealClock()
+        self._log: TextIO | None = None
+        self._servers: dict[str, SerialServer] = {}
+        plant = CoilOnly(magnet or Magnet(r=6e-3))
+        try:
+            if coil is not None:
+                wire = coil_dialect(coil_row).serial
+                source = SimCoilSource(plant, coil_row, clock)
+                if log is not None:
+                    self._log = log.open("a", encoding="utf-8")
+                    source.on_deed = _writer(self._log)
+                wire = wire.model_copy(update={"baud": baud or wire.baud})
+                self._add("coil", coil, source, wire, clock, paced)
+            if teslameter is not None:
+                wire = meter_dialect(meter_row).serial
+                meter = SimTeslameter(plant, meter_row, clock, noise=2e-6, seed=seed)
+                self._add("teslameter", teslameter, meter, wire, clock, paced)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def addresses(self) -> dict[str, str]:
+        """Address for pyserial of each instrument."""
+        return {name: server.url for name, server in self._servers.items()}
+
+    def start(self) -> None:
+        """Serve from now on."""
+        for server in self._servers.values():
+            server.start()
+
+    def close(self) -> None:
+        """End all servers; idempotent."""
+        for server in self._servers.values():
+            server.close()
+        if self._log is not None:
+            self._log.close()
+            self._log = None
+
+    def _add(
+        self,
+        name: str,
+        where: str,
+        instrument: LineInstrument,
+        wire: Wire,
+        clock: Clock,
+        paced: bool,
+    ) -> None:
+        if not paced:
+            wire = wire.model_copy(update={"latency": 0.0})
+        far_end = FarEnd(instrument, wire, clock, name)
+        self._servers[name] = _server(where, far_end, paced)
+
+
+def _server(where: str, far_end: FarEnd, paced: bool) -> SerialServer:
+    if where == "pty":
+        return PtyServer(far_end, paced=paced)
+    kind, _, port = where.partition(":")
+    if kind != "tcp" or not port.isdecimal() or int(port) > 65535:
+        raise SceneError(
+            f'"{where}" is no address to serve at; write pty, or tcp:PORT with a port '
+            "from 0 (any free one) to 65535."
+        )
+    try:
+        return TcpServer(far_end, int(port), paced=paced)
+    except OSError as reason:
+        raise InstrumentError(
+            f"TCP port {port} cannot be served ({reason}); choose another, or 0."
+        ) from reason
+
+
+def _writer(log: TextIO) -> Callable[[Deed], None]:
+    def write(deed: Deed) -> None:
+        entry = {
+            "monotonic_s": time.monotonic(),
+            "what": deed.what,
+            "value": deed.value,
+        }
+        log.write(json.dumps(entry) + "\n")
+        log.flush()
+
+    return write

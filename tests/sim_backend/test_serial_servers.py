@@ -1,0 +1,176 @@
+"""The unchanged driver over a pseudo-terminal and TCP, on the real clock."""
+
+import itertools
+import time
+
+import pytest
+import serial
+
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect, meter_dialect
+from drivers.teslameter import Teslameter
+from sim_backend.coil_source import SimCoilSource
+from sim_backend.faults import SerialFault
+from sim_backend.serial_servers import PtyServer, TcpServer
+from sim_backend.serial_wires import FarEnd
+from sim_backend.teslameter import SimTeslameter
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import RealClock
+from tactile_lab.errors import InstrumentError, LinkLostError, NotFoundError
+
+KEPCO = coil_dialect("kepco-bop")
+FAST = KEPCO.serial.model_copy(update={"latency": 0.0, "timeout": 0.1})
+ROW = KEPCO.model_copy(update={"serial": FAST})
+
+
+class Wireless:
+    """A coil of 5 Ohm in which current flows at once."""
+
+    def __init__(self):
+        self.amperes, self.on = 0.0, False
+
+    def set_current(self, time, amperes):
+        self.amperes = amperes
+
+    def output(self, time, on):
+        self.on = on
+
+    def coil_current(self, time):
+        return self.amperes * self.on
+
+    def coil_voltage(self, time):
+        return 5 * self.coil_current(time)
+
+    def field(self, time):
+        return 11e-3 * self.coil_current(time)
+
+
+@pytest.fixture(params=["pty", "tcp"])
+def served(request):
+    clock = RealClock()
+    source = SimCoilSource(Wireless(), "kepco-bop", clock)
+    end = FarEnd(source, FAST, clock, "coil")
+    server = PtyServer(end) if request.param == "pty" else TcpServer(end)
+    server.start()
+    coil = CoilSource(ROW, server.url, CoilLimits(), clock, guarded=False)
+    yield clock, source, end, server, coil
+    coil.close()
+    server.close()
+
+
+def drive(clock, coil, current, updates=10):
+    for _ in range(updates):
+        clock.sleep_until(clock.now() + 0.02)
+        coil.set_current(current)
+
+
+def test_plays_and_ends_safely(served):
+    clock, source, _end, _server, coil = served
+    coil.open()
+    coil.energise()
+    drive(clock, coil, 0.1, 60)
+    assert coil.setpoint == pytest.approx(0.1)
+    assert coil.read_current().value == pytest.approx(0.1)
+    assert coil.safe_off().verified
+    assert not source.output_on
+    sets = [deed for deed in source.deeds if deed.what == "set"]
+    for before, after in itertools.pairwise(sets):
+        passed = after.time - before.time + 0.01
+        assert abs(after.value - before.value) <= coil.limits.slew * passed
+
+
+@pytest.mark.parametrize("kind", ["missing", "partial", "garbled", "noise", "late"])
+def test_one_bad_exchange_does_not_end_the_run(served, kind):
+    clock, source, end, _server, coil = served
+    coil.open()
+    coil.energise()
+    end.faults.add(SerialFault(kind=kind, line="CURR", amount=0.15))
+    drive(clock, coil, 0.05)
+    assert end.faults.struck == 1
+    assert source.setpoint == pytest.approx(coil.setpoint, abs=1e-5)
+    assert coil.safe_off().verified
+
+
+@pytest.mark.parametrize("form", ["closed", "reset"])
+def test_unplugged_while_playing(served, form):
+    clock, source, end, server, coil = served
+    coil.open()
+    coil.energise()
+    end.faults.add(SerialFault(kind="unplug", line="CURR", form=form))
+    with pytest.raises(LinkLostError, match="unknown until"):
+        drive(clock, coil, 0.05)
+    report = coil.safe_off()
+    if isinstance(server, PtyServer):  # the adapter is gone, its name too
+        assert not report.verified
+        coil.close()
+        with pytest.raises(NotFoundError):
+            coil.open()
+    else:  # a network source takes the next connection
+        assert report.verified
+        assert not source.output_on
+
+
+def test_a_stuck_peer_does_not_hang_us(served):
+    clock, _source, end, server, coil = served
+    coil.open()
+    coil.energise()
+    end.faults.add(SerialFault(kind="stuck", line="CURR", amount=60.0))
+    begun = time.monotonic()
+    with pytest.raises(InstrumentError):
+        drive(clock, coil, 0.05)
+    assert not coil.safe_off().verified
+    assert time.monotonic() - begun < 10
+    server.close()
+
+
+def test_a_second_program_is_kept_out(served):
+    clock, _source, _end, server, coil = served
+    coil.open()
+    second = CoilSource(ROW, server.url, CoilLimits(), clock, guarded=False)
+    why = "Another program" if isinstance(server, PtyServer) else "answered nothing"
+    with pytest.raises(InstrumentError, match=why):
+        second.open()
+
+
+def test_seven_bits_on_a_pty_open_again_and_again():
+    clock = RealClock()
+    row = meter_dialect("lakeshore-425")
+    wire = row.serial.model_copy(update={"latency": 0.0})
+    end = FarEnd(SimTeslameter(Wireless(), row.id, clock), wire, clock, "meter")
+    server = PtyServer(end)
+    server.start()
+    for _ in range(3):
+        meter = Teslameter(row, server.url, clock)
+        meter.open()
+        assert meter.read().value == 0.0
+        meter.close()
+    server.close()
+
+
+def test_seven_odd_one_reaches_pyserial(monkeypatch):
+    asked = {}
+
+    def seen(url, **settings):
+        asked.update(settings)
+        raise serial.SerialException(2, "no such port")
+
+    monkeypatch.setattr(serial, "serial_for_url", seen)
+    meter = Teslameter(meter_dialect("lakeshore-425"), "/dev/ttyUSB9", RealClock())
+    with pytest.raises(NotFoundError):
+        meter.open()
+    assert (asked["bytesize"], asked["parity"], asked["stopbits"]) == (7, "O", 1)
+    assert asked["write_timeout"] and asked["exclusive"]
+
+
+def test_pacing_takes_the_time_of_the_wire():
+    clock = RealClock()
+    wire = KEPCO.serial.model_copy(update={"latency": 0.0, "baud": 9600})
+    end = FarEnd(SimCoilSource(Wireless(), "kepco-bop", clock), wire, clock, "coil")
+    server = PtyServer(end, paced=True)
+    server.start()
+    with serial.serial_for_url(server.url, timeout=1) as port:
+        begun = time.monotonic()
+        port.write(b"CURR 0.10000;:SYST:ERR?\n")
+        assert port.read_until(b"\n") == b'0,"No error"\r\n'
+        assert time.monotonic() - begun >= (24 + 14) * 10 / 9600
+    server.close()
