@@ -1,0 +1,1 @@
+"""One run in progress: the deciding loop, its threads, spikes on line."""

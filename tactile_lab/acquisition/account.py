@@ -1,0 +1,138 @@
+"""The account of a run: what happened goes to the record and to whoever watches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.alignment import CLUSTER, Edge, align, find_edges
+from tactile_lab.acquisition.coil_thread import Applied
+from tactile_lab.acquisition.instruments import Instruments
+from tactile_lab.acquisition.journal import Journal
+from tactile_lab.acquisition.live import Bins
+from tactile_lab.bench import Stream
+from tactile_lab.clock import Clock
+from tactile_lab.trial import Outcome
+
+
+class Account:
+    """Writes events, set-points, readings and outcomes down, on the run's time axis.
+
+    The record begins with the first stream, which fixes the axis's zero; what is said
+    before waits for it.
+
+    Args:
+        clock: the bench's time.
+        open_journal: starts the record, told how samples are scaled (None: no scope).
+        emit: told of everything.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        open_journal: Callable[[Stream | None], Journal],
+        emit: events.Emit,
+    ) -> None:
+        self.emit = emit
+        self.journal: Journal | None = None
+        self._clock = clock
+        self._open_journal = open_journal
+        self._origin: float | None = None
+        self._waiting: list[tuple[str, str]] = []
+        self.edges: list[Edge] = []
+        self._current: list[Applied] = []
+
+    @property
+    def now(self) -> float:
+        """Run time, s; 0 before the record begins."""
+        return self.axis(self._clock.now())
+
+    def axis(self, clock_time: float) -> float:
+        """Run time at `clock_time`, s."""
+        return 0.0 if self._origin is None else clock_time - self._origin
+
+    def begin(self, stream: Stream | None) -> Journal:
+        """Start the record at the stream's first sample, or now without a scope."""
+        self._origin = self._clock.now() if stream is None else stream.started
+        self.journal = self._open_journal(stream)
+        for kind, text in self._waiting:
+            self.journal.event(0.0, kind, text)
+        return self.journal
+
+    def state(self, state: events.RunState, text: str) -> None:
+        """The run entered a state."""
+        self.note(str(state), text)
+        self.emit(events.StateChanged(state, text))
+
+    def note(self, kind: str, text: str) -> None:
+        """Something happened."""
+        if self.journal is None:
+            self._waiting.append((kind, text))
+        else:
+            self.journal.event(self.now, kind, text)
+
+    def outcome(self, outcome: Outcome) -> None:
+        """A trial ended."""
+        if self.journal is not None:
+            self.journal.outcome(outcome)
+        self.emit(events.TrialEnded(outcome))
+
+    def pause(self, start: float, end: float) -> None:
+        """Nothing was streamed from `start` to `end` s of run time, as planned."""
+        if self.journal is not None:
+            self.journal.pause(start, end)
+
+    def spikes(self, times: tuple[float, ...]) -> None:
+        """Spikes were found at these run times, s."""
+        if times:
+            self.emit(events.SpikesSeen(times))
+
+    def readings(self, instruments: Instruments) -> None:
+        """Take what coil and meter have told since last time."""
+        if self.journal is None:
+            return
+        coil, meter = instruments.coil, instruments.meter
+        if coil is not None:
+            for text in coil.take_warnings():
+                self.note("warning", text)
+                self.emit(events.Message("warning", text))
+            for applied in coil.take_applied():
+                self._current.append(applied)
+                row = (self.axis(applied.time), applied.setpoint, applied.measured)
+                self.journal.current(*row)
+                self.emit(events.CoilCurrent(*row))
+        if meter is not None:
+            for reading in meter.take_readings():
+                time = self.axis(reading.time)
+                self.journal.field(time, reading.value)
+                self.emit(events.FieldRead(time, reading.value))
+
+    def note_edges(self, shunt: Bins) -> None:
+        """Find the newest set-points' edges in the binned coil current."""
+        if self._origin is not None:
+            found = find_edges(self._current, self._origin, shunt)
+            # the first and the newest fix the clocks; those between add nothing
+            del self.edges[CLUSTER:-CLUSTER]
+            self.edges.extend(found)
+
+    def align(self, start: float, stop: float, uncertainty: float) -> None:
+        """Correct the segment from `start` to `stop` s of run time by its edges."""
+        if self.journal is not None:
+            told = align(self.edges, start, stop, uncertainty)
+            self.journal.align(
+                offset=told.offset, drift=told.drift, uncertainty=told.uncertainty
+            )
+        self.edges = []
+
+    def applied_since(self, begin: float) -> NDArray[np.float64]:
+        """Current applied since clock time `begin`: shape (n, 2), s after it and A."""
+        rows = [
+            (a.time - begin, a.setpoint if a.measured is None else a.measured)
+            for a in self._current
+            if a.time >= begin
+        ]
+        self._current = []
+        return np.array(rows, dtype=np.float64).reshape(-1, 2)

@@ -1,0 +1,154 @@
+"""Where the scope's sample clock lies against host time, told by the coil's own edges.
+
+A set-point takes effect between the moment it was sent and the moment the source had
+acted on it. The shunt channel shows when it really did, on the sample clock. Each edge
+so bounds the offset of the two clocks, and many edges bound it from all sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.acquisition.coil_thread import Applied
+from tactile_lab.acquisition.live import Bins
+
+SMALLEST = 0.03
+"""Smallest step of the current that counts as an edge, A (two codes of the shunt)."""
+
+COIL_LAG = 2e-3
+"""Longest time the coil's L/R takes to bring the current half the way, s."""
+
+CLOCK_ERROR = 1e-4
+"""Largest relative difference of the scope's sample clock and this computer's."""
+
+STEEPEST = 5e-4
+"""Drift up to which edges of one end are still compared with each other, s/s."""
+
+SEARCH = 0.02
+"""How far beyond its host times an edge is looked for, s."""
+
+CLUSTER = 20
+"""Edges at either end of a segment that fix the clocks there."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One step of the coil current, on both clocks, in run time.
+
+    Attributes:
+        sampled: when the samples show it, s.
+        earliest, latest: between which host times it happened, s.
+    """
+
+    sampled: float
+    earliest: float
+    latest: float
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How to correct a segment's sample times.
+
+    Attributes:
+        offset: to add to the time of the first sample, s.
+        drift: to stretch the sample interval by, s/s.
+        uncertainty: of a time so corrected, s.
+    """
+
+    offset: float
+    drift: float
+    uncertainty: float
+
+
+def find_edges(applied: Sequence[Applied], zero: float, shunt: Bins) -> list[Edge]:
+    """Edges of the set-points in `applied`, as the binned coil current shows them.
+
+    Args:
+        applied: consecutive set-points, clock times in s.
+        zero: clock time of run time 0, s.
+        shunt: coil current, A, on the run's axis.
+    """
+    found = []
+    middle = shunt.time + shunt.width / 2
+    before: float | None = None
+    for one in applied:
+        step = 0.0 if before is None else one.setpoint - before
+        if before is not None and abs(step) >= SMALLEST:
+            earliest, latest = one.asked - zero, one.time - zero + COIL_LAG
+            low, high = np.searchsorted(middle, [earliest - SEARCH, latest + SEARCH])
+            # how far the current has come from the old level to the new one
+            done = (shunt.mean[low:high].astype(np.float64) - before) / step
+            at = _crossing(middle[low:high], done)
+            if at is not None:
+                found.append(Edge(at, earliest, latest))
+        before = one.setpoint
+    return found
+
+
+def align(
+    edges: Sequence[Edge], start: float, stop: float, uncertainty: float
+) -> Alignment:
+    """The alignment of a segment.
+
+    Args:
+        edges: of the segment, ascending; none: host time stands as it is.
+        start: run time of the segment's first sample as the host has it, s.
+        stop: likewise of its last sample, s.
+        uncertainty: of `start`, s.
+    """
+    unaided = Alignment(0.0, 0.0, uncertainty + CLOCK_ERROR * (stop - start))
+    first, last = edges[:CLUSTER], edges[-CLUSTER:]
+    begin, end = _bounds(first, unaided.uncertainty), _bounds(last, np.inf)
+    if begin is None or end is None:
+        return unaided
+    apart = _mean_time(last) - _mean_time(first)
+    if apart > 0 and (end[0] > begin[1] or end[1] < begin[0]):
+        drift = (_middle(end) - _middle(begin)) / apart
+        at_begin = _middle(begin)
+        left = max(end[1] - end[0], begin[1] - begin[0]) / 2
+    else:
+        # equal clocks are the simplest account of edges that allow them
+        both = max(begin[0], end[0]), min(begin[1], end[1])
+        drift, at_begin = 0.0, _middle(both)
+        left = max(abs(bound - at_begin) for bound in (*begin, *end))
+        if left >= unaided.uncertainty:
+            return unaided
+    return Alignment(at_begin - drift * (_mean_time(first) - start), drift, left)
+
+
+def _middle(bounds: tuple[float, float]) -> float:
+    return (bounds[0] + bounds[1]) / 2
+
+
+def _bounds(edges: Sequence[Edge], uncertainty: float) -> tuple[float, float] | None:
+    """Least and largest correction at the edges' mean time that all of them allow.
+
+    None where there are no edges, or where they contradict each other.
+    """
+    if not edges:
+        return None
+    middle = _mean_time(edges)
+    low, high = -uncertainty, uncertainty
+    for edge in edges:
+        parted = STEEPEST * abs(edge.sampled - middle)
+        low = max(low, edge.earliest - edge.sampled - parted)
+        high = min(high, edge.latest - edge.sampled + parted)
+    return (low, high) if low <= high else None
+
+
+def _mean_time(edges: Sequence[Edge]) -> float:
+    return float(np.mean([edge.sampled for edge in edges]))
+
+
+def _crossing(time: NDArray[np.float64], done: NDArray[np.float64]) -> float | None:
+    """When `done` first passes one half, between two bins; None if it never does."""
+    past = np.flatnonzero(done >= 0.5)
+    if past.size == 0 or past[0] == 0:
+        return None
+    i = int(past[0])
+    part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
+    return float(time[i - 1] + part * (time[i] - time[i - 1]))

@@ -1,0 +1,29 @@
+"""Settings of spike detection, as chosen before a run and stored with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detection:
+    """How spikes were detected on one channel, as stored with a run.
+
+    Attributes:
+        signal: name of the channel.
+        threshold: code; for kind "reset" the fall in codes.
+        hysteresis: codes; not used for kind "reset".
+        refractory: samples.
+        polarity: +1 or -1.
+        kind: "crossing" of a threshold, or "reset" of V_C2.
+        span: samples a reset may take.
+    """
+
+    signal: str
+    threshold: int
+    hysteresis: int
+    refractory: int = 0
+    polarity: Literal[1, -1] = 1
+    kind: Literal["crossing", "reset"] = "crossing"
+    span: int = 2

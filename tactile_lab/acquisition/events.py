@@ -1,0 +1,118 @@
+"""What a run tells whoever watches it: small immutable events, through one callable.
+
+The command line prints them, the window queues them into its own thread. Samples are
+not events: a watcher polls them from `tactile_lab.acquisition.live.Live`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from tactile_lab.trial import Outcome, Trial
+
+
+class RunState(StrEnum):
+    """Where a run is."""
+
+    CONNECTING = "connecting"
+    READY = "ready"
+    RUNNING = "running"
+    STOPPING = "stopping"
+    COMPLETE = "complete"
+    ABORTED = "aborted"
+    FAULTED = "faulted"
+
+
+ENDED = frozenset({RunState.COMPLETE, RunState.ABORTED, RunState.FAULTED})
+
+
+@dataclass(frozen=True)
+class StateChanged:
+    """The run entered `state`; `text` says why, for a person."""
+
+    state: RunState
+    text: str
+
+
+@dataclass(frozen=True)
+class FolderMade:
+    """The run's folder exists from now on."""
+
+    folder: Path
+
+
+@dataclass(frozen=True)
+class TrialStarted:
+    """Trial `index` begins at `start` s on the run's time axis."""
+
+    index: int
+    trial: Trial
+    start: float
+
+
+@dataclass(frozen=True)
+class TrialEnded:
+    """A trial's outcome is known."""
+
+    outcome: Outcome
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Run time reached, and run time expected in total (None if unknown), s."""
+
+    elapsed: float
+    expected: float | None
+
+
+@dataclass(frozen=True)
+class CoilCurrent:
+    """Set-point last sent and current read back, A, at a time on the run's axis, s."""
+
+    time: float
+    setpoint: float
+    measured: float | None
+
+
+@dataclass(frozen=True)
+class FieldRead:
+    """Flux density, T, at a time on the run's axis, s."""
+
+    time: float
+    field: float
+
+
+@dataclass(frozen=True)
+class SpikesSeen:
+    """Times of newly detected spikes on the run's axis, s, ascending."""
+
+    times: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Message:
+    """Something a person should know; `level` is info, warning or error."""
+
+    level: str
+    text: str
+
+
+Event = (
+    StateChanged
+    | FolderMade
+    | TrialStarted
+    | TrialEnded
+    | Progress
+    | CoilCurrent
+    | FieldRead
+    | SpikesSeen
+    | Message
+)
+Emit = Callable[[Event], None]
+
+
+def ignore(event: Event) -> None:
+    """Watch nothing."""

@@ -1,0 +1,304 @@
+"""One execution of a scene: bench, run folder, loop, report. The scripting entry point.
+
+from tactile_lab.acquisition.execution import Execution
+from tactile_lab.scene.load import load
+
+done = Execution(load("demo"), Path("runs")).run()
+print(done.folder, done.spikes)
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.detection import Detection
+from tactile_lab.acquisition.environment import environment
+from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.runner import Runner
+from tactile_lab.acquisition.spikes import detector_of
+from tactile_lab.acquisition.stop import StopRequest
+from tactile_lab.acquisition.task import Ending, Task
+from tactile_lab.bench import Bench, OffReport, Stream
+from tactile_lab.errors import RecordingError, TactileLabError
+from tactile_lab.plan.limited import limited
+from tactile_lab.plan.plan import plan
+from tactile_lab.plugins import open_bench
+from tactile_lab.scene.scene import Scene
+from tactile_lab.store.certificate import Certificate, write_certificate
+from tactile_lab.store.folder import RunFolder, Status
+from tactile_lab.store.layout import Layout
+from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.recorder_thread import RecorderThread
+from tactile_lab.trial import Trial
+from tactile_lab.waveform import Waveform
+
+RESET_EDGE = 0.5e-6
+"""Longest a reset of V_C2 takes at the follower's output, s: 4 V at 13 V/us."""
+
+STATUS: dict[events.RunState, Status] = {
+    events.RunState.COMPLETE: "complete",
+    events.RunState.ABORTED: "aborted",
+    events.RunState.FAULTED: "faulted",
+}
+"""What a run's folder calls the states a run can end in."""
+
+
+@dataclass(frozen=True)
+class CoilState:
+    """What is known of the coil now.
+
+    Attributes:
+        live: the output is on.
+        setpoint: last sent, A.
+        measured: last read back, A.
+        off: how it was left; None while the run lasts.
+    """
+
+    live: bool
+    setpoint: float | None
+    measured: float | None
+    off: OffReport | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Executed:
+    """A run that has ended.
+
+    Attributes:
+        folder: where it lies.
+        ending: state, reason, exit code, how the coil was left.
+        spikes: detected on line.
+        loss: samples and spikes lost; None where it cannot be told.
+        duration: of the experiment, s.
+        took: wall time, s.
+    """
+
+    folder: Path
+    ending: Ending
+    spikes: int
+    loss: Mapping[str, int | None]
+    duration: float
+    took: float
+
+
+class Execution:
+    """A scene about to run. Making one validates and plans; it opens nothing.
+
+    Args:
+        scene: what to run.
+        out: folder that run folders are put into; made if missing.
+        bench: instruments made elsewhere; those of the scene's bench unless given.
+        realtime: pace a simulated bench by the wall clock.
+        emit: told of everything that happens, from the deciding thread.
+        notes: kept with the run (operator, sample, ...).
+
+    Raises:
+        SceneError, LimitError: the scene cannot be run on its bench.
+        RecordingError: the folder cannot be written.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        out: Path,
+        *,
+        bench: Bench | None = None,
+        realtime: bool = False,
+        emit: events.Emit = events.ignore,
+        notes: Mapping[str, str] | None = None,
+    ) -> None:
+        self.scene = scene
+        self.plan = plan(scene, preview=False)
+        self.needs = self.plan.needs
+        self.bench = bench or open_bench(scene, realtime=realtime)
+        self.stop = StopRequest(self.bench.clock)
+        self._emit = emit
+        self._notes = dict(notes or {})
+        self._live = Live()
+        self._journal: RecorderThread | None = None
+        self.folder = RunFolder.create(
+            out, scene.name, self._info(), needed=self.plan.estimate.disk
+        )
+        self._runner: Runner | None = None
+        self._certificate: Certificate | None = None
+
+    @property
+    def live(self) -> Live:
+        """The newest samples, decimated."""
+        return self._live
+
+    @property
+    def coil_state(self) -> CoilState:
+        """What is known of the coil now."""
+        thread = self._runner.instruments.coil if self._runner else None
+        if thread is None:
+            return CoilState(False, None, None, None)
+        last = thread.last
+        return CoilState(
+            thread.live,
+            last.setpoint if last else None,
+            thread.measured,
+            thread.off,
+        )
+
+    def run(self) -> Executed:
+        """Run to the end; the coil is safe and the folder closed when this returns.
+
+        Raises:
+            RecordingError: the record could not be completed; what it has is kept.
+        """
+        began = time.monotonic()
+        self._emit(events.FolderMade(self.folder.path))
+        self._write_scene()
+        runner = Runner(
+            self._task(),
+            self.bench,
+            self._begin_record,
+            self.stop,
+            self._live,
+            self._emit,
+        )
+        self._runner = runner
+        ending = runner.run()
+        took = time.monotonic() - began
+        self._close(runner, ending, took)
+        proof = self._certificate
+        return Executed(
+            folder=self.folder.path,
+            ending=ending,
+            spikes=runner.intake.spikes,
+            loss={
+                "samples": proof.samples if proof else None,
+                "spikes": proof.spikes if proof else None,
+            },
+            duration=runner.duration,
+            took=took,
+        )
+
+    def _begin_record(self, stream: Stream | None) -> RecorderThread:
+        """Start the record; codes can be scaled from now on."""
+        magnet = self.scene.bench.magnet
+        layout = Layout(
+            signals=self.needs.stored,
+            detection=self._detection(stream),
+            simulated=self.bench.simulated,
+            attributes={"newtons_per_ampere": magnet.newtons_per_ampere},
+        )
+        self._journal = RecorderThread(
+            Recorder(self.folder, layout),
+            when_full="wait" if self.bench.clock.simulated else "error",
+        )
+        return self._journal
+
+    def _close(self, runner: Runner, ending: Ending, took: float) -> None:
+        """Complete the record and say in it how the run ended."""
+        status = STATUS[ending.state]
+        entries = {
+            "reason": ending.reason,
+            "coil": ending.off.text,
+            "coil_verified_off": ending.off.verified,
+            "duration_s": runner.duration,
+            "took_s": took,
+            "instruments": runner.instruments.settings,
+            "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
+            "overrange": sorted(runner.intake.overrange),
+        }
+        if ending.failure and not isinstance(ending.failure, TactileLabError):
+            told = "".join(traceback.format_exception(ending.failure))
+            self.folder.write_text("traceback.txt", told)
+        if self._journal is None:
+            self.folder.finish(status, **entries)
+        else:
+            self._journal.close(status, runner.intake.produced, **entries)
+            self._certificate = write_certificate(self.folder.path)
+
+    def _task(self) -> Task:
+        scene, needed = self.scene, self.needs
+        rows = [channel.signal for channel in needed.channels]
+        row = rows.index(needed.detect_on) if needed.detect_on else None
+        return Task(
+            trials=scene.protocol.trials,
+            channels=needed.channels,
+            interval=1.0 / scene.record.sample_rate,
+            spike_row=row,
+            detector=lambda stream: detector_of(_found(self._detection(stream))),
+            current_for=self._current_for,
+            expected=self.plan.estimate.duration,
+        )
+
+    def _detection(self, stream: Stream | None) -> Detection | None:
+        """The scene's detection in codes of the stream."""
+        signal = self.needs.detect_on
+        if stream is None or signal is None:
+            return None
+        row = [channel.signal for channel in stream.channels].index(signal)
+        gain, offset = stream.volts_per_code(row)
+        chosen = self.scene.detect
+        refractory = round(chosen.refractory / stream.interval)
+        if signal == "V_K":
+            return Detection(
+                signal=signal,
+                threshold=round((chosen.threshold - offset) / gain),
+                hysteresis=max(1, round(chosen.hysteresis / gain)),
+                refractory=refractory,
+            )
+        swing = self.scene.circuit.fire_voltage - self.scene.circuit.reset_voltage
+        return Detection(
+            signal=signal,
+            threshold=round(swing / 2 / gain),
+            hysteresis=1,
+            refractory=refractory,
+            kind="reset",
+            span=max(2, math.ceil(RESET_EDGE / stream.interval)),
+        )
+
+    def _current_for(
+        self, trial: Trial, update_interval: float, before: float
+    ) -> Waveform:
+        coil = self.scene.bench.coil
+        assert coil is not None
+        wanted = trial.current
+        if wanted is None:
+            magnet = self.scene.bench.magnet
+            wanted = magnet.current_for(trial.force, coil.limits.current)
+        return limited(wanted, coil.limits.slew, update_interval, before)[0]
+
+    def _write_scene(self) -> None:
+        self.folder.write_text("scene.toml", self.scene.to_toml())
+        for path in self.scene.files:
+            try:
+                text = path.read_text(encoding="utf-8")
+            except OSError as error:
+                raise RecordingError(
+                    f"{path} cannot be copied into the run: {error.strerror}."
+                ) from error
+            self.folder.write_text(path.name, text)
+
+    def _info(self) -> dict[str, Any]:
+        scene = self.scene
+        return {
+            "scene": scene.name,
+            "protocol": scene.protocol.name,
+            "title": scene.protocol.title,
+            "bench": scene.bench.name,
+            "simulated": self.bench.simulated,
+            "seed": scene.simulated.seed if self.bench.simulated else None,
+            "sample_rate_Hz": scene.record.sample_rate,
+            "planned_s": self.plan.estimate.duration,
+            "warnings": list(self.plan.warnings),
+            "assumptions": list(self.plan.assumptions),
+            "notes": self._notes,
+            "environment": environment(),
+        }
+
+
+def _found(detection: Detection | None) -> Detection:
+    assert detection is not None, "a detector is asked for only where spikes are"
+    return detection

@@ -1,0 +1,83 @@
+"""The threads of the instruments one run uses, opened together and closed together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tactile_lab.acquisition.coil_thread import CoilThread
+from tactile_lab.acquisition.instrument_thread import InstrumentThread
+from tactile_lab.acquisition.meter_thread import MeterThread
+from tactile_lab.acquisition.scope_thread import ScopeThread
+from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.bench import Bench, OffReport
+
+CLOSING = 10.0
+"""Seconds an instrument thread gets to close before it is given up."""
+
+Serve = Callable[[Callable[[], bool]], None]
+
+
+@dataclass
+class Instruments:
+    """Instrument threads of one run; None where the scene needs no such instrument."""
+
+    coil: CoilThread | None
+    scope: ScopeThread | None
+    meter: MeterThread | None
+
+    @classmethod
+    def of(cls, bench: Bench, stop: StopRequest, lease: Lease) -> Instruments:
+        """Threads for what the bench has; none started, nothing opened."""
+        clock = bench.clock
+        return cls(
+            coil=CoilThread(bench.coil, clock, stop, lease) if bench.coil else None,
+            scope=ScopeThread(bench.scope, clock) if bench.scope else None,
+            meter=MeterThread(bench.field_meter, clock) if bench.field_meter else None,
+        )
+
+    @property
+    def threads(self) -> list[InstrumentThread]:
+        """Those that exist, the coil first: it is the one that must be made safe."""
+        every = (self.coil, self.scope, self.meter)
+        return [thread for thread in every if thread is not None]
+
+    def open(self, serve: Serve) -> None:
+        """Open all side by side; `serve(done)` waits and raises what goes wrong."""
+        for thread in self.threads:
+            thread.start()
+        serve(lambda: all(thread.settled for thread in self.threads))
+        self.raise_failure()
+
+    def raise_failure(self) -> None:
+        """Raise the first failure any thread has met."""
+        for thread in self.threads:
+            thread.raise_failure()
+
+    @property
+    def settings(self) -> dict[str, dict[str, str]]:
+        """Identity and settings read back, by instrument."""
+        return {thread.name: thread.settings for thread in self.threads}
+
+    @property
+    def failed(self) -> bool:
+        """Whether any thread has met a failure."""
+        return any(thread.failure is not None for thread in self.threads)
+
+    def close(self) -> OffReport:
+        """Close all and report how the coil was left."""
+        for thread in self.threads:
+            thread.leave()
+        for thread in self.threads:
+            until = thread.clock.now() + CLOSING
+            thread.clock.wait_for(lambda t=thread: t.ended, until)  # type: ignore[misc]
+        if self.coil is None:
+            return OffReport(True, None, "This scene uses no coil.")
+        if self.coil.off is None:
+            return OffReport(
+                False,
+                None,
+                f"The coil's thread did not end within {CLOSING:g} s: coil state "
+                "unknown. Switch the source off at its front panel.",
+            )
+        return self.coil.off

@@ -1,0 +1,131 @@
+"""Where blocks go: detection on line, the live picture, the recorder. In that order."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.acquisition.live import Live
+from tactile_lab.bench import Block, Stream
+from tactile_lab.errors import SamplesLostError
+
+
+class OnlineDetector(Protocol):
+    """Finds spikes in one channel's consecutive codes; see `acquisition.spikes`."""
+
+    def feed(self, first: int, codes: NDArray[np.int16]) -> NDArray[np.void]:
+        """Spikes completed by these codes: fields sample, amplitude, width."""
+        ...
+
+    def flush(self) -> NDArray[np.void]:
+        """Spikes that were still open; the stream has ended."""
+        ...
+
+
+class Sink(Protocol):
+    """What the recorder offers to the deciding loop."""
+
+    def segment(self, stream: Stream, start: float) -> None:
+        """A stream starts; its first sample is at `start` s on the run's axis."""
+        ...
+
+    def append(self, block: Block) -> None:
+        """Store a block; waits or raises RecordingError when the queue is full."""
+        ...
+
+    def spikes(self, times: NDArray[np.float64], found: NDArray[np.void]) -> None:
+        """Store detected spikes with their times on the run's axis."""
+        ...
+
+
+class Intake:
+    """Takes each block once, in order, and accounts for it.
+
+    Attributes:
+        spikes: number of spikes so far.
+        produced: samples per channel the scope delivered.
+    """
+
+    def __init__(self, live: Live, row: int | None) -> None:
+        self._live = live
+        self._row = row
+        self._sink: Sink | None = None
+        self._detector: OnlineDetector | None = None
+        self._stream: Stream | None = None
+        self._start = 0.0
+        self._expected = 0
+        self.spikes = 0
+        self._spike_times: list[float] = []
+        self.produced = 0
+        self.overrange: set[str] = set()
+
+    @property
+    def reached(self) -> float:
+        """Run time just past the newest sample, s."""
+        interval = self._stream.interval if self._stream else 0.0
+        return self._start + self._expected * interval
+
+    def begin(
+        self,
+        stream: Stream,
+        start: float,
+        detector: OnlineDetector | None,
+        sink: Sink,
+    ) -> None:
+        """A stream starts; its first sample is at `start` s on the run's axis."""
+        self._stream, self._start, self._expected = stream, start, 0
+        self._detector, self._sink = detector, sink
+        self._live.begin(stream, start)
+        sink.segment(stream, start)
+
+    def add(self, block: Block) -> tuple[float, ...]:
+        """Take a block; times of the spikes it completed, s on the run's axis.
+
+        Raises:
+            SamplesLostError: samples between this block and the last are missing.
+        """
+        if self._stream is None or self._sink is None:
+            raise SamplesLostError("A block arrived although no stream runs.")
+        if block.first != self._expected:
+            raise SamplesLostError(
+                f"{block.first - self._expected} samples are missing before sample "
+                f"{block.first}: the scope or its driver lost them. Lower the rate."
+            )
+        self._expected += block.samples
+        self.produced += block.samples
+        for channel, over in zip(self._stream.channels, block.overrange, strict=True):
+            if over:
+                self.overrange.add(channel.signal)
+        self._sink.append(block)
+        self._live.add(block)
+        if self._detector is None or self._row is None:
+            return ()
+        return self._keep(self._detector.feed(block.first, block.codes[self._row]))
+
+    def spikes_between(self, start: float, end: float) -> NDArray[np.float64]:
+        """Times of remembered spikes in [start, end) s on the run's axis."""
+        times = self._spike_times
+        return np.array(times[bisect_left(times, start) : bisect_left(times, end)])
+
+    def forget_spikes_before(self, time: float) -> None:
+        """Let go of spikes that no trial to come can ask for."""
+        del self._spike_times[: bisect_left(self._spike_times, time)]
+
+    def end(self) -> tuple[float, ...]:
+        """The stream has ended; times of spikes that were still open."""
+        found = () if self._detector is None else self._keep(self._detector.flush())
+        self._stream, self._detector = None, None
+        return found
+
+    def _keep(self, found: NDArray[np.void]) -> tuple[float, ...]:
+        if found.size == 0 or self._stream is None or self._sink is None:
+            return ()
+        times = self._start + found["sample"] * self._stream.interval
+        self._sink.spikes(times, found)
+        new = tuple(float(t) for t in times)
+        self._spike_times.extend(new)
+        self.spikes += len(new)
+        return new

@@ -1,0 +1,160 @@
+"""The newest samples, decimated, for whoever watches: latest values win.
+
+One writer (the deciding loop), any number of readers. Each bin keeps minimum, maximum
+and mean, so no spike is invisible and averaging stays honest. Readers copy; a reader
+that is too slow loses old bins from the picture, never from the record.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.bench import Block, Channel, Stream
+
+BIN = 1e-3
+"""Length of one bin, s (at least one sample)."""
+
+CAPACITY = 1 << 17
+"""Bins kept per channel: 131 s at 1 ms."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """Consecutive bins of one channel in the signal's SI unit.
+
+    Attributes:
+        time: shape (n,), start of each bin on the run's time axis, s.
+        width: of one bin, s.
+        low, high, mean: shape (n,), of the samples in each bin.
+    """
+
+    time: NDArray[np.float64]
+    width: float
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    mean: NDArray[np.float32]
+
+
+class Live:
+    """A ring of bins per channel."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._channels: tuple[Channel, ...] = ()
+        self._written = 0
+        self._per_bin = 1
+        self._interval = 0.0
+        self._scale: list[tuple[float, float]] = []
+        self._rest: NDArray[np.int16] = np.empty((0, 0), np.int16)
+        self._ring: NDArray[np.float32] = np.empty((3, 0, 0), np.float32)
+        self._time: NDArray[np.float64] = np.empty(0)
+        self._next_time = 0.0
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the measured signals, in channel order."""
+        return tuple(channel.signal for channel in self._channels)
+
+    @property
+    def written(self) -> int:
+        """Bins written so far; grows by one per bin and never falls."""
+        return self._written
+
+    def begin(self, stream: Stream, start: float) -> None:
+        """Start a segment whose first sample is at `start` s on the run's axis."""
+        with self._lock:
+            if stream.channels != self._channels:
+                self._channels = stream.channels
+                count = len(stream.channels)
+                self._written = 0
+                self._ring = np.zeros((3, count, CAPACITY), np.float32)
+                self._time = np.zeros(CAPACITY)
+            self._interval = stream.interval
+            self._per_bin = max(1, round(BIN / stream.interval))
+            self._scale = [
+                stream.volts_per_code(row) for row in range(len(stream.channels))
+            ]
+            self._rest = np.empty((len(stream.channels), 0), np.int16)
+            self._next_time = start
+
+    def add(self, block: Block) -> None:
+        """Decimate a block that follows the one before without a gap."""
+        codes = block.codes
+        if self._rest.shape[1]:
+            codes = np.concatenate([self._rest, codes], axis=1)
+        bins = codes.shape[1] // self._per_bin
+        whole = bins * self._per_bin
+        self._rest = codes[:, whole:].copy()
+        if bins == 0:
+            return
+        cells = codes[:, :whole].reshape(codes.shape[0], bins, self._per_bin)
+        low, high = cells.min(axis=2), cells.max(axis=2)
+        # twice as fast as a mean; int32 holds the sum of 65535 codes
+        kind = np.int32 if self._per_bin < 1 << 16 else np.int64
+        mean = cells.sum(axis=2, dtype=kind) / np.float32(self._per_bin)
+        width = self._per_bin * self._interval
+        with self._lock:
+            at = (self._written + np.arange(bins)) % CAPACITY
+            self._time[at] = self._next_time + width * np.arange(bins)
+            for row, (gain, offset) in enumerate(self._scale):
+                for part, values in enumerate((low, high, mean)):
+                    self._ring[part, row, at] = values[row] * gain + offset
+            self._written += bins
+            self._next_time += bins * width
+
+    def since(self, written: int, signal: str) -> Bins:
+        """Bins of `signal` from number `written` on, as far as they are still kept.
+
+        Raises:
+            KeyError: the signal is not measured.
+        """
+        if signal not in self.signals:
+            raise KeyError(signal)
+        row = self.signals.index(signal)
+        with self._lock:
+            first = max(written, self._written - CAPACITY, 0)
+            at = np.arange(first, self._written) % CAPACITY
+            low, high, mean = self._ring[:, row, at]
+            width = self._per_bin * self._interval
+            return Bins(self._time[at], width, low, high, mean)
+
+    def levels(self, start: float, end: float) -> dict[str, float]:
+        """Mean of each measured signal over [start, end) s, where there is any."""
+        found = {}
+        for signal in self.signals:
+            mean = self.between(start, end, signal).mean
+            if mean.size:
+                found[signal] = float(mean.mean())
+        return found
+
+    def traces(
+        self, start: float, end: float, points: int = 4000
+    ) -> dict[str, NDArray[np.float64]]:
+        """Each measured signal over [start, end) s, thinned to at most `points` means.
+
+        Returns:
+            Shape (n, 2) by name: s after `start`, SI unit.
+        """
+        found = {}
+        for signal in self.signals:
+            bins = self.between(start, end, signal)
+            every = max(1, -(-bins.time.size // points))
+            time = bins.time[::every] + bins.width / 2 - start
+            found[signal] = np.column_stack([time, bins.mean[::every]])
+        return found
+
+    def between(self, start: float, end: float, signal: str) -> Bins:
+        """Bins of `signal` that start in [start, end) s on the run's axis."""
+        bins = self.since(0, signal)
+        inside = slice(*np.searchsorted(bins.time, [start, end]))
+        return Bins(
+            bins.time[inside],
+            bins.width,
+            bins.low[inside],
+            bins.high[inside],
+            bins.mean[inside],
+        )

@@ -1,0 +1,280 @@
+"""The one loop: protocol generator -> trials -> coil and scope -> outcome -> generator.
+
+It decides everything in one synchronous loop and is the only one that talks to the
+recorder, the watchers and the protocol. Every way out passes through a verified safe
+state of the coil.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.account import Account
+from tactile_lab.acquisition.instruments import Instruments
+from tactile_lab.acquisition.intake import Intake
+from tactile_lab.acquisition.journal import Journal
+from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.acquisition.task import Ending, Task
+from tactile_lab.bench import Bench, Stream
+from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
+from tactile_lab.trial import Outcome, Trial
+
+BASELINE = 0.1
+"""Seconds of rest recorded before the first trial and after each recovery."""
+
+PULSE = 0.25
+"""Longest time between two signs of life of the loop, s."""
+
+GRACE = 2.0
+"""Seconds samples may be late at the end of a trial before the scope is given up."""
+
+
+class StopAskedError(Exception):
+    """Somebody asked the run to stop."""
+
+
+class Runner:
+    """Executes one task on one bench, once.
+
+    Args:
+        task: what to do.
+        bench: with what; nothing of it is open.
+        journal: starts the record, told how the samples are scaled (None: no scope).
+        stop: asks for the end.
+        live: gets the newest samples.
+        emit: is told what happens.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        bench: Bench,
+        journal: Callable[[Stream | None], Journal],
+        stop: StopRequest,
+        live: Live,
+        emit: events.Emit = events.ignore,
+    ) -> None:
+        self.intake = Intake(live, task.spike_row)
+        self._live = live
+        self._task = task
+        self._clock = bench.clock
+        self._account = Account(bench.clock, journal, emit)
+        self._stop = stop
+        self._emit = emit
+        self._lease = Lease(bench.clock)
+        self.instruments = Instruments.of(bench, stop, self._lease)
+        self._told = 0.0
+
+    @property
+    def duration(self) -> float:
+        """Length of the run so far, planned pauses included, s."""
+        return self._account.now
+
+    def run(self) -> Ending:
+        """Run to the end, however it comes; the coil is safe when this returns."""
+        with self._clock.taking_part("runner"):
+            state, reason = events.RunState.COMPLETE, None
+            failure: BaseException | None = None
+            try:
+                self._connect()
+                self._play_all()
+            except StopAskedError:
+                state, reason = events.RunState.ABORTED, self._stop.reason
+            except TactileLabError as error:
+                state, reason, failure = events.RunState.FAULTED, str(error), error
+            except BaseException as error:
+                state, failure = events.RunState.FAULTED, error
+                reason = f"{type(error).__name__}: {error}"
+            self._account.state(events.RunState.STOPPING, "making the coil safe")
+            self._lease.end()
+            off = self.instruments.close()
+            self._last_words()
+            self._account.state(state, reason or off.text)
+        return Ending(state, off, reason, failure, self._stop.signal)
+
+    def _connect(self) -> None:
+        self._account.state(events.RunState.CONNECTING, "opening instruments")
+        self.instruments.open(self._serve)
+        self._start_stream()
+        coil = self.instruments.coil
+        if coil is not None:
+            coil.energise()
+            self._serve(lambda: coil.live)
+        self._account.state(events.RunState.RUNNING, "running")
+
+    def _play_all(self) -> None:
+        self._rest_until(self._clock.now() + BASELINE)
+        trials = self._task.trials()
+        outcome: Outcome | None = None
+        try:
+            while True:
+                trial = next(trials) if outcome is None else trials.send(outcome)
+                index = 0 if outcome is None else outcome.index + 1
+                play = self._pause if trial.pause else self._play
+                outcome = play(index, trial)
+                self._account.outcome(outcome)
+        except StopIteration:
+            pass
+        finally:
+            trials.close()
+        self._stop_stream()
+
+    def _play(self, index: int, trial: Trial) -> Outcome:
+        """Play one trial while everything streams."""
+        rest = self._live.levels(self.intake.reached - BASELINE, self.intake.reached)
+        begin, start = self._begin(index, trial)
+        end = begin + trial.length
+        skipped = self._play_current(trial, begin, end)
+        scope = self.instruments.scope
+        if scope is None:
+            self._rest_until(end)
+        else:
+            scope.poll_at(end)
+            target = start + trial.length - 2 * self._task.interval
+            self._serve(lambda: self.intake.reached >= target, end + GRACE)
+            if self.intake.reached < target:
+                raise InstrumentError(
+                    f"The scope is {target - self.intake.reached:.3g} s of samples "
+                    f"behind at the end of a trial (limit {GRACE:g} s). Lower the "
+                    "sample rate or use a faster USB port."
+                )
+        coil = self.instruments.coil
+        self._note_edges(start)
+        spikes = self.intake.spikes_between(start, start + trial.length)
+        return Outcome(
+            trial=trial,
+            index=index,
+            start=start,
+            spike_times=spikes - start,
+            current=self._account.applied_since(begin),
+            rest=rest,
+            traces=self._live.traces(start, start + trial.length),
+            skipped=0 if coil is None else coil.skipped - skipped,
+        )
+
+    def _pause(self, index: int, trial: Trial) -> Outcome:
+        """A planned recovery: the coil holds, nothing is streamed or stored."""
+        begin, start = self._begin(index, trial)
+        self._stop_stream()
+        self._play_current(trial, begin, begin + trial.length)
+        self._rest_until(begin + trial.length)
+        self._account.pause(start, self._account.now)
+        self._start_stream()
+        self._rest_until(self._clock.now() + BASELINE)
+        return Outcome(
+            trial=trial,
+            index=index,
+            start=start,
+            spike_times=np.empty(0),
+            current=self._account.applied_since(begin),
+        )
+
+    def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
+        """Begin a trial now: its start in clock time and in run time, s."""
+        begin, start = self._clock.now(), self._account.now
+        self.intake.forget_spikes_before(start)
+        self._emit(events.TrialStarted(index, trial, start))
+        return begin, start
+
+    def _play_current(self, trial: Trial, begin: float, end: float) -> int:
+        """Have the coil play the trial; set-points it had skipped before."""
+        coil = self.instruments.coil
+        if coil is None:
+            return 0
+        before = coil.last.setpoint if coil.last is not None else 0.0
+        interval = coil.coil.update_interval
+        current = self._task.current_for(trial, interval, before)
+        coil.play(current.shifted(begin), end)
+        return coil.skipped
+
+    def _start_stream(self) -> None:
+        scope = self.instruments.scope
+        if scope is None:
+            if self._account.journal is None:
+                self._account.begin(None)
+            return
+        scope.stream_from(self._task.channels, self._task.interval)
+        self._serve(lambda: scope.stream is not None)
+        stream = scope.stream
+        if stream is None:
+            raise RefusedError("The scope did not start its stream.")
+        journal = self._account.journal or self._account.begin(stream)
+        searched = self._task.spike_row is not None
+        detector = self._task.detector(stream) if searched else None
+        start = self._account.axis(stream.started)
+        self.intake.begin(stream, start, detector, journal)
+
+    def _stop_stream(self) -> None:
+        scope = self.instruments.scope
+        if scope is None:
+            return
+        stream = scope.stream
+        scope.halt()
+        self._serve(lambda: scope.stream is None)
+        if stream is not None:
+            start = self._account.axis(stream.started)
+            self._account.align(start, self.intake.reached, stream.uncertainty)
+        self._account.spikes(self.intake.end())
+
+    def _note_edges(self, start: float) -> None:
+        """Let the trial that began at `start` s of run time tell where clocks lie."""
+        if "coil_current" in self._live.signals:
+            end = self.intake.reached
+            self._account.note_edges(self._live.between(start, end, "coil_current"))
+
+    def _rest_until(self, when: float) -> None:
+        self._serve(lambda: self._clock.now() >= when, when)
+
+    def _serve(self, done: Callable[[], bool], until: float | None = None) -> None:
+        """Do all that comes up until `done()`, or until clock time `until`, s.
+
+        Raises:
+            StopAskedError: somebody asked to stop.
+            TactileLabError: an instrument or the recorder failed.
+        """
+        scope = self.instruments.scope
+        while True:
+            self._lease.renew()
+            self._take_blocks()
+            self._account.readings(self.instruments)
+            if self._stop.requested:
+                raise StopAskedError
+            self.instruments.raise_failure()
+            if done():
+                return
+            wake = self._clock.now() + PULSE
+            if until is not None:
+                if self._clock.now() >= until:
+                    return
+                wake = min(wake, until)
+            self._clock.wait_for(
+                lambda: (
+                    done()
+                    or self._stop.requested
+                    or self.instruments.failed
+                    or (scope is not None and scope.waiting > 0)
+                ),
+                wake,
+            )
+
+    def _take_blocks(self) -> None:
+        scope = self.instruments.scope
+        while scope is not None and (block := scope.take()) is not None:
+            self._account.spikes(self.intake.add(block))
+            self._lease.renew()
+            if self.intake.reached - self._told >= PULSE:
+                self._told = self.intake.reached
+                self._emit(events.Progress(self._told, self._task.expected))
+
+    def _last_words(self) -> None:
+        """Store what the instruments still delivered while they were closed."""
+        try:
+            self._take_blocks()
+            self._account.readings(self.instruments)
+            self._account.spikes(self.intake.end())
+        except TactileLabError as failure:
+            self._emit(events.Message("error", str(failure)))

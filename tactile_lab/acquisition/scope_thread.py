@@ -1,0 +1,135 @@
+"""The scope's thread: polls the stream and hands over every block, in order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from tactile_lab.acquisition.instrument_thread import InstrumentThread
+from tactile_lab.bench import Block, Channel, Scope, Stream
+from tactile_lab.clock import Clock
+from tactile_lab.errors import InstrumentError, RecordingError
+
+QUEUE = 256
+"""Blocks that may wait for the deciding loop."""
+
+
+class ScopeThread(InstrumentThread):
+    """Owns the scope.
+
+    The queue to the deciding loop is bounded. When it is full, real time cannot wait,
+    so the run stops with an error and keeps what it has; the simulated clock waits.
+    """
+
+    def __init__(self, scope: Scope, clock: Clock, queue: int = QUEUE) -> None:
+        super().__init__("scope", clock)
+        self.scope = scope
+        self.stream: Stream | None = None
+        self.polled_until = float("-inf")
+        self._queue: deque[Block] = deque()
+        self._capacity = queue
+        self._wanted: tuple[tuple[Channel, ...], float] | None = None
+        self._halt = False
+        self._due: float | None = None
+
+    def stream_from(self, channels: Sequence[Channel], interval: float) -> None:
+        """Ask for a stream; `stream` is set once it runs."""
+        self._wanted = (tuple(channels), interval)
+        self.clock.notify()
+
+    def halt(self) -> None:
+        """Ask for the stream to stop; `stream` is None once it has."""
+        self._halt = True
+        self.clock.notify()
+
+    def poll_at(self, when: float) -> None:
+        """Ask for one poll exactly at clock time `when`, s, beside the regular ones."""
+        self._due = when
+        self.clock.notify()
+
+    def take(self) -> Block | None:
+        """The oldest block not taken yet."""
+        block = self._queue.popleft() if self._queue else None
+        if block is not None and len(self._queue) == self._capacity - 1:
+            self.clock.notify()
+        return block
+
+    @property
+    def waiting(self) -> int:
+        """Blocks not taken yet."""
+        return len(self._queue)
+
+    def open(self) -> None:
+        """Open the scope."""
+        self.scope.open()
+        self.settings = {"identity": self.scope.identity, **self.scope.settings()}
+
+    def work(self) -> None:
+        """Poll while a stream runs, until told to leave."""
+        poll = 0.0
+        while not self._leaving:
+            now = self.clock.now()
+            if self._halt:
+                self._end_stream()
+            if self._wanted is not None and self.stream is None:
+                self.stream = self.scope.start(*self._wanted)
+                self._wanted = None
+                self.clock.notify()
+                poll = self.clock.now() + self.scope.poll_interval
+            due = self._due is not None and now >= self._due
+            if self.stream is not None and (due or now >= poll):
+                self._poll()
+                if due:
+                    self._due = None
+                if now >= poll:
+                    poll = now + self.scope.poll_interval
+            self.clock.wait_for(self._called, self._wake(poll))
+
+    def make_safe_and_close(self) -> None:
+        """Stop the stream and close."""
+        try:
+            self.scope.stop()
+            self.scope.close()
+        except InstrumentError as failure:
+            self.failure = self.failure or failure
+        self.stream = None
+
+    def _called(self) -> bool:
+        if self._leaving or self._halt:
+            return True
+        if self._wanted is not None and self.stream is None:
+            return True
+        return self._due is not None and self._due <= self.clock.now()
+
+    def _wake(self, poll: float) -> float | None:
+        if self.stream is None:
+            return None
+        return poll if self._due is None else min(poll, self._due)
+
+    def _end_stream(self) -> None:
+        if self.stream is not None:
+            self._poll()
+            self.scope.stop()
+        self.stream, self._halt, self._due = None, False, None
+        self.clock.notify()
+
+    def _poll(self) -> None:
+        asked = self.clock.now()
+        block = self.scope.poll()
+        if block is not None:
+            self._hand_over(block)
+        self.polled_until = asked
+        self.clock.notify()
+
+    def _hand_over(self, block: Block) -> None:
+        if len(self._queue) >= self._capacity:
+            if not self.clock.simulated:
+                raise RecordingError(
+                    f"{self._capacity} blocks of samples wait to be processed: this "
+                    "computer does not keep up with the sample rate. Lower "
+                    "record.sample_rate or record fewer channels."
+                )
+            self.clock.wait_for(
+                lambda: self._leaving or len(self._queue) < self._capacity
+            )
+        self._queue.append(block)

@@ -1,0 +1,66 @@
+"""What the deciding loop is given, and how it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.acquisition.intake import OnlineDetector
+from tactile_lab.bench import Channel, OffReport, Stream
+from tactile_lab.trial import Trial, Trials
+from tactile_lab.waveform import Waveform
+
+
+@dataclass(frozen=True)
+class Task:
+    """All the loop must know of a scene.
+
+    Attributes:
+        trials: the protocol's generator, not started yet.
+        channels: scope channels to enable, in row order.
+        interval: sample interval asked for, s.
+        spike_row: row whose codes are searched for spikes; None for none.
+        detector: makes a detector for a running stream.
+        current_for: coil current, A(t), that gives a trial's force within all limits,
+            told the time between two set-points, s, and the last set-point, A.
+        expected: run time expected, s; None if it depends on outcomes.
+    """
+
+    trials: Callable[[], Trials]
+    channels: tuple[Channel, ...]
+    interval: float
+    spike_row: int | None
+    detector: Callable[[Stream], OnlineDetector]
+    current_for: Callable[[Trial, float, float], Waveform]
+    expected: float | None
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended.
+
+    Attributes:
+        state: complete, aborted or faulted.
+        off: how the coil was left.
+        reason: why it ended early; None if complete.
+        failure: the error behind a fault.
+        signal: POSIX signal that asked for the end, if one did.
+    """
+
+    state: RunState
+    off: OffReport
+    reason: str | None = None
+    failure: BaseException | None = None
+    signal: int | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """0 complete, 3 faulted, 4 safe state not verified, 128 + signal."""
+        if not self.off.verified:
+            return 4
+        if self.state is RunState.COMPLETE:
+            return 0
+        if self.signal is not None:
+            return 128 + self.signal
+        return 130 if self.state is RunState.ABORTED else 3

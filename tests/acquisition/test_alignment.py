@@ -1,0 +1,103 @@
+"""Two clocks, told apart by the coil's edges; never by more than the edges allow."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from tactile_lab.acquisition.alignment import CLOCK_ERROR, Edge, align, find_edges
+from tactile_lab.acquisition.coil_thread import Applied
+from tactile_lab.acquisition.live import Bins
+
+
+def edges(times, offset, drift, before, after):
+    """True steps at host `times`; samples are late by offset + drift * t."""
+    return [
+        Edge(t + offset + drift * t, t - b, t + a)
+        for t, b, a in zip(times, before, after, strict=True)
+    ]
+
+
+@example(offset=0.0, drift=-0.00039390902289107886, seed=335, length=20.0)
+@given(
+    offset=st.floats(-0.2, 0.2),
+    drift=st.floats(-5e-4, 5e-4),
+    seed=st.integers(0, 1000),
+    length=st.floats(20, 2000),
+)
+def test_the_corrected_time_is_right_within_the_stated_uncertainty(
+    offset, drift, seed, length
+):
+    rng = np.random.default_rng(seed)
+    times = np.sort(np.r_[rng.uniform(0, 2, 30), rng.uniform(length - 2, length, 30)])
+    before, after = rng.uniform(0, 0.02, (2, times.size))
+    told = align(edges(times, offset, drift, before, after), 0.0, length, 0.5)
+    for at in (times[0], times[-1]):
+        sampled = at + offset + drift * at
+        corrected = told.offset + sampled * (1 + told.drift)
+        # the edges of one end are up to 2 s apart, in which clocks part by 1 ms
+        assert abs(corrected - at) <= told.uncertainty + 2e-3
+
+
+def test_edges_that_contradict_each_other_are_not_believed():
+    torn = [Edge(1.0, 0.99, 1.0), Edge(9.0, 9.2, 9.21), Edge(9.001, 9.0, 9.001)]
+    told = align(torn, 0.0, 10.0, 0.003)
+    assert (told.offset, told.drift) == (0.0, 0.0)
+    assert told.uncertainty == pytest.approx(0.003 + CLOCK_ERROR * 10)
+
+
+def test_many_edges_beat_one():
+    rng = np.random.default_rng(3)
+    times = np.linspace(1, 5, 30)
+    before, after = rng.uniform(0.001, 0.02, (2, 30))
+    every = edges(times, 0.1, 0.0, before, after)
+    one, many = (align(e, 0.0, 6.0, 0.5) for e in (every[:1], every))
+    assert many.uncertainty < 0.8 * one.uncertainty
+    assert many.offset == pytest.approx(-0.1, abs=many.uncertainty)
+
+
+def test_without_edges_host_time_stands_with_its_own_uncertainty():
+    told = align([], 10.0, 110.0, 0.003)
+    assert (told.offset, told.drift) == (0.0, 0.0)
+    assert told.uncertainty == pytest.approx(0.003 + CLOCK_ERROR * 100)
+
+
+def test_edges_worse_than_the_host_clock_change_nothing():
+    told = align([Edge(1.0, 0.9, 1.2)], 0.0, 2.0, 1e-6)
+    assert (told.offset, told.drift) == (0.0, 0.0)
+
+
+def test_an_edge_is_found_where_the_shunt_shows_it():
+    time = np.arange(2000) * 1e-3
+    current = np.where(time < 0.5, 0.1, 0.4).astype(np.float32)
+    bins = Bins(time, 1e-3, current, current, current)
+    applied = [
+        Applied(3.3, 3.31, 0.1, None),
+        Applied(3.488, 3.505, 0.4, None),
+        Applied(3.7, 3.71, 0.41, None),  # too small a step to be seen
+    ]
+    (edge,) = find_edges(applied, 3.0, bins)
+    assert edge.sampled == pytest.approx(0.5, abs=1e-3)
+    assert edge.earliest == pytest.approx(0.488)
+    assert edge.latest == pytest.approx(0.507)
+
+
+def test_a_drifting_sample_clock_stays_within_the_stored_uncertainty(run_scene):
+    ran = run_scene(
+        "simulated.clock_error=9e-5",
+        'protocol.levels=["200 mN"]',
+        "protocol.rest=1 s",
+        'record.signals=["coil_current", "V_K", "spikes"]',
+        "record.sample_rate=0.5 MS/s",
+    )
+    exact = run_scene(
+        'protocol.levels=["200 mN"]',
+        "protocol.rest=1 s",
+        'record.signals=["coil_current", "V_K", "spikes"]',
+        "record.sample_rate=0.5 MS/s",
+    )
+    with ran.stored() as run, exact.stored() as truth:
+        segment = run.records("segments")[0]
+        assert segment["uncertainty"] > 0
+        late = run.spikes["time"][-1] - truth.spikes["time"][-1]
+        assert abs(late) <= segment["uncertainty"]

@@ -1,0 +1,180 @@
+"""The whole path in real time: emulated PicoScope, detection, live picture, disk.
+
+    python tests/benchmarks/sustained.py [--seconds 60] [--rates 7.8125 15.625 31.25]
+                                         [--out FILE]
+
+Four channels at each rate (MS/s per channel). Spikes of known number are in the
+scope's samples; at the end the run is certified from what the disk holds. A rate that
+is too high must end with a message, never with samples missing unnoticed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from drivers.picoscope import PicoScope
+from sim_backend.picosdk import FakePs3000a
+from sim_backend.scope_source import Acquisition, Codes
+from tactile_lab.acquisition.detection import Detection
+from tactile_lab.acquisition.intake import Intake
+from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.scope_thread import ScopeThread
+from tactile_lab.acquisition.spikes import detector_of
+from tactile_lab.bench import Channel
+from tactile_lab.clock import RealClock
+from tactile_lab.errors import TactileLabError
+from tactile_lab.store.certificate import write_certificate
+from tactile_lab.store.folder import DATA, RunFolder
+from tactile_lab.store.layout import Layout
+from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.recorder_thread import RecorderThread
+
+SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
+ROW = 2
+PERIOD = 1 << 20
+EVERY = 16_384
+"""Samples from spike to spike; divides the period."""
+
+DETECTION = Detection(signal="V_K", threshold=5120, hysteresis=2560)
+CHANNELS = tuple(
+    Channel(signal=name, input="ABCD"[i], range=5.0) for i, name in enumerate(SIGNALS)
+)
+
+
+class Table:
+    """Noise of one code on four inputs and a spike on one, repeating."""
+
+    def __init__(self, longest: int) -> None:
+        rng = np.random.default_rng(1)
+        self._table = rng.integers(-1, 2, (4, PERIOD), dtype=np.int16)
+        self._table[ROW, EVERY - 1 :: EVERY] = 100
+        self._table = np.tile(self._table * np.int16(256), longest // PERIOD + 2)
+
+    def render(
+        self, acquisition: Acquisition, first: int, samples: int
+    ) -> tuple[Codes, tuple[bool, ...]]:
+        """A piece of the table."""
+        begin = first % PERIOD
+        rows = len(acquisition.inputs)
+        return self._table[:rows, begin : begin + samples], (False,) * rows
+
+
+def one(rate: float, seconds: float, root: Path) -> str:
+    """A row of the table: `rate` MS/s for `seconds`."""
+    clock = RealClock()
+    library = FakePs3000a(Table(1 << 22), clock)
+    thread = ScopeThread(PicoScope(clock=clock, library=library), clock)
+    thread.start()
+    clock.wait_for(lambda: thread.settled)
+    thread.raise_failure()
+    live = Live()
+    intake = Intake(live, ROW)
+    detector = detector_of(DETECTION)
+    detector.feed(0, np.zeros(10, np.int16))  # compile or load before samples come
+    detector.flush()
+    thread.stream_from(CHANNELS, 1e-6 / rate)
+    clock.wait_for(lambda: thread.stream is not None or thread.failure is not None)
+    thread.raise_failure()
+    stream = thread.stream
+    assert stream is not None
+    folder = RunFolder.create(root, "sustained", {})
+    layout = Layout(signals=SIGNALS, detection=DETECTION, simulated=True)
+    recorder = RecorderThread(Recorder(folder, layout), when_full="error")
+    intake.sink = recorder
+    intake.begin(stream, 0.0, detector)
+    worked, began, ended, fullest = time.process_time(), time.monotonic(), "", 0.0
+    try:
+        while intake.reached < seconds:
+            while (block := thread.take()) is not None:
+                intake.add(block)
+                fullest = max(fullest, recorder.waiting)
+            thread.raise_failure()
+            clock.wait_for(
+                lambda: thread.waiting > 0 or thread.failure is not None,
+                clock.now() + 0.25,
+            )
+    except TactileLabError as error:
+        ended = f"{type(error).__name__}: {str(error)[:200]}"
+    took = time.monotonic() - began
+    thread.leave()
+    thread.join(5)
+    intake.end()
+    try:
+        recorder.close("faulted" if ended else "complete", intake.produced)
+    except TactileLabError as error:
+        ended = ended or str(error)
+    load = (time.process_time() - worked) / took
+    proof = write_certificate(folder.path)
+    spikes = intake.produced // EVERY
+    found = f"{proof.online} of {spikes}"
+    size = (folder.path / DATA).stat().st_size
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return (
+        f"| {rate:g} | {took:.0f} | {intake.produced * 4:,} | {proof.samples} "
+        f"| {found} | {proof.spikes} | {100 * fullest:.0f} | {load:.2f} | {memory:.0f} "
+        f"| {size / 1e6:.0f} | {ended or 'complete'} |"
+    )
+
+
+def main() -> None:
+    """Measure each rate in a process of its own; print or write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument(
+        "--rates", type=float, nargs="+", default=[7.8125, 15.625, 31.25]
+    )
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--row", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.row:
+        with tempfile.TemporaryDirectory(dir=os.environ.get("TMPDIR")) as root:
+            print(one(options.rates[0], options.seconds, Path(root)))
+        return
+    rows = []
+    for rate in options.rates:
+        command = [sys.executable, __file__, "--row", "--rates", str(rate)]
+        command += ["--seconds", str(options.seconds)]
+        made = subprocess.run(command, capture_output=True, text=True, check=False)
+        rows.append(made.stdout.strip() or f"| {rate:g} | {made.stderr[-300:]} |")
+        print(rows[-1], flush=True)
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"],
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
+    text = "\n".join(
+        [
+            "# Sustained streaming to disk",
+            "",
+            f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
+            f"{os.cpu_count()} cores. Made by `tests/benchmarks/sustained.py`: the "
+            "real PicoScope driver on its emulated library, paced by the clock, "
+            "detection on V_K, live picture, recorder. The emulator takes part of the "
+            "load. Lost samples and spikes are those of the run's certificate.",
+            "",
+            "| MS/s per channel | s | samples | lost | spikes found | offline differ "
+            "| queue at most, % | cores used | memory, MB | file, MB | end |",
+            "|---|---|---|---|---|---|---|---|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
+    if options.out:
+        options.out.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
