@@ -1,0 +1,164 @@
+"""All runs under a folder, found again quickly; the index may be deleted any time."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.store.folder import INFO, is_live, read_info, write_json
+
+INDEX = ".index.json"
+VERSION = 2
+"""Of the index; another one is thrown away and rebuilt."""
+
+SENSOR_KEYS = ("sensor", "sample")
+"""Notes that name the sensor measured on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One run in the catalogue.
+
+    Attributes:
+        name: of the folder.
+        started: ISO time with zone.
+        status: as in `run.json`; "cut short" where a running run has no writer.
+        protocol, scene, sensor, bench: names; empty where not known.
+        simulated: whether physics was computed.
+        duration: of the experiment, s; None if not known.
+        spikes: found on line; None if not known.
+        loss: the certificate's line; empty if there is none.
+        trouble: why the run cannot be read; empty where it can.
+    """
+
+    name: str
+    started: str = ""
+    status: str = "unreadable"
+    protocol: str = ""
+    scene: str = ""
+    sensor: str = ""
+    bench: str = ""
+    simulated: bool | None = None
+    duration: float | None = None
+    spikes: int | None = None
+    loss: str = ""
+    trouble: str = ""
+
+
+def catalogue(
+    root: Path,
+    *,
+    protocol: str | None = None,
+    sensor: str | None = None,
+    since: date | None = None,
+    until: date | None = None,
+) -> list[Entry]:
+    """Runs in folder `root` that match, oldest first.
+
+    Args:
+        root: holds run folders.
+        protocol: name of the protocol.
+        sensor: part of the noted sensor, any case.
+        since: first day on which the run started.
+        until: last day.
+
+    Raises:
+        RunFolderError: `root` is no folder.
+    """
+    chosen = []
+    for entry in _all(root):
+        day = datetime.fromisoformat(entry.started).date() if entry.started else None
+        if protocol is not None and entry.protocol != protocol:
+            continue
+        if sensor is not None and sensor.casefold() not in entry.sensor.casefold():
+            continue
+        if since is not None and (day is None or day < since):
+            continue
+        if until is not None and (day is None or day > until):
+            continue
+        chosen.append(entry)
+    return sorted(chosen, key=lambda entry: (entry.started, entry.name))
+
+
+def _all(root: Path) -> list[Entry]:
+    """Every run, from the index where `run.json` has not changed since."""
+    known = _read_index(root)
+    index: dict[str, Any] = {}
+    entries = []
+    for path, stamp in _folders(root):
+        old = known.get(path.name)
+        if old is not None and old["stamp"] == stamp:
+            entry = Entry(**old["entry"])
+        else:
+            entry = _entry(path)
+        index[path.name] = {"stamp": stamp, "entry": asdict(entry)}
+        if entry.status == "running" and not is_live(path):
+            entry = replace(entry, status="cut short")
+        entries.append(entry)
+    if index != known:
+        try:
+            write_json(root / INDEX, {"version": VERSION, "runs": index})
+        except RecordingError:
+            # an archive one may only read is listed without an index
+            return entries
+    return entries
+
+
+def _folders(root: Path) -> Iterator[tuple[Path, list[int]]]:
+    """Run folders and what tells whether their `run.json` has changed."""
+    try:
+        with os.scandir(root) as found:
+            names = [item.name for item in found if item.is_dir()]
+    except OSError as error:
+        raise RunFolderError(
+            f"{root} cannot be listed: {error.strerror}. Give the folder that holds "
+            "the runs."
+        ) from error
+    for name in sorted(names):
+        try:
+            state = (root / name / INFO).stat()
+        except OSError:
+            continue  # some other folder
+        yield root / name, [state.st_mtime_ns, state.st_size]
+
+
+def _read_index(root: Path) -> dict[str, Any]:
+    """The index as last written; empty where there is none that can be used."""
+    try:
+        content = json.loads((root / INDEX).read_text(encoding="utf-8"))
+        if content["version"] != VERSION:
+            return {}
+        for item in content["runs"].values():
+            Entry(**item["entry"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+    runs: dict[str, Any] = content["runs"]
+    return runs
+
+
+def _entry(path: Path) -> Entry:
+    try:
+        info = read_info(path)
+    except RunFolderError as error:
+        return Entry(name=path.name, trouble=str(error))
+    notes = info.get("notes") or {}
+    sensors = [str(notes[key]) for key in SENSOR_KEYS if notes.get(key)]
+    return Entry(
+        name=path.name,
+        started=str(info.get("started") or ""),
+        status=str(info["status"]),
+        protocol=str(info.get("protocol") or ""),
+        scene=str(info.get("scene") or ""),
+        sensor=", ".join(sensors),
+        bench=str(info.get("bench") or ""),
+        simulated=info.get("simulated"),
+        duration=info.get("duration_s"),
+        spikes=info.get("spikes_online"),
+        loss=str((info.get("loss") or {}).get("text") or ""),
+    )

@@ -1,0 +1,175 @@
+"""The loss certificate: every sample and every spike of a run accounted for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.store.folder import INFO, write_json
+from tactile_lab.store.run import Run
+
+PIECE = 1 << 22
+"""Samples read at a time."""
+
+SAME_PLACE = 1e-3
+"""Two spikes closer than this, in samples, are one; only rounding moves them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certificate:
+    """What was produced, what was stored, and what spikes the stored samples hold.
+
+    Attributes:
+        produced: samples the scope delivered plus known gaps, all channels; None
+            where the run was cut short before it could say.
+        written: samples stored, all channels.
+        gaps: samples per channel known to be missing.
+        online: spikes found while the run went on.
+        offline: spikes found again in the stored samples; None where the channel was
+            not stored.
+        differing: spikes that only one of the two searches found; None likewise.
+    """
+
+    produced: int | None
+    written: int
+    gaps: int
+    online: int
+    offline: int | None
+    differing: int | None
+
+    @property
+    def samples(self) -> int | None:
+        """Samples lost; None if not known."""
+        return None if self.produced is None else self.produced - self.written
+
+    @property
+    def spikes(self) -> int | None:
+        """Spikes lost or invented; None where this cannot be checked."""
+        return self.differing
+
+    @property
+    def clean(self) -> bool:
+        """Nothing is known to be lost."""
+        return not self.samples and not self.gaps and not self.spikes
+
+    def __str__(self) -> str:
+        if self.produced is None:
+            samples = f"not known of {self.written} samples (the run was cut short)"
+        else:
+            samples = f"{self.samples} of {self.produced} samples"
+        if self.differing is None:
+            spikes = f"{self.online} spikes, not possible to check (not stored)"
+        else:
+            spikes = f"{self.spikes} of {max(self.online, self.offline or 0)} spikes"
+        return f"loss: {samples}, {spikes}"
+
+    def to_json(self) -> dict[str, Any]:
+        """For `run.json` and ``--json``."""
+        return {
+            "samples": self.samples,
+            "spikes": self.spikes,
+            "produced": self.produced,
+            "written": self.written,
+            "gaps": self.gaps,
+            "spikes_online": self.online,
+            "spikes_offline": self.offline,
+            "text": str(self),
+        }
+
+
+def certify(run: Run) -> Certificate:
+    """Account for the samples and spikes of a run; reads the searched channel."""
+    counters = run.info.get("samples") or {}
+    rows = run.records("gaps")["missing"]
+    missing = int(rows.sum())
+    produced: int | None = 0
+    written = 0
+    for name in run.signals:
+        delivered = (counters.get(name) or {}).get("produced")
+        if delivered is None or produced is None:
+            produced = None
+        else:
+            produced += delivered + missing
+        written += run.stored(name)
+    online = run.records("spikes")["sample"]
+    offline = None if not searched_is_stored(run) else redetect(run)["sample"]
+    return Certificate(
+        produced=produced,
+        written=written,
+        gaps=missing,
+        online=online.size,
+        offline=None if offline is None else offline.size,
+        differing=None if offline is None else unmatched(online, offline).size,
+    )
+
+
+def write_certificate(path: Path) -> Certificate:
+    """Certify the run in folder `path` and note the result in its `run.json`.
+
+    Raises:
+        RunFolderError: not a run that can be read.
+        RecordingError: the folder cannot be written.
+    """
+    with Run.load(path) as run:
+        certificate = certify(run)
+        info = {**run.info, "loss": certificate.to_json()}
+    write_json(path / INFO, info)
+    return certificate
+
+
+def searched_is_stored(run: Run) -> bool:
+    """Whether the channel that spikes were searched on is stored."""
+    return run.detection is not None and run.detection.signal in run.signals
+
+
+def redetect(run: Run) -> NDArray[Any]:
+    """Spikes found again in the stored samples, dtype `acquisition.spikes.SPIKE`.
+
+    Each stretch without a gap is searched by itself, as on line.
+    """
+    # compiled code is loaded only where it is needed
+    from tactile_lab.acquisition.spikes import SPIKE, detector_of
+
+    found = [np.empty(0, SPIKE)]
+    if run.detection is not None and searched_is_stored(run):
+        signal = run.signal(run.detection.signal)
+        for start, stop in stretches(run):
+            detector = detector_of(run.detection)
+            for at in range(start, stop, PIECE):
+                codes = signal.scope_codes(at, min(at + PIECE, stop))
+                found.append(detector.feed(at, codes))
+            found.append(detector.flush())
+    return np.concatenate(found)
+
+
+def stretches(run: Run) -> Iterator[tuple[int, int]]:
+    """(first, one past last) stored sample of each stretch without a gap."""
+    end = run.samples
+    for start, stop in pairwise([*run.axis.first.tolist(), end]):
+        if start < min(stop, end):
+            yield start, min(stop, end)
+
+
+def unmatched(
+    one: NDArray[np.float64], other: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Sample indices that only one of two ascending lists has, ascending."""
+    return np.sort(np.concatenate([_without(one, other), _without(other, one)]))
+
+
+def _without(
+    some: NDArray[np.float64], others: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Those of `some` that are not in `others`."""
+    if others.size == 0:
+        return some
+    after = np.clip(np.searchsorted(others, some), 0, others.size - 1)
+    before = np.clip(after - 1, 0, None)
+    near = np.minimum(np.abs(others[after] - some), np.abs(others[before] - some))
+    return some[near > SAME_PLACE]

@@ -1,0 +1,107 @@
+"""What differs between two runs: what they ran on, with, and what came out."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.quantity import show
+from tactile_lab.store.run import Run
+
+SCENE = "scene.toml"
+
+
+@dataclass(frozen=True)
+class Differences:
+    """What differs, one line each; nothing where two runs are alike.
+
+    Attributes:
+        environment: versions, computer, bench and how it was simulated.
+        calibration: constants stored with the samples, and changed scene lines.
+        results: trials, spikes and samples.
+    """
+
+    environment: tuple[str, ...]
+    calibration: tuple[str, ...]
+    results: tuple[str, ...]
+
+    def __str__(self) -> str:
+        parts = []
+        for name in ("environment", "calibration", "results"):
+            lines: tuple[str, ...] = getattr(self, name)
+            parts += [f"{name}: {line}" for line in lines or ("the same",)]
+        return "\n".join(parts)
+
+
+def differences(old: Path, new: Path) -> Differences:
+    """Compare the runs in two folders.
+
+    Raises:
+        RunFolderError: one of them is no run, or has no data.
+    """
+    with Run.load(old) as one, Run.load(new) as other:
+        return Differences(
+            tuple(_environment(one.info, other.info)),
+            (*_values(one.attributes, other.attributes), *_scene(old, new)),
+            tuple(_results(one, other)),
+        )
+
+
+def _environment(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:
+    keys = ("bench", "simulated", "seed", "instruments", "notes")
+    yield from _values({k: old.get(k) for k in keys}, {k: new.get(k) for k in keys})
+    yield from _values(old.get("environment") or {}, new.get("environment") or {})
+
+
+def _values(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:
+    """Entries that differ; entries within entries by themselves."""
+    for key in sorted({*old, *new}):
+        one, other = old.get(key), new.get(key)
+        if isinstance(one, dict) and isinstance(other, dict):
+            yield from (f"{key}.{line}" for line in _values(one, other))
+        elif one != other:
+            yield f"{key} was {one}, is {other}"
+
+
+def _scene(old: Path, new: Path) -> Iterator[str]:
+    """Lines of the resolved scene that differ."""
+    one, other = (_lines(path / SCENE) for path in (old, new))
+    for line in difflib.unified_diff(one, other, "old", "new", lineterm="", n=0):
+        if not line.startswith(("---", "+++", "@@")):
+            yield f"scene {line}"
+
+
+def _lines(file: Path) -> list[str]:
+    return file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+
+
+def _results(old: Run, new: Run) -> Iterator[str]:
+    if old.status != new.status:
+        yield f"status was {old.status}, is {new.status}"
+    if old.trials.size != new.trials.size:
+        yield f"{old.trials.size} trials were {new.trials.size} now"
+    for one, other in zip(old.trials, new.trials, strict=False):
+        if one["spikes"] != other["spikes"] or one["label"] != other["label"]:
+            yield (
+                f"trial {one['index']} ({one['label'].decode()}) had {one['spikes']} "
+                f"spikes, {other['label'].decode()} has {other['spikes']}"
+            )
+    before, after = old.spikes["time"], new.spikes["time"]
+    if before.size != after.size:
+        yield f"{before.size} spikes in all, {after.size} now"
+    elif before.size and not np.array_equal(before, after):
+        apart = float(np.max(np.abs(before - after)))
+        yield f"spike times differ by up to {show(apart, 's', 3)}"
+    for name in old.signals:
+        if name not in new.signals:
+            yield f"{name} is not stored any more"
+        elif not np.array_equal(old.column(name)[1][()], new.column(name)[1][()]):
+            yield f"the samples of {name} are not identical"
+    for name in new.signals:
+        if name not in old.signals:
+            yield f"{name} was not stored"

@@ -1,0 +1,108 @@
+"""Which part of a run to export, and at which rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.run import Run
+
+PIECE = 1 << 18
+"""Rows handled at a time."""
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """A part of a run.
+
+    Attributes:
+        signals: to export; None for all that are stored.
+        start: s on the run's axis.
+        end: s on the run's axis; None for the last sample.
+        rate: S/s to average down to; None for every sample.
+    """
+
+    signals: tuple[str, ...] | None = None
+    start: float = 0.0
+    end: float | None = None
+    rate: float | None = None
+
+    def names(self, run: Run) -> tuple[str, ...]:
+        """Signals to export.
+
+        Raises:
+            RunFolderError: one of them is not stored.
+        """
+        if self.signals is None:
+            return run.signals
+        for name in self.signals:
+            run.signal(name)
+        return self.signals
+
+    def average(self, interval: float) -> int:
+        """Samples averaged into one.
+
+        Raises:
+            RunFolderError: a rate above the run's.
+        """
+        if self.rate is None:
+            return 1
+        count = round(1.0 / (self.rate * interval))
+        if count < 1:
+            raise RunFolderError(
+                f"The run has {1.0 / interval:g} S/s; it cannot be exported at "
+                f"{self.rate:g} S/s."
+            )
+        return count
+
+    def spans(self, run: Run) -> list[tuple[int, int]]:
+        """(first, one past last) sample of each stretch without a gap."""
+        names = self.names(run)
+        if not names:
+            return []
+        chosen = run.signal(names[0]).between(self.start, self.end)
+        edges = [*run.axis.first.tolist(), run.samples]
+        spans = []
+        for first, last in pairwise(edges):
+            first, last = max(first, chosen.start), min(last, chosen.stop)
+            if first < last:
+                spans.append((first, last))
+        return spans
+
+    def inside(self, run: Run, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of `times`, s, lie in the part."""
+        end = np.inf if self.end is None else self.end
+        mask: NDArray[np.bool_] = (times >= self.start) & (times < end)
+        return mask
+
+    def pieces(self, run: Run) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
+        """(times, one array of SI values per signal), a bounded piece at a time."""
+        signals = [run.signal(name) for name in self.names(run)]
+        for first, last in self.spans(run):
+            count = self.average(signals[0].interval)
+            step = max(PIECE // count, 1) * count
+            for at in range(first, last, step):
+                stop = min(at + step, last)
+                edges = np.arange(at, stop, count)
+                centre = (edges + np.minimum(edges + count, stop) - 1) / 2
+                yield (
+                    run.axis.time_of(centre),
+                    [_averaged(signal[at:stop], count) for signal in signals],
+                )
+
+
+def _averaged(values: FloatArray, count: int) -> FloatArray:
+    """Means of each `count` values; the last may have fewer."""
+    if count == 1:
+        return values
+    edges = np.arange(0, values.size, count)
+    sizes = np.diff(np.append(edges, values.size))
+    means: FloatArray = np.add.reduceat(values, edges) / sizes
+    return means

@@ -1,0 +1,241 @@
+"""A run's folder: `run.json` says what it is from the first moment to the last."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import sys
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import IO, Any, Literal
+
+from tactile_lab.errors import RecordingError, RunFolderError
+
+Status = Literal["running", "complete", "aborted", "faulted", "recovered"]
+
+SCHEMA = 1
+"""Version of the folder's layout; raised when old readers would misread it."""
+
+INFO, DATA, LOG = "run.json", "data.h5", "log.jsonl"
+
+RESERVE = 200_000_000
+"""Bytes that must stay free on the disk while a run is written."""
+
+
+class RunFolder:
+    """The folder of a run that is being recorded.
+
+    Attributes:
+        path: the folder.
+        info: what `run.json` holds.
+    """
+
+    def __init__(self, path: Path, info: dict[str, Any], log: IO[str]) -> None:
+        self.path = path
+        self.info = info
+        self._log = log
+
+    @classmethod
+    def create(
+        cls,
+        root: Path,
+        name: str,
+        info: Mapping[str, Any],
+        *,
+        needed: int = 0,
+        reserve: int = RESERVE,
+    ) -> RunFolder:
+        """Make a new folder under `root`, its `run.json` with status running first.
+
+        Args:
+            root: made if missing.
+            name: of protocol or scene; becomes part of the folder's name.
+            info: further entries of `run.json`, plain JSON types.
+            needed: bytes the run is expected to take.
+            reserve: bytes that must stay free beside them.
+
+        Raises:
+            RecordingError: the disk lacks room, or the folder cannot be written.
+        """
+        now = datetime.now().astimezone()
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+            check_space(root, needed + reserve)
+            path = _unique(root, f"{now:%Y-%m-%d_%H%M%S}_{_plain(name)}")
+            content = {
+                "schema": SCHEMA,
+                "status": "running",
+                "started": now.isoformat(timespec="milliseconds"),
+                "ended": None,
+                "process": os.getpid(),
+                **info,
+            }
+            write_json(path / INFO, content)
+            log = (path / LOG).open("a", encoding="utf-8")
+        except OSError as error:
+            if isinstance(error, RecordingError):
+                raise
+            raise RecordingError(
+                f"No run folder can be made under {root}: {error.strerror or error}. "
+                "Choose a writable folder with --out."
+            ) from error
+        _lock(log)
+        return cls(path, content, log)
+
+    def update(self, **entries: Any) -> None:
+        """Put further entries into `run.json`."""
+        self.info.update(entries)
+        write_json(self.path / INFO, self.info)
+
+    def log(self, kind: str, text: str, **entries: Any) -> None:
+        """Append one line to the log."""
+        now = datetime.now().astimezone().isoformat(timespec="milliseconds")
+        line = {"at": now, "kind": kind, "text": text, **entries}
+        try:
+            self._log.write(json.dumps(line, ensure_ascii=False, default=str) + "\n")
+            self._log.flush()
+        except OSError as error:
+            raise RecordingError(
+                f"{self.path / LOG} cannot be written: {error.strerror}."
+            ) from error
+
+    def write_text(self, name: str, text: str) -> Path:
+        """Put a text file into the folder (scene, calibration, protocol).
+
+        Its SHA-256 goes into `run.json`, so that a later change shows.
+        """
+        path = self.path / name
+        data = text.encode()
+        try:
+            path.write_bytes(data)
+        except OSError as error:
+            raise RecordingError(
+                f"{path} cannot be written: {error.strerror}."
+            ) from error
+        files = {**self.info.get("files", {}), name: digest(data)}
+        self.update(files=files)
+        return path
+
+    def finish(self, status: Status, **entries: Any) -> None:
+        """Patch `run.json` for the last time and let go of the folder."""
+        ended = datetime.now().astimezone().isoformat(timespec="milliseconds")
+        try:
+            self.update(status=status, ended=ended, **entries)
+        finally:
+            self._log.close()
+
+
+def digest(data: bytes) -> str:
+    """SHA-256 in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Replace `path` in one step, so that no reader or crash sees half a file.
+
+    Raises:
+        RecordingError: the folder cannot be written.
+    """
+    new = path.with_suffix(".new")
+    try:
+        with new.open("w", encoding="utf-8") as file:
+            json.dump(content, file, indent=2, ensure_ascii=False, default=str)
+            file.write("\n")
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    except OSError as error:
+        raise RecordingError(
+            f"{path} cannot be written: {error.strerror}; the old one stays."
+        ) from error
+
+
+def read_info(path: Path) -> dict[str, Any]:
+    """What `run.json` in the folder `path` says.
+
+    Raises:
+        RunFolderError: no folder, no `run.json`, or not one this version reads.
+    """
+    file = path / INFO
+    try:
+        info = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise RunFolderError(
+            f"{path} is no run folder: it has no {INFO}. Give the folder of one run; "
+            "`tactile-lab runs` lists them."
+        ) from error
+    except (OSError, ValueError) as error:
+        raise RunFolderError(f"{file} cannot be read: {error}.") from error
+    if not isinstance(info, dict) or info.get("schema") != SCHEMA:
+        found = info.get("schema") if isinstance(info, dict) else None
+        raise RunFolderError(
+            f"{file} has schema {found}; this version reads schema {SCHEMA}."
+        )
+    return info
+
+
+def check_space(path: Path, needed: int) -> None:
+    """Refuse when the disk under `path` has fewer than `needed` bytes free.
+
+    Raises:
+        RecordingError: too little room.
+    """
+    free = shutil.disk_usage(path).free
+    if free < needed:
+        raise RecordingError(
+            f"{path} has {free / 1e9:.2f} GB free but {needed / 1e9:.2f} GB are needed "
+            "(run and reserve). Free some space, choose another --out, or record less."
+        )
+
+
+def is_live(path: Path) -> bool:
+    """Whether a process still writes the run in folder `path`."""
+    try:
+        with (path / LOG).open("r+", encoding="utf-8") as log:
+            return not _lock(log)
+    except FileNotFoundError:
+        return False
+    except PermissionError:
+        # another user's run, or a read-only archive: nobody here can be its writer
+        return False
+
+
+def _unique(root: Path, name: str) -> Path:
+    """Make a folder nobody else has made."""
+    for number in range(1, 1000):
+        path = root / (name if number == 1 else f"{name}_{number}")
+        try:
+            path.mkdir()
+        except FileExistsError:
+            continue
+        return path
+    raise RecordingError(f"{root} holds a thousand runs called {name}.")
+
+
+def _plain(name: str) -> str:
+    """A name every file system takes."""
+    return re.sub(r"[^A-Za-z0-9-]+", "-", name).strip("-")[:60] or "run"
+
+
+def _lock(file: IO[str]) -> bool:
+    """Lock the open log until it is closed or its process dies; False if taken."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        file.seek(1 << 30)  # a byte nobody reads
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

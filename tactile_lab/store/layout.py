@@ -1,0 +1,205 @@
+"""What `data.h5` holds: every dataset is declared before the first sample.
+
+    /samples/<signal>   codes, int8 or int16; signal = gain * code + offset
+    /pyramid/<signal>   smallest, largest and sum of the codes of each `bin` samples
+    /checks/<signal>    per chunk: samples in it, CRC-32 of their codes
+    /segments           stretches without a gap, and where they lie in time
+    /gaps /overrange    missing samples; blocks in which an input left its range
+    /spikes             found on line
+    /current /field     applied current, teslameter readings
+    /trials /pauses /events
+
+SWMR allows no new datasets, attributes or variable-length types once writing has
+started, hence fixed records. All times are in s on the run's axis, whose zero is the
+first sample of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import h5py
+import hdf5plugin
+import numpy as np
+
+from tactile_lab.acquisition.detection import Detection
+from tactile_lab.bench import Stream
+from tactile_lab.errors import RecordingError
+from tactile_lab.signals import SIGNALS
+from tactile_lab.store.folder import SCHEMA
+
+BIN = 512
+"""Samples under one entry of the pyramid."""
+
+CHUNK_TIME = 0.25
+"""Length of one chunk, s: what a crash can cost at most."""
+
+CHECK = np.dtype([("samples", "u4"), ("crc32", "u4")])
+RECORDS = {
+    "segments": np.dtype(
+        [
+            ("first", "i8"), ("time", "f8"), ("interval", "f8"), ("host", "f8"),
+            ("drift", "f8"), ("uncertainty", "f8"),
+        ]
+    ),
+    "gaps": np.dtype([("sample", "i8"), ("missing", "i8"), ("time", "f8")]),
+    "overrange": np.dtype([("sample", "i8"), ("samples", "i8"), ("channels", "u4")]),
+    "spikes": np.dtype(
+        [("sample", "f8"), ("time", "f8"), ("amplitude", "i2"), ("width", "f4")]
+    ),
+    "current": np.dtype([("time", "f8"), ("setpoint", "f8"), ("measured", "f8")]),
+    "field": np.dtype([("time", "f8"), ("field", "f8")]),
+    "trials": np.dtype(
+        [
+            ("index", "u4"), ("start", "f8"), ("end", "f8"), ("level", "f8"),
+            ("hold_start", "f8"), ("hold_end", "f8"), ("spikes", "u4"),
+            ("skipped", "u4"), ("pause", "u1"), ("label", "S48"),
+        ]
+    ),
+    "pauses": np.dtype([("start", "f8"), ("end", "f8")]),
+    "events": np.dtype([("time", "f8"), ("kind", "S16"), ("text", "S160")]),
+}  # fmt: skip
+UNITS = {
+    "segments": "first: sample, time: s, interval: s, host: s, drift: s/s, "
+    "uncertainty: s",
+    "gaps": "sample: sample, missing: sample, time: s",
+    "overrange": "sample: sample, samples: sample, channels: bit per row",
+    "spikes": "sample: sample, time: s, amplitude: code, width: sample",
+    "current": "time: s, setpoint: A, measured: A",
+    "field": "time: s, field: T",
+    "trials": "start: s, end: s, level: N, hold_start: s, hold_end: s",
+    "pauses": "start: s, end: s",
+    "events": "time: s",
+}
+PYRAMID_CHUNK = 8192
+"""Entries in one chunk of the pyramid: few reads for a view of a whole run."""
+
+SLOW_CHUNK = 256
+"""Records in one chunk of the slow datasets."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """What one run stores, known before it starts.
+
+    Attributes:
+        signals: scope channels to store; others may stream for detection only.
+        detection: how spikes are found on line; None where nothing is searched.
+        simulated: whether physics was computed.
+        attributes: calibration and other constants, put on the file's root.
+    """
+
+    signals: tuple[str, ...]
+    detection: Detection | None = None
+    simulated: bool
+    attributes: Mapping[str, float | str | bool] = field(default_factory=dict)
+
+    def rows(self, stream: Stream) -> tuple[int, ...]:
+        """Rows of the stream's blocks that are stored, in the order of `signals`.
+
+        Raises:
+            RecordingError: a signal to store is not streamed.
+        """
+        names = [channel.signal for channel in stream.channels]
+        missing = [name for name in self.signals if name not in names]
+        if missing:
+            raise RecordingError(
+                f"{', '.join(missing)} shall be stored but the scope streams only "
+                f"{', '.join(names) or 'nothing'}."
+            )
+        return tuple(names.index(name) for name in self.signals)
+
+
+def pyramid_record(code: np.dtype[Any]) -> np.dtype[Any]:
+    """One entry of the pyramid over codes of that type."""
+    return np.dtype([("low", code), ("high", code), ("sum", "i4")])
+
+
+def chunk_length(interval: float) -> int:
+    """Samples in one chunk: a power of two near `CHUNK_TIME`, 1024 to 2^20."""
+    wanted = max(1.0, CHUNK_TIME / interval)
+    return int(2 ** np.clip(round(np.log2(wanted)), 10, 20))
+
+
+def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
+    """Create every dataset and attribute of a run; afterwards SWMR may start.
+
+    Args:
+        file: new and open for writing.
+        layout: what to store.
+        stream: scaling of the samples; None where the run has no scope.
+    """
+    file.attrs.update(schema=SCHEMA, simulated=layout.simulated, **layout.attributes)
+    for name, record in RECORDS.items():
+        dataset = file.create_dataset(
+            name,
+            (0,),
+            record,
+            maxshape=(None,),
+            chunks=(SLOW_CHUNK,),
+            fletcher32=True,
+        )
+        dataset.attrs["units"] = UNITS[name]
+    spikes = file["spikes"].attrs
+    if layout.detection is not None:
+        spikes.update(asdict(layout.detection))
+    if stream is None:
+        return
+    for row, channel in enumerate(stream.channels):
+        if layout.detection is not None and channel.signal == layout.detection.signal:
+            spikes["gain"], spikes["offset"] = stream.volts_per_code(row)
+    chunk = chunk_length(stream.interval)
+    file.attrs.update(interval=stream.interval, full_scale=stream.full_scale)
+    code = np.dtype(np.int8 if stream.shift == 8 else np.int16)
+    for row in layout.rows(stream):
+        channel = stream.channels[row]
+        gain, offset = stream.volts_per_code(row)
+        scale = 256 if stream.shift == 8 else 1
+        samples = create_channel(file, channel.signal, code, chunk)
+        signal = SIGNALS.get(channel.signal)
+        samples.attrs.update(
+            unit=signal.unit if signal else "V",
+            gain=gain * scale,
+            offset=offset,
+            code_scale=scale,
+            interval=stream.interval,
+            input=channel.input,
+            range=channel.range,
+            analogue_offset=channel.offset,
+            coupling=channel.coupling,
+            scale=channel.scale,
+        )
+
+
+def create_channel(
+    file: h5py.File, signal: str, code: np.dtype[Any], chunk: int
+) -> h5py.Dataset:
+    """Create one channel's samples (returned), checks and pyramid, all empty."""
+    samples = file.create_dataset(
+        f"samples/{signal}",
+        (0,),
+        code,
+        maxshape=(None,),
+        chunks=(chunk,),
+        **hdf5plugin.Bitshuffle(),
+    )
+    pyramid = file.create_dataset(
+        f"pyramid/{signal}",
+        (0,),
+        pyramid_record(code),
+        maxshape=(None,),
+        chunks=(PYRAMID_CHUNK,),
+        fletcher32=True,
+    )
+    pyramid.attrs["bin"] = BIN
+    file.create_dataset(
+        f"checks/{signal}",
+        (0,),
+        CHECK,
+        maxshape=(None,),
+        chunks=(SLOW_CHUNK,),
+        fletcher32=True,
+    )
+    return samples

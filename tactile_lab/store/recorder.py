@@ -1,0 +1,306 @@
+"""Writes a run while it happens, in the calling thread."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.bench import Block, Stream
+from tactile_lab.errors import RecordingError
+from tactile_lab.store.columns import Records, SampleColumn
+from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
+from tactile_lab.store.layout import RECORDS, Layout, declare
+from tactile_lab.trial import Outcome
+
+CADENCE = 0.5
+"""Longest time anything stays in memory only, s of real time."""
+
+
+class Recorder:
+    """The record of one run; what `acquisition.journal.Journal` asks for.
+
+    The file comes into being with the first `segment`, which knows the scaling;
+    records that come before it wait in memory and in the log.
+
+    Args:
+        folder: of the run.
+        layout: what to store.
+        reserve: bytes that must stay free on the disk.
+
+    Raises:
+        RecordingError: from every method, when something cannot be stored.
+    """
+
+    def __init__(
+        self, folder: RunFolder, layout: Layout, *, reserve: int = RESERVE
+    ) -> None:
+        self.folder = folder
+        self.layout = layout
+        self._reserve = reserve
+        self._records = {name: Records(kind) for name, kind in RECORDS.items()}
+        self._file: h5py.File | None = None
+        self._columns: tuple[SampleColumn, ...] = ()
+        self._rows: tuple[int, ...] = ()
+        self._stream: Stream | None = None
+        self._expected = 0
+        self._pieces: list[tuple[int, int]] = []
+        self._segment: tuple[Any, ...] = ()
+        self._flushed = time.monotonic()
+        self._failed = False
+        self._taken = 0
+        if not layout.signals and layout.detection is None:
+            self._guard(lambda: self._open(None))
+
+    @property
+    def spikes_stored(self) -> int:
+        """Spikes taken so far."""
+        return self._records["spikes"].count
+
+    def segment(self, stream: Stream, start: float) -> None:
+        """A stream starts; its first sample is at `start` s on the run's axis."""
+        if self._file is None:
+            self._guard(lambda: self._open(stream))
+        self._rows = self.layout.rows(stream)
+        self._stream, self._expected = stream, 0
+        self._begin_piece(start)
+
+    def append(self, block: Block) -> None:
+        """Store a block; samples missing before it become a gap record."""
+        if self._stream is None:
+            raise RecordingError("Samples came before any stream had started.")
+        missing = block.first - self._expected
+        if missing < 0:
+            raise RecordingError(
+                f"Samples {block.first} to {self._expected - 1} came twice; the scope "
+                "driver repeats data. Restart the scope."
+            )
+        if missing:
+            _, start, interval, *_ = self._segment
+            at = start + (block.first - self._pieces[-1][0]) * interval
+            self._records["gaps"].append(self._taken, missing, at)
+            self._expected = block.first
+            self._begin_piece(at)
+        self._guard(lambda: self._append(block))
+
+    def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
+        """Correct the running segment's place in time.
+
+        Args:
+            offset: added to the time of its first sample, s.
+            drift: of the scope's clock against the host's, s/s.
+            uncertainty: of the aligned times, s.
+        """
+        first, start, interval, host, _, _ = self._segment
+        self._segment = (first, start + offset, interval, host, drift, uncertainty)
+        self._guard(lambda: self._records["segments"].replace_last(*self._segment))
+
+    def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
+        """Store spikes detected on line.
+
+        Args:
+            times: shape (k,), s on the run's axis.
+            found: shape (k,), dtype `acquisition.spikes.SPIKE`, sample indices
+                counted from the start of the stream.
+        """
+        streamed = np.array([piece[0] for piece in self._pieces])
+        stored = np.array([piece[1] for piece in self._pieces])
+        which = np.searchsorted(streamed, found["sample"], side="right") - 1
+        samples = found["sample"] - streamed[which] + stored[which]
+        for sample, at, spike in zip(samples, times, found, strict=True):
+            self._records["spikes"].append(
+                sample, at, spike["amplitude"], spike["width"]
+            )
+        self.tick()
+
+    def current(self, time: float, setpoint: float, measured: float | None) -> None:
+        """Store an applied set-point and its read-back, A."""
+        read = math.nan if measured is None else measured
+        self._records["current"].append(time, setpoint, read)
+        self.tick()
+
+    def field(self, time: float, field: float) -> None:
+        """Store a teslameter reading, T."""
+        self._records["field"].append(time, field)
+        self.tick()
+
+    def event(self, time: float, kind: str, text: str) -> None:
+        """Store that something happened; the whole text goes to the log."""
+        self.folder.log(kind, text, time=time)
+        self._records["events"].append(time, _fixed(kind, 16), _fixed(text, 160))
+        self.tick()
+
+    def trial(
+        self,
+        index: int,
+        start: float,
+        end: float,
+        *,
+        label: str = "",
+        level: float | None = None,
+        hold: tuple[float, float] | None = None,
+        spikes: int = 0,
+        skipped: int = 0,
+        pause: bool = False,
+    ) -> None:
+        """Store a trial's place in the run, s, and level, N; see `trial.Trial`."""
+        held = hold or (math.nan, math.nan)
+        force = math.nan if level is None else level
+        self._records["trials"].append(
+            index, start, end, force, *held, spikes, skipped, pause, _fixed(label, 48)
+        )
+        self.tick()
+
+    def outcome(self, outcome: Outcome) -> None:
+        """Store that a trial ended, and what came of it in numbers."""
+        trial = outcome.trial
+        self.trial(
+            outcome.index,
+            outcome.start,
+            outcome.start + trial.length,
+            label=trial.label,
+            level=trial.level,
+            hold=trial.hold,
+            spikes=outcome.spike_times.size,
+            skipped=outcome.skipped,
+            pause=trial.pause,
+        )
+
+    def pause(self, start: float, end: float) -> None:
+        """Store a planned pause, s: nothing was streamed, and that is no gap."""
+        self._records["pauses"].append(start, end)
+        self.tick()
+
+    def tick(self) -> None:
+        """Write what has waited for longer than `CADENCE`."""
+        if time.monotonic() - self._flushed > CADENCE:
+            self._guard(self._flush)
+
+    def close(
+        self,
+        status: Status,
+        produced: Mapping[str, int] | int | None = None,
+        **entries: Any,
+    ) -> None:
+        """Write the rest, close the file and patch `run.json` with the counters.
+
+        Args:
+            status: how the run ended.
+            produced: samples the scope delivered, per signal or for each of them.
+            entries: more entries for `run.json`.
+        """
+        spikes = self.spikes_stored
+        try:
+            self._guard(self._close)
+        finally:
+            counters = {
+                column.signal: {
+                    "produced": produced.get(column.signal)
+                    if isinstance(produced, Mapping)
+                    else produced,
+                    "written": column.written,
+                }
+                for column in self._columns
+            }
+            self.folder.finish(
+                status, samples=counters, spikes_online=spikes, **entries
+            )
+
+    def _open(self, stream: Stream | None) -> None:
+        path = self.folder.path / DATA
+        # no chunk cache: whole chunks are written once and never read back
+        file = h5py.File(path, "x", libver="latest", rdcc_nbytes=0)
+        declare(file, self.layout, stream)
+        self._file = file
+        if stream is not None:
+            self._columns = tuple(SampleColumn(file, n) for n in self.layout.signals)
+        for name, records in self._records.items():
+            records.attach(file[name])
+        file.swmr_mode = True
+        self._flush()
+
+    def _begin_piece(self, start: float) -> None:
+        """Samples from here on follow one another from `start` s on."""
+        assert self._stream is not None
+        self._pieces = [p for p in self._pieces if p[0] < self._expected]
+        self._pieces.append((self._expected, self._taken))
+        host = self._stream.started + self._expected * self._stream.interval
+        self._segment = (
+            self._taken, start, self._stream.interval, host, 0.0,
+            self._stream.uncertainty,
+        )  # fmt: skip
+        self._records["segments"].append(*self._segment)
+
+    def _append(self, block: Block) -> None:
+        over = sum(
+            1 << bit for bit, row in enumerate(self._rows) if block.overrange[row]
+        )
+        if over:
+            self._records["overrange"].append(self._taken, block.samples, over)
+        self._expected += block.samples
+        self._taken += block.samples
+        wrote = [
+            column.append(block.codes[row])
+            for column, row in zip(self._columns, self._rows, strict=True)
+        ]
+        if any(wrote):
+            self._flush()
+        else:
+            self.tick()
+
+    def _flush(self) -> None:
+        if self._file is None:
+            return
+        check_space(self.folder.path, self._reserve)
+        if time.monotonic() - self._flushed > CADENCE:
+            for column in self._columns:
+                column.write()
+        for records in self._records.values():
+            records.flush()
+        self._file.flush()
+        self._flushed = time.monotonic()
+
+    def _close(self) -> None:
+        if self._file is None and not self._failed:
+            self._open(None)
+        if self._file is None:
+            return
+        file, self._file = self._file, None
+        # after a failure, which has been told, as much as still goes
+        failed = (OSError, RuntimeError, ValueError) if self._failed else ()
+        try:
+            with suppress(*failed):
+                for column in self._columns:
+                    column.write()
+                    column.write_pyramid()
+                for records in self._records.values():
+                    records.flush()
+        finally:
+            file.close()
+
+    def _guard(self, write: Callable[[], None]) -> None:
+        """Turn what a disk can do to us into a message that says what is kept."""
+        try:
+            write()
+        except RecordingError:
+            self._failed = True
+            raise
+        except (OSError, RuntimeError, ValueError) as error:
+            self._failed = True
+            kept = min((column.written for column in self._columns), default=0)
+            raise RecordingError(
+                f"{self.folder.path / DATA} cannot be written: {error}. The first "
+                f"{kept} samples per channel are kept; free space on the disk or "
+                "choose another --out, and run `tactile-lab recover` on this run."
+            ) from error
+
+
+def _fixed(text: str, size: int) -> bytes:
+    """UTF-8 of at most `size` bytes, cut between characters."""
+    return text.encode()[:size].decode(errors="ignore").encode()

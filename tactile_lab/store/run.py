@@ -1,0 +1,260 @@
+"""Reads a run back: arrays with units, loaded only as far as they are indexed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.acquisition.detection import Detection
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.folder import DATA, is_live, read_info
+from tactile_lab.store.opening import open_data
+from tactile_lab.store.signal import Axis, StoredSignal
+
+if TYPE_CHECKING:
+    import xarray
+
+Records = NDArray[Any]
+
+
+class Run:
+    """One run on disk, running, complete or cut short.
+
+    Attributes:
+        path: the folder.
+        info: what `run.json` says.
+    """
+
+    def __init__(self, path: Path, info: dict[str, Any], file: h5py.File) -> None:
+        self.path = path
+        self.info = info
+        self._file = file
+
+    @classmethod
+    def load(cls, path: str | Path) -> Run:
+        """Open the run in folder `path` for reading, also while it is written.
+
+        Raises:
+            RunFolderError: not a run folder, or its data cannot be read.
+        """
+        path = Path(path)
+        info = read_info(path)
+        file = path / DATA
+        if not file.exists():
+            raise RunFolderError(
+                f"{path} has no {DATA}: the run ended ({info['status']}) before the "
+                "first sample was stored."
+            )
+        try:
+            live = info["status"] == "running" and is_live(path)
+            opened = open_data(file, live=live)
+            try:
+                opened.attrs["schema"], opened["events"]  # the last that was declared
+            except BaseException:
+                opened.close()
+                raise
+        except (OSError, KeyError, RuntimeError) as error:
+            raise RunFolderError(
+                f"{file} cannot be read: {error}. A run that was cut short before its "
+                "first sample has nothing to read; else `tactile-lab verify` says "
+                "where the file is damaged."
+            ) from error
+        return cls(path, info, opened)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def refresh(self) -> None:
+        """See what a living writer has added since."""
+        self.info = read_info(self.path)
+
+        def renew(name: str, node: Any) -> None:
+            if isinstance(node, h5py.Dataset):
+                node.refresh()
+
+        self._file.visititems(renew)
+
+    @property
+    def status(self) -> str:
+        """Running, complete, aborted, faulted or recovered."""
+        return str(self.info["status"])
+
+    @property
+    def simulated(self) -> bool:
+        """Whether physics was computed."""
+        return bool(self._file.attrs["simulated"])
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Calibration and other constants of the run."""
+        return dict(self._file.attrs)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals stored sample by sample."""
+        group = self._file.get("samples")
+        return () if group is None else tuple(group)
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel that all channels have, checksum included."""
+        lengths = [self.stored(name) for name in self.signals]
+        return min(lengths, default=0)
+
+    def signal(self, name: str) -> StoredSignal:
+        """A stored signal by name, such as "V_C1".
+
+        Raises:
+            RunFolderError: the run did not store it.
+        """
+        if name not in self.signals:
+            raise RunFolderError(
+                f"{self.path} stores no {name}; it stores "
+                f"{', '.join(self.signals) or 'no samples'}."
+            )
+        samples, _, pyramid = self.column(name)
+        return StoredSignal(name, samples, pyramid, self.samples, self.axis)
+
+    def column(self, name: str) -> tuple[h5py.Dataset, h5py.Dataset, h5py.Dataset]:
+        """Datasets of one channel as stored: samples, checks, pyramid."""
+        kinds = ("samples", "checks", "pyramid")
+        samples, checks, pyramid = (self._file[f"{kind}/{name}"] for kind in kinds)
+        return samples, checks, pyramid
+
+    @property
+    def axis(self) -> Axis:
+        """Where stored samples lie in time."""
+        rows = self.records("segments")
+        return Axis(
+            rows["first"].copy(),
+            rows["time"].copy(),
+            rows["interval"] * (1.0 + rows["drift"]),
+        )
+
+    @property
+    def duration(self) -> float:
+        """End of the newest sample, trial or reading, s on the run's axis."""
+        ends = [0.0]
+        if self.samples:
+            ends.append(float(self.axis.time_of(float(self.samples))))
+        for name, column in (("trials", "end"), ("current", "time")):
+            rows = self.records(name)[column]
+            if rows.size:
+                ends.append(float(rows[-1]))
+        return max(ends)
+
+    def records(self, name: str) -> Records:
+        """A table of fixed records by name; see `layout.RECORDS` for its fields."""
+        rows: Records = self._file[name][()]
+        return rows
+
+    def table_attributes(self, name: str) -> dict[str, Any]:
+        """Units and settings stored with a table."""
+        return dict(self._file[name].attrs)
+
+    @property
+    def spikes(self) -> Records:
+        """Detected spikes: sample, time (s), amplitude (SI), width (s)."""
+        rows = self.records("spikes")
+        attrs = self._file["spikes"].attrs
+        kind = np.dtype([(n, "f8") for n in ("sample", "time", "amplitude", "width")])
+        spikes = np.empty(rows.size, kind)
+        axis = self.axis
+        spikes["sample"] = rows["sample"]
+        spikes["time"] = rows["time"]
+        if axis.first.size:
+            spikes["time"] = axis.time_of(rows["sample"])
+        gain, offset = attrs.get("gain", np.nan), attrs.get("offset", np.nan)
+        if attrs.get("kind") == "reset":
+            gain, offset = 2 * gain, 0.0  # half the fall is stored, see ResetDetector
+        spikes["amplitude"] = rows["amplitude"] * gain + offset
+        step = axis.step[0] if axis.step.size else np.nan
+        spikes["width"] = rows["width"] * step
+        return spikes
+
+    @property
+    def detection(self) -> Detection | None:
+        """How spikes were detected; None where nothing was searched."""
+        attrs = self._file["spikes"].attrs
+        if "signal" not in attrs:
+            return None
+        return Detection(
+            signal=str(attrs["signal"]),
+            threshold=int(attrs["threshold"]),
+            hysteresis=int(attrs["hysteresis"]),
+            refractory=int(attrs["refractory"]),
+            polarity=1 if attrs["polarity"] > 0 else -1,
+            kind="reset" if attrs["kind"] == "reset" else "crossing",
+            span=int(attrs["span"]),
+        )
+
+    @property
+    def trials(self) -> Records:
+        """Trials: index, start, end (s), level (N), hold, spikes, label (bytes)."""
+        return self.records("trials")
+
+    @property
+    def current(self) -> Records:
+        """Applied current: time (s), setpoint and measured (A; NaN where not read)."""
+        return self.records("current")
+
+    @property
+    def field(self) -> Records:
+        """Teslameter readings: time (s), field (T)."""
+        return self.records("field")
+
+    @property
+    def events(self) -> Records:
+        """What happened: time (s), kind and text (bytes, UTF-8)."""
+        return self.records("events")
+
+    def to_xarray(self, start: float = 0.0, end: float | None = None) -> xarray.Dataset:
+        """Signals from `start` to `end` s as an xarray dataset (reads them).
+
+        Raises:
+            RunFolderError: xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise RunFolderError(
+                "xarray is not installed; `pip install xarray`, or use run.signal()."
+            ) from error
+        arrays = {}
+        for name in self.signals:
+            signal = self.signal(name)
+            part = signal.between(start, end)
+            time = signal.time(part.start, part.stop)
+            attrs = {"units": signal.unit, "long_name": signal.title}
+            arrays[name] = xarray.DataArray(
+                signal[part], {"time": time}, ("time",), attrs=attrs
+            )
+        dataset = xarray.Dataset(arrays)
+        if arrays:
+            dataset["time"].attrs["units"] = "s"
+        simulated = int(self.simulated)
+        dataset.attrs.update(run=self.path.name, simulated=simulated)
+        return dataset
+
+    def stored(self, name: str) -> int:
+        """Samples of one channel that have a checksum."""
+        samples, checks, _ = self.column(name)
+        checked = int(checks["samples"].sum(dtype=np.int64))
+        return min(checked, int(samples.shape[0]))

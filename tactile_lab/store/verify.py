@@ -1,0 +1,238 @@
+"""Looks for damage in a run: every chunk, checksum, counter and spike."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.quantity import show
+from tactile_lab.store.certificate import (
+    Certificate,
+    certify,
+    redetect,
+    searched_is_stored,
+    unmatched,
+)
+from tactile_lab.store.columns import pyramid_of
+from tactile_lab.store.folder import DATA, INFO, digest, is_live, read_info
+from tactile_lab.store.layout import BIN, RECORDS
+from tactile_lab.store.opening import missing_bytes
+from tactile_lab.store.run import Run
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is not as it was written.
+
+    Attributes:
+        where: file, dataset and place in it.
+        what: what is wrong, for a person.
+    """
+
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `verify` found.
+
+    Attributes:
+        findings: damage, located; empty for a sound run.
+        certificate: loss; None where the data cannot be read far enough.
+        notes: what a person should know that is no damage.
+    """
+
+    findings: tuple[Finding, ...]
+    certificate: Certificate | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def sound(self) -> bool:
+        """No damage was found."""
+        return not self.findings
+
+
+def verify(path: Path) -> Verdict:
+    """Check the run in folder `path`, reading all of it; changes nothing."""
+    try:
+        info = read_info(path)
+    except RunFolderError as error:
+        return Verdict((Finding(INFO, str(error)),), None)
+    findings, notes = [], []
+    if info["status"] == "running":
+        if is_live(path):
+            notes.append("the run is still being written; what is there was checked")
+        else:
+            findings.append(
+                Finding(INFO, "the run was cut short; `tactile-lab recover` it")
+            )
+    findings += _files(path, info)
+    if not (path / DATA).exists():
+        if info.get("samples"):
+            findings.append(Finding(DATA, "the file is missing"))
+        notes.append("the run stored no samples")
+        return Verdict(tuple(findings), None, tuple(notes))
+    lacking = missing_bytes(path / DATA)
+    if lacking:
+        findings.append(Finding(DATA, f"{lacking} bytes are missing at the end"))
+    try:
+        run = Run.load(path)
+    except RunFolderError as error:
+        return Verdict((*findings, Finding(DATA, str(error))), None, tuple(notes))
+    certificate = None
+    with run:
+        try:
+            findings += _tables(run)
+            for name in run.signals:
+                findings += _channel(run, name)
+            if not any(finding.where.startswith(DATA) for finding in findings):
+                findings += _counters(run)
+                certificate = certify(run)
+                # the spikes of a cut-short run lag behind its samples
+                if certificate.differing and info["status"] != "running":
+                    findings += _spikes(run)
+        except (OSError, KeyError, RuntimeError, ValueError) as error:
+            findings.append(
+                Finding(DATA, f"its structure is damaged ({_brief(error)})")
+            )
+    return Verdict(tuple(findings), certificate, tuple(notes))
+
+
+def _files(path: Path, info: dict[str, Any]) -> Iterator[Finding]:
+    """Files beside the data that are missing or not as they were written."""
+    for name, wanted in (info.get("files") or {}).items():
+        try:
+            data = (path / name).read_bytes()
+        except OSError as error:
+            yield Finding(name, f"cannot be read ({error.strerror})")
+            continue
+        if digest(data) != wanted:
+            yield Finding(name, "was changed after the run (SHA-256 differs)")
+
+
+def _tables(run: Run) -> Iterator[Finding]:
+    """Tables that cannot be read; their checksums are HDF5's own."""
+    for name in RECORDS:
+        try:
+            run.records(name)
+        except (OSError, KeyError, RuntimeError) as error:
+            yield Finding(f"{DATA} /{name}", f"cannot be read ({_brief(error)})")
+
+
+def _channel(run: Run, name: str) -> Iterator[Finding]:
+    """Chunks of one channel that are missing, unreadable or not as written."""
+    place = f"{DATA} /samples/{name}"
+    try:
+        samples, checks, pyramid = run.column(name)
+        written = checks[()]
+    except (OSError, KeyError, RuntimeError) as error:
+        yield Finding(place, f"cannot be read ({_brief(error)})")
+        return
+    size = samples.chunks[0]
+    if run.status == "running":
+        written = written[:-1]  # its writer may be, or may have died, in the last chunk
+    stored = int(written["samples"].sum(dtype=np.int64))
+    if stored != samples.shape[0] and run.status != "running":
+        yield Finding(
+            place, f"{samples.shape[0]} samples are stored but {stored} have checksums"
+        )
+    sound = True
+    for number, (count, crc) in enumerate(written.tolist()):
+        first = number * size
+        what = _chunk(samples, first, count, crc)
+        if what is not None:
+            sound = False
+            yield Finding(f"{place}[{first}:{first + count}]", what + _when(run, first))
+    if not sound:
+        return
+    try:
+        bins = pyramid[()]
+    except (OSError, RuntimeError) as error:
+        yield Finding(f"{DATA} /pyramid/{name}", f"cannot be read ({_brief(error)})")
+        return
+    for number, count in enumerate(written["samples"].tolist()):
+        first = number * size
+        codes = samples[first : first + count]
+        part = bins[first // BIN : -(-(first + count) // BIN)]
+        if run.status == "running" and first // BIN + part.size == bins.size:
+            break  # its writer holds back, or has lost, the newest
+        if not np.array_equal(part, pyramid_of(codes)):
+            yield Finding(
+                f"{DATA} /pyramid/{name}",
+                f"does not fit samples {first} to {first + count - 1}",
+            )
+
+
+def _chunk(samples: h5py.Dataset, first: int, count: int, crc: int) -> str | None:
+    """What is wrong with one chunk; None if it is sound."""
+    try:
+        info = samples.id.get_chunk_info_by_coord((first,))
+    except (OSError, RuntimeError, ValueError) as error:
+        return f"the chunk's place is not known ({_brief(error)})"
+    if info.byte_offset is None:
+        return "the chunk is missing"
+    try:
+        codes = samples[first : first + count]
+    except (OSError, RuntimeError) as error:
+        return f"the chunk cannot be decompressed ({_brief(error)})"
+    if zlib.crc32(codes.data) != crc:
+        return "the samples are not those that were written (CRC-32 differs)"
+    return None
+
+
+def _when(run: Run, sample: int) -> str:
+    """When a sample was taken, where the table that tells it can be read."""
+    try:
+        axis = run.axis
+    except OSError:
+        return ""
+    if axis.first.size == 0:
+        return ""
+    return f", from {show(float(axis.time_of(float(sample))), 's', 6)} on"
+
+
+def _counters(run: Run) -> Iterator[Finding]:
+    """Counters in `run.json` that do not fit the file."""
+    for name, counters in (run.info.get("samples") or {}).items():
+        written = counters.get("written")
+        if name in run.signals and written != run.stored(name):
+            yield Finding(
+                f"{INFO} samples.{name}",
+                f"says {written} samples were written; {DATA} has {run.stored(name)}",
+            )
+    online = run.info.get("spikes_online")
+    if online is not None and online != run.records("spikes").size:
+        yield Finding(
+            f"{INFO} spikes_online",
+            f"says {online} spikes; {DATA} has {run.records('spikes').size}",
+        )
+
+
+def _spikes(run: Run) -> Iterator[Finding]:
+    """Spikes that are stored but not in the samples, or the other way round."""
+    assert searched_is_stored(run)
+    odd = unmatched(run.records("spikes")["sample"], redetect(run)["sample"])
+    for sample in odd[:10]:
+        yield Finding(
+            f"{DATA} /spikes",
+            f"stored and found again differ at sample {sample:.3f}"
+            + _when(run, int(sample)),
+        )
+    if odd.size > 10:
+        yield Finding(f"{DATA} /spikes", f"and at {odd.size - 10} more")
+
+
+def _brief(error: Exception) -> str:
+    """The first sentence of what a library says."""
+    return str(error).strip("'\"").split("\n")[0][:120]

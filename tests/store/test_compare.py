@@ -1,0 +1,45 @@
+"""Two runs are compared by what they ran on, with, and what came out."""
+
+import pytest
+
+from tactile_lab.store.compare import differences
+from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.layout import Layout
+from tactile_lab.store.recorder import Recorder
+
+
+@pytest.fixture
+def make(bench, tmp_path):
+    def made(*, seed=1, environment=None, gain=0.2, hold="2 s"):
+        info = {"environment": environment or {"numpy": "2.0"}, "seed": seed}
+        folder = RunFolder.create(tmp_path, "pulses", info)
+        folder.write_text("scene.toml", f'[protocol]\nhold = "{hold}"\n')
+        layout = Layout(
+            signals=bench.SIGNALS,
+            detection=bench.DETECTION,
+            simulated=True,
+            attributes={"newtons_per_ampere": gain},
+        )
+        recorder = Recorder(folder, layout, reserve=0)
+        bench.play(recorder, bench.codes(3000, seed), 500)
+        recorder.close("complete", 3000)
+        return folder.path
+
+    return made
+
+
+def test_the_same_again_is_the_same(make):
+    found = differences(make(), make())
+    assert str(found).count("the same") == 3
+
+
+def test_each_kind_of_difference_is_named(make):
+    old = make()
+    new = make(seed=2, environment={"numpy": "2.1"}, gain=0.1, hold="3 s")
+    found = differences(old, new)
+    assert "numpy was 2.0, is 2.1" in found.environment
+    assert "seed was 1, is 2" in found.environment
+    assert "newtons_per_ampere was 0.2, is 0.1" in found.calibration
+    assert 'scene +hold = "3 s"' in found.calibration
+    assert "the samples of V_K are not identical" in found.results
+    assert any("spike times differ by up to" in line for line in found.results)

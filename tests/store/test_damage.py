@@ -1,0 +1,279 @@
+"""Damage is found and located; what a crash cut short is made whole again."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.certificate import write_certificate
+from tactile_lab.store.recover import recover
+from tactile_lab.store.run import Run
+from tactile_lab.store.verify import verify
+
+WRITER = Path(__file__).with_name("killed_writer.py")
+
+
+@pytest.fixture
+def complete(bench, recorder, folder):
+    """A sound run of 5 chunks of 1024 samples, the last one short."""
+    bench.play(recorder, bench.codes(5000), 500)
+    recorder.current(1.0, 0.5, 0.5)
+    recorder.close("complete", 5000)
+    write_certificate(folder.path)
+    return folder.path
+
+
+def place(path, dataset, chunk):
+    """(offset, size) of a chunk in the file."""
+    with h5py.File(path / "data.h5") as file:
+        info = file[dataset].id.get_chunk_info(chunk)
+    return info.byte_offset, info.size
+
+
+def damage(path, offset, flip=0x10):
+    data = bytearray((path / "data.h5").read_bytes())
+    data[offset] ^= flip
+    (path / "data.h5").write_bytes(data)
+
+
+def test_sound_run_has_nothing_lost(complete):
+    verdict = verify(complete)
+    assert verdict.sound
+    assert str(verdict.certificate) == "loss: 0 of 10000 samples, 0 of 7 spikes"
+    loss = json.loads((complete / "run.json").read_text())["loss"]
+    assert (loss["samples"], loss["spikes"]) == (0, 0)
+
+
+@pytest.mark.parametrize("chunk", [0, 2, 4])
+@pytest.mark.parametrize("where", [0, 0.25, 0.5])
+def test_a_flipped_bit_is_located(complete, chunk, where):
+    offset, size = place(complete, "samples/V_K", chunk)
+    damage(complete, offset + int(where * size))
+    verdict = verify(complete)
+    first = chunk * 1024
+    assert [f.where for f in verdict.findings] == [
+        f"data.h5 /samples/V_K[{first}:{min(first + 1024, 5000)}]"
+    ]
+
+
+@pytest.mark.parametrize("table", ["spikes", "current", "segments"])
+def test_a_flipped_bit_in_a_table_is_located(complete, table):
+    offset, _ = place(complete, table, 0)
+    damage(complete, offset + 3)
+    verdict = verify(complete)
+    assert f"data.h5 /{table}" in [f.where for f in verdict.findings]
+
+
+def test_a_truncated_file_is_found(complete):
+    data = (complete / "data.h5").read_bytes()
+    (complete / "data.h5").write_bytes(data[: len(data) // 2])
+    verdict = verify(complete)
+    assert not verdict.sound
+    assert verdict.findings[0].where == "data.h5"
+    assert "bytes are missing at the end" in verdict.findings[0].what
+    assert any("/samples/" in finding.where for finding in verdict.findings)
+
+
+def test_a_missing_chunk_is_located(complete):
+    with h5py.File(complete / "data.h5", "r+") as file:
+        old = file["samples/V_K"]
+        codes, attrs = old[:], dict(old.attrs)
+        del file["samples/V_K"]
+        new = file.create_dataset(
+            "samples/V_K", (5000,), "i1", chunks=(1024,), maxshape=(None,)
+        )
+        new.attrs.update(attrs)
+        for first in (0, 1024, 3072, 4096):
+            new[first : first + 1024] = codes[first : first + 1024]
+    verdict = verify(complete)
+    (finding,) = verdict.findings
+    assert finding.where == "data.h5 /samples/V_K[2048:3072]"
+    assert "missing" in finding.what
+    assert "2.048 s" in finding.what
+
+
+def test_a_missing_file_and_a_wrong_counter_are_found(complete):
+    info = json.loads((complete / "run.json").read_text())
+    info["samples"]["V_K"]["written"] = 4999
+    (complete / "run.json").write_text(json.dumps(info))
+    assert "4999" in str(verify(complete).findings[0])
+    (complete / "data.h5").unlink()
+    assert verify(complete).findings[0].where == "data.h5"
+
+
+def test_a_changed_scene_is_found(bench, recorder, folder):
+    folder.write_text("scene.toml", "[protocol]\n")
+    bench.play(recorder, bench.codes(2000), 500)
+    recorder.close("complete", 2000)
+    assert verify(folder.path).sound
+    (folder.path / "scene.toml").write_text("[protocol]\nhold = 1\n")
+    verdict = verify(folder.path)
+    assert [finding.where for finding in verdict.findings] == ["scene.toml"]
+    assert verdict.certificate.clean
+    (folder.path / "scene.toml").unlink()
+    assert "cannot be read" in verify(folder.path).findings[0].what
+
+
+def test_a_spike_that_is_not_in_the_samples_is_named(complete):
+    with h5py.File(complete / "data.h5", "r+") as file:
+        file["spikes"][2, "sample"] = 1234.5
+    verdict = verify(complete)
+    assert verdict.certificate.differing == 2
+    assert "sample 1234.500" in str(verdict.findings[0])
+
+
+def test_spikes_cannot_be_checked_where_v_k_is_not_stored(bench, folder, tmp_path):
+    from tactile_lab.store.layout import Layout
+    from tactile_lab.store.recorder import Recorder
+
+    layout = Layout(signals=("V_C1",), detection=bench.DETECTION, simulated=True)
+    recorder = Recorder(folder, layout, reserve=0)
+    bench.play(recorder, bench.codes(3000), 500)
+    recorder.close("complete", 3000)
+    certificate = write_certificate(folder.path)
+    assert certificate.spikes is None
+    assert "not possible to check" in str(certificate)
+
+
+def test_samples_the_scope_made_but_nobody_stored_are_counted(bench, recorder, folder):
+    bench.play(recorder, bench.codes(5000), 500)
+    recorder.close("faulted", 5500)
+    assert write_certificate(folder.path).samples == 1000
+
+
+def killed(root, *, after, samples=200_000, block=1024):
+    """Path and acknowledged samples of a run whose writer was killed."""
+    command = [sys.executable, str(WRITER), str(root), str(samples), str(block)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
+        assert writer.stdout is not None
+        path = Path(writer.stdout.readline().strip())
+        acknowledged = 0
+        while acknowledged < after:
+            acknowledged = int(writer.stdout.readline())
+        os.kill(writer.pid, signal.SIGKILL)
+        rest = writer.stdout.read().split("\n")
+        acknowledged = max([acknowledged, *(int(x) for x in rest[:-1] if x)])
+    return path, acknowledged
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+@pytest.mark.parametrize("after", [1024, 9 * 1024, 60 * 1024])
+def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, tmp_path, after):
+    path, acknowledged = killed(tmp_path, after=after)
+    made = bench.codes(200_000)
+    with Run.load(path) as run:
+        assert run.status == "running"
+        assert run.samples >= acknowledged - 1024
+        stored = run.signal("V_K").scope_codes(0, run.samples)
+        np.testing.assert_array_equal(stored, made[1, : run.samples])
+    assert not verify(path).sound
+    recovery = recover(path)
+    assert recovery.samples >= acknowledged - 1024
+    with h5py.File(path / "data.h5", "r") as plain:
+        assert plain["samples/V_K"].shape[0] == recovery.samples
+    verdict = verify(path)
+    assert verdict.sound, verdict.findings
+    with Run.load(path) as run:
+        assert run.status == "recovered"
+        spikes = np.arange(701, run.samples, 701)
+        assert abs(run.spikes.size - spikes.size) <= 1
+        np.testing.assert_array_equal(
+            np.ceil(run.spikes["sample"][: spikes.size - 1]), spikes[:-1]
+        )
+        signal_ = run.signal("V_C1")
+        picture = signal_.envelope(cells=3)
+        assert picture.high.max() == signal_[:].max()
+    with pytest.raises(RunFolderError, match="not cut short"):
+        recover(path)
+
+
+def test_a_living_run_is_left_alone(bench, recorder, folder):
+    bench.play(recorder, bench.codes(5000), 500)
+    with pytest.raises(RunFolderError, match="still being recorded"):
+        recover(folder.path)
+    verdict = verify(folder.path)
+    assert verdict.sound, verdict.findings
+    assert "still being written" in verdict.notes[0]
+    recorder.close("complete", 5000)
+
+
+def test_a_reader_sees_samples_while_they_are_written(bench, recorder, folder):
+    made = bench.codes(9000)
+    recorder.segment(bench.stream(), 0.0)
+    recorder.append(bench.block(made, 0, 3000))
+    with Run.load(folder.path) as run:
+        before = run.samples
+        assert before == 2048
+        recorder.append(bench.block(made, 3000, 6000))
+        run.refresh()
+        assert run.samples == 8192
+        np.testing.assert_array_equal(
+            run.signal("V_K").scope_codes(0, 8192), made[1, :8192]
+        )
+        recorder.close("complete", 9000)
+        run.refresh()
+        assert (run.samples, run.status) == (9000, "complete")
+
+
+def test_a_quiet_stream_reaches_the_disk_within_the_cadence(bench, recorder, folder):
+    made = bench.codes(600)
+    recorder.segment(bench.stream(), 0.0)
+    recorder.append(bench.block(made, 0, 300))
+    time.sleep(0.6)
+    recorder.append(bench.block(made, 300, 10))
+    with Run.load(folder.path) as run:
+        assert run.samples == 310
+    recorder.append(bench.block(made, 310, 290))
+    recorder.close("complete", 600)
+    assert verify(folder.path).sound
+
+
+@pytest.mark.parametrize("size", [0, 48, 700])
+def test_a_run_killed_before_its_first_sample_is_closed(
+    bench, complete, tmp_path, size
+):
+    from tactile_lab.store.folder import RunFolder
+
+    data = bytearray((complete / "data.h5").read_bytes()[:size])
+    if data:
+        data[11] = 5  # HDF5's mark of a file that is open for writing with SWMR
+    folder = RunFolder.create(tmp_path, "early", {})
+    folder._log.close()  # what the kernel does when the process dies
+    (folder.path / "data.h5").write_bytes(data)
+    with pytest.raises(RunFolderError, match="cut short before its first sample"):
+        Run.load(folder.path)
+    assert recover(folder.path).samples == 0
+    verdict = verify(folder.path)
+    assert verdict.sound, verdict.findings
+    assert json.loads((folder.path / "run.json").read_text())["status"] == "recovered"
+
+
+def test_any_flipped_bit_is_found_or_harmless(bench, complete):
+    """Seeded sample; where `verify` finds nothing, every number must be as written."""
+    sound = (complete / "data.h5").read_bytes()
+    with Run.load(complete) as run:
+        tables = {name: run.records(name).tobytes() for name in ("spikes", "segments")}
+    made = bench.codes(5000)
+    flips = np.random.default_rng(6)
+    for at, bit in zip(
+        flips.integers(0, len(sound), 40), flips.integers(0, 8, 40), strict=True
+    ):
+        data = bytearray(sound)
+        data[at] ^= 1 << int(bit)
+        (complete / "data.h5").write_bytes(data)
+        if not verify(complete).sound:
+            continue
+        with Run.load(complete) as run:
+            for row, name in enumerate(bench.SIGNALS):
+                stored = run.signal(name).scope_codes(0, 5000)
+                np.testing.assert_array_equal(stored, made[row])
+            for name, content in tables.items():
+                assert run.records(name).tobytes() == content

@@ -1,0 +1,126 @@
+"""Exports hold the run's numbers, in units other programs expect."""
+
+import csv
+import sys
+
+import numpy as np
+import pytest
+import scipy.io
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.export import csv as to_csv
+from tactile_lab.store.export import mat as to_mat
+from tactile_lab.store.export.selection import Selection
+from tactile_lab.store.run import Run
+from tactile_lab.trial import Outcome, Trial
+from tactile_lab.waveform import Waveform
+
+
+@pytest.fixture
+def run(bench, recorder, folder):
+    """Two stretches of 3000 samples at 1 kS/s, the second from 53 s on."""
+    made = bench.codes(3000)
+    bench.play(recorder, made, 500)
+    recorder.pause(3.0, 53.0)
+    bench.play(recorder, made, 500, start=53.0, source=bench.stream(started=63.0))
+    recorder.current(0.5, 0.25, 0.24)
+    recorder.current(54.0, 0.5, None)
+    recorder.field(0.6, 11e-3)
+    trial = Trial(force=Waveform.pulse(0.12, ramp=0.25, hold=2.0), label='the "120"')
+    nothing = np.empty(0)
+    recorder.outcome(
+        Outcome(trial=trial, index=0, start=0.1, spike_times=nothing, current=nothing)
+    )
+    recorder.close("complete", 6000)
+    with Run.load(folder.path) as loaded:
+        yield loaded
+
+
+def rows(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.reader(file))
+
+
+def test_csv_has_units_in_its_header_and_si_values(run, tmp_path):
+    files = to_csv.export(run, tmp_path / "csv", Selection())
+    names = {file.name for file in files}
+    assert names == {
+        "signals.csv", "spikes.csv", "current.csv", "field.csv", "trials.csv"
+    }  # fmt: skip
+    head, *body = rows(tmp_path / "csv" / "signals.csv")
+    assert head == ["time_s", "V_C1_V", "V_K_V"]
+    table = np.array(body, dtype=float)
+    np.testing.assert_allclose(table[:, 2], run.signal("V_K")[:], rtol=1e-9)
+    np.testing.assert_allclose(table[[0, 2999, 3000], 0], [0, 2.999, 53.0])
+    head, *body = rows(tmp_path / "csv" / "spikes.csv")
+    assert head == ["time_s", "amplitude_V", "width_s"]
+    np.testing.assert_allclose([float(x[0]) for x in body], run.spikes["time"])
+    assert rows(tmp_path / "csv" / "trials.csv")[1][1] == 'the "120"'
+
+
+def test_a_part_at_a_lower_rate_is_averaged_and_keeps_gaps_apart(run, tmp_path):
+    part = Selection(signals=("V_C1",), start=2.5, end=53.5, rate=100.0)
+    to_csv.export(run, tmp_path, part)
+    head, *body = rows(tmp_path / "signals.csv")
+    assert head == ["time_s", "V_C1_V"]
+    table = np.array(body, dtype=float)
+    assert table.shape == (100, 2)
+    volts = run.signal("V_C1")[2500:3500].reshape(100, 10).mean(axis=1)
+    np.testing.assert_allclose(table[:, 1], volts, rtol=1e-9)
+    np.testing.assert_allclose(table[[0, 49, 50], 0], [2.5045, 2.9945, 53.0045])
+
+
+def test_matlab_reads_names_units_and_values(run, tmp_path):
+    to_mat.export(run, tmp_path / "run.mat", Selection())
+    content = scipy.io.loadmat(tmp_path / "run.mat", simplify_cells=True)
+    np.testing.assert_allclose(
+        content["V_K"]["values"], run.signal("V_K")[:], rtol=1e-6
+    )
+    assert content["V_K"]["unit"] == "V"
+    np.testing.assert_allclose(content["time"][3000], 53.0)
+    np.testing.assert_allclose(content["spikes"]["time"], run.spikes["time"])
+    np.testing.assert_allclose(content["current"]["setpoint"], [0.25, 0.5])
+
+
+def test_impossible_parts_are_refused(run, tmp_path):
+    with pytest.raises(RunFolderError, match="stores no V_C2"):
+        to_csv.export(run, tmp_path, Selection(signals=("V_C2",)))
+    with pytest.raises(RunFolderError, match="1000 S/s; it cannot"):
+        to_csv.export(run, tmp_path, Selection(rate=1e6))
+
+
+def test_nwb_passes_its_inspector_with_spikes_in_seconds(run, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    inspector = pytest.importorskip("nwbinspector")
+    from tactile_lab.store.export import nwb
+
+    file = tmp_path / "run.nwb"
+    nwb.export(run, file, Selection())
+    with pynwb.NWBHDF5IO(str(file), "r") as reader:
+        session = reader.read()
+        np.testing.assert_allclose(
+            session.units["spike_times"][0], run.spikes["time"], rtol=1e-12
+        )
+        series = session.acquisition["V_K_2"]
+        assert series.starting_time == pytest.approx(53.0)
+        volts = series.data[:] * series.conversion + series.offset
+        np.testing.assert_allclose(volts, run.signal("V_K")[3000:6000])
+        assert series.unit == "volts"
+        assert session.trials["label"][0] == 'the "120"'
+    messages = list(inspector.inspect_nwbfile(nwbfile_path=file))
+    severe = [
+        m
+        for m in messages
+        # a sensor has no species
+        if m.check_function_name != "check_subject_species_exists"
+        and m.importance.value >= inspector.Importance.BEST_PRACTICE_VIOLATION.value
+    ]
+    assert not severe, severe
+
+
+def test_nwb_without_pynwb_says_what_to_install(run, tmp_path, monkeypatch):
+    from tactile_lab.store.export import nwb
+
+    monkeypatch.setitem(sys.modules, "pynwb", None)
+    with pytest.raises(RunFolderError, match="pip install pynwb"):
+        nwb.export(run, tmp_path / "run.nwb", Selection())
