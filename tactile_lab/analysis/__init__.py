@@ -1,0 +1,1 @@
+"""What the data say: adaptation, transfer curve, rate against force, twin."""

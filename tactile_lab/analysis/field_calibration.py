@@ -1,0 +1,232 @@
+"""From teslameter readings on both branches to a dated, hashed calibration file."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.errors import NotIdentifiableError, SceneError
+from tactile_lab.quantity import show
+
+FloatArray = NDArray[np.float64]
+
+WIDEST_LOOP = 0.05
+"""Half-width of the loop over the largest field that is accepted without asking."""
+HEADER = "current_A,field_T"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldStep:
+    """The field on one step of one branch.
+
+    Attributes:
+        branch: "rising" or "falling".
+        current: applied, as measured, A.
+        field: mean of the readings, T.
+        error: standard error of that mean, T.
+    """
+
+    branch: Literal["rising", "falling"]
+    current: float
+    field: float
+    error: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FieldCalibration:
+    """B2(I) of the electromagnet.
+
+    Attributes:
+        current: shape (n,), A, increasing.
+        field: shape (n,), mean of both branches, T.
+        half_width: half the distance between the branches at 0 A, T.
+        half_width_current: the same along the current, A.
+        slope: T/A.
+        offset: of the straight line at 0 A, T.
+        residual: standard deviation of the mean curve about the line, T.
+        uncertainty: half of the 95 % band of one field value, hysteresis included, T.
+        warnings: what to look at before it is used.
+    """
+
+    current: FloatArray
+    field: FloatArray
+    half_width: float
+    half_width_current: float
+    slope: Estimate
+    offset: Estimate
+    residual: float
+    uncertainty: float
+    warnings: tuple[str, ...]
+
+
+def fit_field(steps: Sequence[FieldStep]) -> FieldCalibration:
+    """Fit both branches with one slope and a loop between them.
+
+    Raises:
+        NotIdentifiableError: a branch is missing or has fewer than 5 steps, the
+            branches do not cover 0 A, or the field does not follow the current.
+    """
+    falling = _branch(steps, "falling")
+    rising = _branch(steps, "rising")
+    low = max(falling[0].min(), rising[0].min())
+    high = min(falling[0].max(), rising[0].max())
+    if not low <= 0 <= high:
+        raise NotIdentifiableError("the branches do not both cover 0 A")
+    current = np.unique(
+        np.round(np.concatenate([falling[0], rising[0], [low, 0.0, high]]), 4)
+    )
+    current = _apart(current[(current >= low) & (current <= high)])
+    upper = np.interp(current, *falling)
+    lower = np.interp(current, *rising)
+    field = (upper + lower) / 2
+    freedom = current.size - 2
+    centre = current.mean()
+    spread = np.sum((current - centre) ** 2)
+    slope = float(np.sum((current - centre) * field) / spread)
+    line = field.mean() + slope * (current - centre)
+    residual = float(np.sqrt(np.sum((field - line) ** 2) / freedom))
+    at_zero = field.mean() - slope * centre
+    if slope == 0 or abs(slope) * (high - low) < 4 * residual:
+        raise NotIdentifiableError("the field does not follow the current")
+    half_width = abs(float(np.interp(0.0, current, (upper - lower) / 2)))
+    noise = float(np.sqrt(np.mean([step.error**2 for step in steps])))
+    warnings = []
+    full = float(np.max(np.abs(field)))
+    if half_width > WIDEST_LOOP * full:
+        warnings.append(
+            f"the loop is {show(half_width, 'T', 3)} wide to either side, "
+            f"{100 * half_width / full:.0f} % of full scale (5 % is usual): "
+            "demagnetise again, and approach each force from the same side"
+        )
+    if np.any(np.diff(field) * slope <= 0):
+        warnings.append("the mean curve is not monotonic: read longer on each step")
+    return FieldCalibration(
+        current=current,
+        field=field,
+        half_width=half_width,
+        half_width_current=half_width / abs(slope),
+        slope=Estimate.of(slope, residual / np.sqrt(spread), freedom),
+        offset=Estimate.of(
+            at_zero, residual * np.sqrt(1 / current.size + centre**2 / spread), freedom
+        ),
+        residual=residual,
+        uncertainty=float(np.hypot(2 * noise, half_width)),
+        warnings=tuple(warnings),
+    )
+
+
+def _branch(steps: Sequence[FieldStep], name: str) -> tuple[FloatArray, FloatArray]:
+    found = sorted((s.current, s.field) for s in steps if s.branch == name)
+    if len(found) < 5:
+        raise NotIdentifiableError(
+            f"the {name} branch has {len(found)} steps, 5 are needed"
+        )
+    values = np.array(found)
+    return values[:, 0], values[:, 1]
+
+
+def _apart(current: FloatArray) -> FloatArray:
+    """Without currents that differ by read-back noise only; 0 A always stays."""
+    nearest = 0.2 * (current[-1] - current[0]) / current.size
+    kept = [0.0]
+    for value in current[np.argsort(np.abs(current))]:
+        if min(abs(value - other) for other in kept) > nearest:
+            kept.append(float(value))
+    return np.array(sorted(kept))
+
+
+def write_calibration(
+    path: Path,
+    calibration: FieldCalibration,
+    *,
+    coil: str,
+    date: datetime.date,
+    valid_days: int = 180,
+) -> Path:
+    """Write the file a bench's ``[magnet] calibration`` names; never over another.
+
+    Args:
+        path: ends in .csv.
+        calibration: what to write.
+        coil: the coil or source it belongs to, as the bench names it.
+        date: day of the measurement.
+        valid_days: after so many days it has expired.
+
+    Raises:
+        SceneError: the file exists, or cannot be written.
+    """
+    rows = "\n".join(
+        f"{i:.6g},{b:.9g}"
+        for i, b in zip(calibration.current, calibration.field, strict=True)
+    )
+    body = f"{HEADER}\n{rows}\n"
+    head = {
+        "coil": coil,
+        "date": date.isoformat(),
+        "valid until": (date + datetime.timedelta(days=valid_days)).isoformat(),
+        "slope T/A": f"{calibration.slope.value:.6g} ({calibration.slope.low:.6g} to "
+        f"{calibration.slope.high:.6g})",
+        "loop half-width T": f"{calibration.half_width:.3g}",
+        "uncertainty T (95 %)": f"{calibration.uncertainty:.3g}",
+        "sha256": hashlib.sha256(body.encode()).hexdigest(),
+    }
+    text = "".join(f"# {name}: {value}\n" for name, value in head.items()) + body
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+        path.chmod(0o444)
+    except FileExistsError as reason:
+        raise SceneError(
+            f"Calibration {path} exists; calibrations are never changed. Choose "
+            "another name."
+        ) from reason
+    except OSError as reason:
+        raise SceneError(
+            f"Calibration {path} cannot be written: {reason.strerror}."
+        ) from reason
+    return path
+
+
+def check_calibration(
+    path: Path, *, coil: str | None = None, today: datetime.date | None = None
+) -> dict[str, str]:
+    """The head of a calibration file, once it is found whole, valid and of that coil.
+
+    Raises:
+        SceneError: not written by `write_calibration`, changed since, expired, or of
+            another coil.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise SceneError(f"Calibration {path} cannot be read: {reason}.") from reason
+    lines = text.splitlines(keepends=True)
+    head = {
+        name.strip(): value.strip()
+        for line in lines
+        if line.startswith("# ")
+        for name, _, value in [line[2:].partition(":")]
+    }
+    body = "".join(line for line in lines if not line.startswith("#"))
+    if head.get("sha256") != hashlib.sha256(body.encode()).hexdigest():
+        raise SceneError(
+            f"Calibration {path} has no valid hash: it was changed or not written by "
+            "this program. Calibrate again."
+        )
+    if today is not None and today > datetime.date.fromisoformat(head["valid until"]):
+        raise SceneError(
+            f"Calibration {path} expired on {head['valid until']}. Calibrate again."
+        )
+    if coil is not None and coil != head["coil"]:
+        raise SceneError(
+            f"Calibration {path} belongs to the coil {head['coil']}, not to {coil}."
+        )
+    return head

@@ -1,0 +1,142 @@
+"""What a spike train says: intervals, rate, latency, adaptation.
+
+Times are seconds, rates hertz. The instantaneous rate at t is one over the interval of
+the last two spikes at or before t, and 0 before the second spike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_lab.errors import ParameterError
+
+FloatArray = NDArray[np.float64]
+
+SILENT_AFTER = 2.0
+"""A train has fallen silent when its last interval passed this many times over."""
+
+
+def intervals(spike_times: ArrayLike) -> FloatArray:
+    """Interspike intervals, shape (spikes - 1,), s, Eq. (12).
+
+    Raises:
+        ParameterError: times not finite or not strictly increasing.
+    """
+    return np.diff(_checked(spike_times))
+
+
+def rate(spike_times: ArrayLike, at: ArrayLike) -> FloatArray:
+    """Instantaneous rate at the times `at` (any shape, s), Hz, right-continuous."""
+    times = _checked(spike_times)
+    steps = np.zeros(times.size + 1)
+    steps[2:] = 1.0 / np.diff(times)
+    seen = np.searchsorted(times, np.asarray(at, dtype=np.float64), side="right")
+    values: FloatArray = steps[seen]
+    return values
+
+
+def adaptation_index(spike_times: ArrayLike) -> float | None:
+    """Mean of (ISI[i+1] - ISI[i]) / (ISI[i+1] + ISI[i]); None below three spikes.
+
+    0 for a regular train, positive where the train slows down, at most 1.
+    """
+    isi = intervals(spike_times)
+    if isi.size < 2:
+        return None
+    return float(np.mean(np.diff(isi) / (isi[1:] + isi[:-1])))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """How a sensor answered one stimulus; None where there are too few spikes.
+
+    Attributes:
+        spikes: number of spikes in the whole trial.
+        latency: from the stimulus's onset to the first spike after it, s.
+        peak_rate: highest instantaneous rate in the trial, Hz.
+        final_rate: rate of the last two spikes at or before the hold's end, Hz.
+        fall: from the highest rate within the hold to the final one, as a part of
+            the former: 0.4 for a fall by 40 %.
+        adaptation_index: of the spikes within the hold.
+        intervals: whole intervals within the hold.
+        silent: when firing stopped before the hold ended: the time of the last spike,
+            s from the trial's start. None while it still fired.
+    """
+
+    spikes: int
+    latency: float | None
+    peak_rate: float | None
+    final_rate: float | None
+    fall: float | None
+    adaptation_index: float | None
+    intervals: int
+    silent: float | None
+
+
+def respond(
+    spike_times: ArrayLike,
+    *,
+    onset: float = 0.0,
+    hold: tuple[float, float] | None = None,
+) -> Response:
+    """Describe one trial's spikes.
+
+    Args:
+        spike_times: s from the trial's start.
+        onset: when the stimulus begins, s.
+        hold: (start, end) of the constant part, s; None for the whole train.
+
+    Raises:
+        ParameterError: times not finite or not increasing.
+    """
+    times = _checked(spike_times)
+    after = times[times >= onset]
+    held = within(times, hold)
+    isi = np.diff(times)
+    held_rates = 1.0 / np.diff(held)
+    fall = None
+    if held_rates.size:
+        fall = float(1.0 - held_rates[-1] / held_rates.max())
+    return Response(
+        spikes=int(times.size),
+        latency=float(after[0] - onset) if after.size else None,
+        peak_rate=float(1.0 / isi.min()) if isi.size else None,
+        final_rate=float(held_rates[-1]) if held_rates.size else None,
+        fall=fall,
+        adaptation_index=adaptation_index(held),
+        intervals=int(held_rates.size),
+        silent=_silent_from(held, hold),
+    )
+
+
+def within(times: ArrayLike, hold: tuple[float, float] | None) -> FloatArray:
+    """The times in the closed interval `hold`; all of them where it is None."""
+    t = np.asarray(times, dtype=np.float64)
+    if hold is None:
+        return t
+    return t[(t >= hold[0]) & (t <= hold[1])]
+
+
+def _silent_from(held: FloatArray, hold: tuple[float, float] | None) -> float | None:
+    if hold is None or held.size < 2:
+        return None
+    last_interval = held[-1] - held[-2]
+    if hold[1] - held[-1] > SILENT_AFTER * last_interval:
+        return float(held[-1])
+    return None
+
+
+def _checked(spike_times: ArrayLike) -> FloatArray:
+    times = np.asarray(spike_times, dtype=np.float64)
+    if times.ndim != 1 or not np.all(np.isfinite(times)):
+        raise ParameterError("Spike times must be a list of finite numbers in s.")
+    if np.any(np.diff(times) <= 0):
+        first = int(np.flatnonzero(np.diff(times) <= 0)[0])
+        raise ParameterError(
+            f"Spike times must increase: number {first + 2} at {times[first + 1]:g} s "
+            f"follows {times[first]:g} s. Sort them and drop doubles."
+        )
+    return times

@@ -1,0 +1,19 @@
+"""What a run says as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What a run says as a whole.
+
+    Attributes:
+        sentences: for people.
+        values: for machines, plain values with units in the keys.
+    """
+
+    sentences: tuple[str, ...] = ()
+    values: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,181 @@
+"""What a protocol was run for, in one or two sentences and as numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.analysis.decay import fit_decay
+from tactile_lab.analysis.drain_current import BOXCAR_3DB
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.rate_force import eq15_rate, onset
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.quantity import show
+from tactile_lab.report.bench_conclusions import (
+    calibrate_field,
+    force_check,
+    monitor,
+    wiring_check,
+)
+from tactile_lab.report.conclusion import Conclusion
+from tactile_lab.report.run_data import RunData, Trace
+from tactile_lab.report.sweep import sine_sweep
+from tactile_lab.report.trial_finding import TrialFinding
+
+LATE = 0.15
+"""A coil set over a serial line is late: the first part of a hold still rises, s."""
+
+
+NO_UNCERTAINTY = (
+    "The calibration states no uncertainty of force: none is carried into this number."
+)
+
+
+def conclude(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
+    """The conclusion of the run's protocol; an empty one where it has none."""
+    how = _BY_PROTOCOL.get(run.protocol)
+    if how is None or not trials:
+        return Conclusion()
+    return how(run, trials)
+
+
+def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
+    forces = [float(t.trial.level or 0.0) for t in trials]
+    try:
+        found = onset(forces, [t.response.spikes for t in trials])
+    except NotIdentifiableError as reason:
+        return Conclusion(
+            (f"No critical force: {reason}.",), {"critical_force_N": None}
+        )
+    ramp, hold = (run.parameters.get(name, "?") for name in ("ramp", "hold"))
+    sentence = (
+        f"Critical force: between {show(found.silent, 'N')} (silent) and "
+        f"{show(found.fires, 'N')} (fires), for a ramp of {ramp} and a hold of {hold}."
+    )
+    values = {
+        "critical_force_N": found.middle,
+        "critical_force_half_width_N": found.half_width,
+    }
+    if run.force_uncertainty is None:
+        return Conclusion((sentence, NO_UNCERTAINTY), values)
+    whole = math.hypot(found.half_width, run.force_uncertainty)
+    values["critical_force_uncertainty_N_95"] = whole
+    said = f"With the calibration's uncertainty: ±{show(whole, 'N', 2)} (95 %)."
+    return Conclusion((sentence, said), values)
+
+
+def _rate_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
+    critical = _critical_force(run, trials)
+    rated = [t for t in trials if t.response.peak_rate is not None]
+    if run.circuit is None or not rated:
+        return critical
+    ratios = []
+    for finding in rated:
+        hold, level = finding.trial.hold, finding.trial.level
+        if hold is not None and level is not None:
+            expected = eq15_rate(run.circuit, level, hold[0])
+            if expected > 0:
+                ratios.append((finding.response.peak_rate or 0.0) / expected)
+    if not ratios:
+        return critical
+    sentence = (
+        f"The highest rates are {min(ratios):.2f} to {max(ratios):.2f} of what Eq. "
+        "(15) gives for the current at the end of the ramp, which knows no adaptation."
+    )
+    return Conclusion(
+        (*critical.sentences, sentence),
+        {**critical.values, "peak_rate_over_eq15": ratios},
+    )
+
+
+def _repeat(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
+    counts = [t.response.spikes for t in trials]
+    rates = [t.response.peak_rate for t in trials]
+    values: dict[str, Any] = {"spikes": counts, "peak_rates_Hz": rates}
+    if rates[0] is None or len(counts) < 2:
+        return Conclusion(("The first presentation gave no rate.",), values)
+    rated = [r for r in rates if r is not None]
+    sentence = (
+        f"Peak rate from one presentation to the next: "
+        f"{', '.join(f'{r:.3g}' for r in rated)} Hz"
+    )
+    silent = len(rates) - len(rated)
+    if silent:
+        sentence += f"; the other {silent} gave fewer than two spikes"
+    return Conclusion((f"{sentence}.",), values)
+
+
+def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
+    trace = run.trace("I_DS")
+    if trace is None:
+        return Conclusion()
+    changes: list[dict[str, Any]] = []
+    sentences = []
+    margin = BOXCAR_3DB / 20
+    for finding in trials:
+        hold, start = finding.trial.hold, finding.trial.start
+        if hold is None:
+            continue
+        before = _mean(trace.time, trace.mean, start - 0.1, start + margin)
+        begin = start + hold[0]
+        during = _mean(trace.time, trace.mean, begin, begin + 0.1)
+        if np.isnan(before) or np.isnan(during):
+            continue
+        changes.append({"level_N": finding.trial.level, "change_A": during - before})
+        sentences.append(
+            f"{finding.trial.label}: I_DS from {show(before, 'A', 3)} to "
+            f"{show(during, 'A', 3)}"
+        )
+    if not changes:
+        return Conclusion()
+    said = ["; ".join(sentences) + "."]
+    values: dict[str, Any] = {"I_DS_changes": changes}
+    tau, why_not = _tau(trace, trials)
+    if tau is None:
+        said.append(f"tau: {why_not}.")
+    else:
+        said.append(
+            f"The decay gives tau = {tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} "
+            "s, 95 %)."
+        )
+        values["tau_s"] = {"value": tau.value, "low_95": tau.low, "high_95": tau.high}
+    return Conclusion(tuple(said), values)
+
+
+def _tau(trace: Trace, trials: Sequence[TrialFinding]) -> tuple[Estimate | None, str]:
+    """Tau from the strongest trial, its end known from the rest before the first."""
+    first = trials[0].trial
+    rest = _mean(trace.time, trace.mean, first.start - 0.2, first.start + 0.02)
+    held = [t.trial for t in trials if t.trial.hold is not None]
+    if np.isnan(rest) or not held:
+        return None, "the current at rest is not known"
+    strongest = max(held, key=lambda t: abs(t.level or 0.0))
+    start, end = strongest.hold or (0.0, 0.0)
+    window = (strongest.start + start + LATE, strongest.start + end)
+    try:
+        averaged = 2 * float(np.median(np.diff(trace.time)))
+        found = fit_decay(trace.time, trace.mean, window, averaged=averaged, rest=rest)
+    except NotIdentifiableError as reason:
+        return None, str(reason)
+    return found.tau, ""
+
+
+def _mean(time: np.ndarray, values: np.ndarray, start: float, end: float) -> float:
+    inside = (time >= start) & (time <= end)
+    return float(values[inside].mean()) if inside.any() else float("nan")
+
+
+_BY_PROTOCOL: dict[str, Callable[[RunData, Sequence[TrialFinding]], Conclusion]] = {
+    "threshold_search": _critical_force,
+    "rate_force": _rate_force,
+    "repeat": _repeat,
+    "bipolar": _bipolar,
+    "sine_sweep": sine_sweep,
+    "calibrate_field": calibrate_field,
+    "force_check": force_check,
+    "wiring_check": wiring_check,
+    "monitor": monitor,
+}

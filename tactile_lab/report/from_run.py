@@ -1,0 +1,201 @@
+"""A run on disk as the plain values a report is written from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.analysis.drain_current import Divider
+from tactile_lab.quantity import show
+from tactile_lab.report.calibrated import provenance
+from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
+from tactile_lab.scene.load import load
+from tactile_lab.scene.scene import Scene
+from tactile_lab.store.run import Run
+from tactile_lab.waveform import Waveform
+
+CELLS = 4000
+"""Cells of a trace over the whole run."""
+
+
+def read(folder: Path) -> RunData:
+    """The run in `folder`, decimated.
+
+    Raises:
+        RunFolderError: not a run, or one without data.
+        SceneError: its resolved scene cannot be read any more.
+    """
+    scene = load(folder / "scene.toml")
+    with Run.load(folder) as run:
+        info = run.info
+        current = _current(run)
+        spikes = run.spikes["time"]
+        before = float(getattr(scene.protocol, "before", 0.0))
+        started = _for_people(str(info.get("started", "")))
+        settings: Mapping[str, Mapping[str, str]] = info.get("instruments") or {}
+        uncertainty, doubts = _trust(scene, started, settings)
+        return RunData(
+            title=str(info.get("title", scene.protocol.title)),
+            protocol=scene.protocol.name,
+            scene=str(info.get("scene", "")),
+            run=folder.resolve().name,
+            started=started,
+            status=run.status,
+            simulated=run.simulated,
+            bench=scene.bench.name,
+            duration=run.duration,
+            took=info.get("took_s"),
+            trials=tuple(_trial(row, spikes, before) for row in run.trials),
+            force=_force(scene, current, run.duration),
+            current=current,
+            field=_field(run),
+            force_uncertainty=uncertainty,
+            field_per_ampere=_field_per_ampere(scene),
+            traces=tuple(_trace(run, name) for name in run.signals),
+            circuit=scene.circuit,
+            searched=bool({"V_K", "spikes", "rate"} & set(scene.record.signals)),
+            divider=_divider(scene),
+            loss=_loss(info),
+            accuracy=str(info.get("accuracy") or ""),
+            warnings=(*(info.get("warnings") or ()), *doubts),
+            assumptions=tuple(info.get("assumptions") or ()),
+            parameters=_texts(scene, "protocol"),
+            sensor=_texts(scene, "sensor"),
+            settings=settings,
+            calibration=_calibration(scene),
+            environment=info.get("environment") or {},
+        )
+
+
+def _trial(row: Any, spikes: NDArray[np.float64], onset: float) -> TrialData:
+    start, end, level = (float(row[name]) for name in ("start", "end", "level"))
+    held = (float(row["hold_start"]), float(row["hold_end"]))
+    return TrialData(
+        label=bytes(row["label"]).decode("utf-8", errors="replace"),
+        level=None if np.isnan(level) else level,
+        start=start,
+        duration=end - start,
+        spike_times=spikes[(spikes >= start) & (spikes < end)] - start,
+        onset=onset,
+        hold=None if np.isnan(held[0]) else held,
+        pause=bool(row["pause"]),
+    )
+
+
+def _trace(run: Run, name: str) -> Trace:
+    cells = run.signal(name).envelope(cells=CELLS)
+    half = np.diff(cells.time, append=cells.time[-1:]) / 2
+    half[-1:] = half[-2:-1]
+    return Trace(
+        signal=name,
+        time=cells.time + half,
+        mean=cells.mean,
+        low=cells.low,
+        high=cells.high,
+    )
+
+
+def _current(run: Run) -> NDArray[np.float64]:
+    """Applied current, shape (n, 2), s and A: read back where it was, else as sent."""
+    rows = run.current
+    read_back = rows["measured"]
+    amperes = np.where(np.isnan(read_back), rows["setpoint"], read_back)
+    return np.column_stack([rows["time"], amperes])
+
+
+def _field_per_ampere(scene: Scene) -> float:
+    """Slope of the assumed or calibrated field around 0 A, T/A."""
+    low, high = scene.bench.magnet.field([-1e-3, 1e-3])
+    return float(high - low) / 2e-3
+
+
+def _field(run: Run) -> NDArray[np.float64]:
+    """Teslameter readings, shape (m, 2), s and T."""
+    rows = run.field
+    names = rows.dtype.names or ()
+    value = "field" if "field" in names else "value"
+    return np.column_stack([rows["time"], rows[value]])
+
+
+def _force(scene: Scene, current: NDArray[np.float64], end: float) -> Waveform:
+    """Force the applied current gives: each set-point holds until the next."""
+    if len(current) == 0:
+        return Waveform.constant(0.0)
+    time, amperes = current[:, 0], current[:, 1]
+    steps = np.repeat(time, 2)[1:]
+    held = np.repeat(amperes, 2)[:-1]
+    steps, held = np.append(steps, max(end, steps[-1])), np.append(held, held[-1])
+    distinct = np.ones(steps.size, dtype=bool)
+    distinct[1:-1] = (steps[2:] != steps[1:-1]) | (steps[1:-1] != steps[:-2])
+    return scene.bench.magnet.force_for(Waveform(steps[distinct], held[distinct]))
+
+
+def _divider(scene: Scene) -> Divider:
+    circuit = scene.circuit
+    return Divider(V_S=circuit.V_S, R1=circuit.R1, R2=circuit.R2, C1=circuit.C1)
+
+
+def _loss(info: Mapping[str, Any]) -> Loss | None:
+    loss = info.get("loss")
+    if not loss:
+        return None
+    return Loss(
+        samples_produced=loss["produced"],
+        samples_stored=loss["written"],
+        spikes_online=loss["spikes_online"],
+        spikes=loss["spikes"],
+        sentence=loss["text"],
+    )
+
+
+def _texts(scene: Scene, table: str) -> dict[str, str]:
+    entries = scene.to_dict()[table]
+    return {
+        name: ", ".join(map(str, value))
+        if isinstance(value, list | tuple)
+        else str(value)
+        for name, value in entries.items()
+    }
+
+
+def _trust(
+    scene: Scene, started: str, settings: Mapping[str, Mapping[str, str]]
+) -> tuple[float | None, tuple[str, ...]]:
+    """Uncertainty of a force by the calibration, N, and doubts about it."""
+    calibration = scene.bench.magnet.calibration
+    if calibration is None:
+        return None, ()
+    coil = settings.get("coil", {}).get("identity", "")
+    known = provenance(calibration.path, started, coil)
+    if known.uncertainty is None or calibration.unit != "T":
+        return None, known.warnings
+    newtons = known.uncertainty * abs(scene.bench.magnet.newtons_per_tesla)
+    return newtons, known.warnings
+
+
+def _calibration(scene: Scene) -> dict[str, str]:
+    magnet = scene.bench.magnet
+    found = {
+        "Force per current at 0 A": f"{show(magnet.newtons_per_ampere, 'N')}/A",
+        "r": show(magnet.r, "m"),
+        "A1": show(magnet.A1, "m^2"),
+        "A2": show(magnet.A2, "m^2"),
+        "B1": show(magnet.B1, "T"),
+    }
+    if magnet.calibration is None:
+        found["B2 per current"] = f"{show(magnet.B2_per_ampere, 'T')}/A, assumed linear"
+    else:
+        found["Calibration file"] = magnet.calibration.path.name
+    return found
+
+
+def _for_people(started: str) -> str:
+    try:
+        return f"{datetime.fromisoformat(started):%Y-%m-%d %H:%M:%S}"
+    except ValueError:
+        return started

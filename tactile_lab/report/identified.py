@@ -1,0 +1,41 @@
+"""Identification from a run as it is reported."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tactile_lab.analysis.identify import Identified, identify
+from tactile_lab.analysis.twin import Measured
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.report.run_data import RunData
+
+
+def identify_run(run: RunData, names: Sequence[str]) -> Identified:
+    """Fit the parameters `names` to V_C1 and the spikes of a run.
+
+    Raises:
+        NotIdentifiableError: the run has neither, or does not determine a parameter.
+        ParameterError: an unknown parameter.
+    """
+    trace = run.trace("V_C1")
+    if run.circuit is None or (trace is None and not run.searched):
+        raise NotIdentifiableError(
+            "the run has neither V_C1 nor spikes; record V_C1 or V_K"
+        )
+    spikes = np.concatenate(
+        [t.spike_times + t.start for t in run.trials if not t.pause] or [np.empty(0)]
+    )
+    seen = None
+    if trace is not None:
+        inside = (trace.time >= 0) & (trace.time <= run.duration)
+        seen = Measured("V_C1", trace.time[inside], trace.mean[inside])
+    return identify(
+        run.circuit,
+        names,
+        run.force,
+        run.duration,
+        V_C1=seen,
+        spike_times=spikes[spikes <= run.duration] if run.searched else None,
+    )

@@ -1,0 +1,125 @@
+"""The machine-readable results.json: every documented key always present, no NaN."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from tactile_lab.analysis.adaptation import Adaptation
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.twin import Twin
+from tactile_lab.report.findings import Findings
+from tactile_lab.report.trial_finding import TrialFinding
+
+SCHEMA = 1
+
+
+def results(findings: Findings) -> dict[str, Any]:
+    """The findings as plain values; units are in the keys, missing numbers are None."""
+    run = findings.run
+    loss = run.loss
+    return {
+        "schema": SCHEMA,
+        "run": run.run,
+        "title": run.title,
+        "protocol": run.protocol,
+        "scene": run.scene,
+        "started": run.started,
+        "status": run.status,
+        "simulated": run.simulated,
+        "bench": run.bench,
+        "duration_s": run.duration,
+        "took_s": run.took,
+        "force_uncertainty_N_95": run.force_uncertainty,
+        "spikes": sum(t.response.spikes for t in findings.trials),
+        "trials": [
+            _trial(t, rest)
+            for t, rest in zip(findings.trials, findings.rest, strict=True)
+        ],
+        "loss": None
+        if loss is None
+        else {
+            "samples": loss.samples,
+            "samples_produced": loss.samples_produced,
+            "spikes": loss.spikes,
+            "spikes_online": loss.spikes_online,
+        },
+        "conclusion": findings.conclusion.values,
+        "twin": None if findings.twin is None else _twin(findings.twin),
+        "accuracy": run.accuracy or None,
+        "notes": list(findings.notes),
+        "warnings": list(run.warnings),
+        "assumptions": list(run.assumptions),
+        "parameters": dict(run.parameters),
+        "sensor": dict(run.sensor),
+        "calibration": dict(run.calibration),
+    }
+
+
+def as_json(findings: Findings) -> str:
+    """`results` as JSON text with full double precision."""
+    text = json.dumps(results(findings), indent=2, ensure_ascii=False, allow_nan=False)
+    return text + "\n"
+
+
+def _trial(finding: TrialFinding, rest: float | None) -> dict[str, Any]:
+    trial, response = finding.trial, finding.response
+    return {
+        "label": trial.label,
+        "level_N": trial.level,
+        "start_s": trial.start,
+        "duration_s": trial.duration,
+        "hold_s": None if trial.hold is None else list(trial.hold),
+        "rest_V_C1_V": rest,
+        "spikes": response.spikes,
+        "spike_times_s": [float(t) for t in trial.spike_times],
+        "latency_s": response.latency,
+        "peak_rate_Hz": response.peak_rate,
+        "final_rate_Hz": response.final_rate,
+        "fall": response.fall,
+        "adaptation_index": response.adaptation_index,
+        "silent_from_s": response.silent,
+        "adaptation": None
+        if finding.adaptation is None
+        else _adaptation(finding.adaptation),
+        "adaptation_why_not": finding.why_not or None,
+    }
+
+
+def _twin(twin: Twin) -> dict[str, Any]:
+    matched = twin.spikes
+    return {
+        "voltages": {
+            r.signal: {"offset_V": r.offset, "rms_V": r.rms, "band_95_V": r.band}
+            for r in twin.residuals
+        },
+        "spikes": None
+        if matched is None
+        else {
+            "matched": int(matched.measured.size),
+            "missed": matched.missed,
+            "extra": matched.extra,
+            "offsets_s": [float(o) for o in matched.offsets],
+        },
+    }
+
+
+def _adaptation(fit: Adaptation) -> dict[str, Any]:
+    return {
+        "alpha_Hz": _estimate(fit.alpha),
+        "beta_per_s": _estimate(fit.beta),
+        "gamma_Hz": _estimate(fit.gamma),
+        "time_constant_s": _estimate(fit.time_constant),
+        "irregularity": fit.irregularity,
+        "r_squared": fit.r_squared,
+        "intervals": fit.intervals,
+    }
+
+
+def _estimate(estimate: Estimate) -> dict[str, float]:
+    return {
+        "value": estimate.value,
+        "error": estimate.error,
+        "low_95": estimate.low,
+        "high_95": estimate.high,
+    }

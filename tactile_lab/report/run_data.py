@@ -1,0 +1,172 @@
+"""What a report is written from: one run as plain, immutable values.
+
+It knows neither how a run is stored nor how it was made; whoever has a run fills it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.analysis.drain_current import Divider
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.signals import Source
+from tactile_lab.waveform import Waveform
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrialData:
+    """One trial of the run.
+
+    Attributes:
+        label: for people ("120 mN").
+        level: force the result is filed under, N; None where there is no one level.
+        start: on the run's time axis, s.
+        duration: s.
+        spike_times: shape (k,), s from the trial's start.
+        onset: when the stimulus begins, s from the trial's start.
+        hold: (start, end) of the constant part, s from the trial's start, or None.
+        pause: a planned recovery; listed nowhere but in the time axis.
+    """
+
+    label: str
+    level: float | None
+    start: float
+    duration: float
+    spike_times: FloatArray
+    onset: float = 0.0
+    hold: tuple[float, float] | None = None
+    pause: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """One signal over the run, decimated to a few thousand bins.
+
+    Attributes:
+        signal: a name of `tactile_lab.signals`.
+        time: shape (n,), middle of each bin, s on the run's time axis; a step more
+            than 1.5 times the usual one is drawn as a gap.
+        mean: shape (n,), SI.
+        low, high: shape (n,), extremes within each bin, SI, or None.
+        source: "measured", "derived" or "model".
+    """
+
+    signal: str
+    time: FloatArray
+    mean: FloatArray
+    low: FloatArray | None = None
+    high: FloatArray | None = None
+    source: Source = "measured"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loss:
+    """The loss certificate of a run.
+
+    Attributes:
+        samples_produced: by the scope, all channels; None if the run could not say.
+        samples_stored: all channels.
+        spikes_online: spikes found while the run went on.
+        spikes: found by only one of the searches on line and in the stored samples;
+            None where the searched channel was not stored.
+        sentence: all of it: "loss: 0 of 72000000 samples, 0 of 47 spikes".
+    """
+
+    samples_produced: int | None
+    samples_stored: int
+    spikes_online: int
+    spikes: int | None
+    sentence: str
+
+    @property
+    def samples(self) -> int | None:
+        """Samples lost; None if not known."""
+        if self.samples_produced is None:
+            return None
+        return self.samples_produced - self.samples_stored
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunData:
+    """One run, ready to be reported.
+
+    Attributes:
+        title: the protocol's title.
+        protocol: its name.
+        scene: name of the scene.
+        run: name of the run's folder.
+        started: date and time for people.
+        status: "complete", "aborted", "faulted" or "recovered".
+        simulated: whether the bench's physics was computed.
+        bench: its name.
+        duration: of the experiment, s.
+        took: wall time the run needed, s, or None.
+        trials: in order.
+        force: N on the run's time axis, as applied (limited and stepped).
+        current: applied coil current as read back, shape (n, 2), s and A, or None.
+        force_uncertainty: half of the 95 % band of a force by the calibration, N; None
+            where none is stated.
+        field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
+        field: teslameter readings, shape (m, 2), s and T, or None.
+        traces: decimated signals; I_DS is derived from V_C1 where it is missing.
+        circuit: the sensor as it is believed to be, to compare with, or None.
+        searched: V_K was searched for spikes.
+        divider: parts around node A that I_DS is derived with.
+        loss: counters, or None where nothing was acquired.
+        accuracy: how accurate the simulation was, one sentence, or "".
+        warnings: one sentence each.
+        assumptions: one sentence each.
+        parameters: the protocol's parameters as text by name.
+        sensor: the sensor's parameters as text by name.
+        settings: settings read back, by instrument, then by name.
+        calibration: calibration of force and field, as text by name.
+        environment: versions and machine, as text by name.
+    """
+
+    title: str
+    protocol: str
+    run: str
+    status: str
+    simulated: bool
+    bench: str
+    duration: float
+    trials: tuple[TrialData, ...]
+    force: Waveform
+    scene: str = ""
+    started: str = ""
+    took: float | None = None
+    current: FloatArray | None = None
+    force_uncertainty: float | None = None
+    field_per_ampere: float | None = None
+    field: FloatArray | None = None
+    traces: tuple[Trace, ...] = ()
+    circuit: Circuit | None = None
+    searched: bool = True
+    divider: Divider = dataclasses.field(default_factory=Divider)
+    loss: Loss | None = None
+    accuracy: str = ""
+    warnings: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    parameters: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    sensor: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
+    calibration: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    environment: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def trace(self, signal: str, *, model: bool = False) -> Trace | None:
+        """The measured or derived trace of `signal`, or the model's; None if none."""
+        return next(
+            (
+                t
+                for t in self.traces
+                if t.signal == signal and (t.source == "model") == model
+            ),
+            None,
+        )

@@ -1,0 +1,59 @@
+"""Write a run's report: figure, report.html and results.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tactile_lab.report.bench_conclusions import write_calibration_file
+from tactile_lab.report.canvas import save
+from tactile_lab.report.figure import figure
+from tactile_lab.report.findings import Findings, find
+from tactile_lab.report.html import page
+from tactile_lab.report.results import as_json
+from tactile_lab.report.run_data import RunData
+from tactile_lab.report.summary import summary
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Report:
+    """What was written, and the findings it was written from."""
+
+    findings: Findings
+    png: Path
+    svg: Path
+    html: Path
+    results: Path
+
+
+def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
+    """Write figure.png, figure.svg, report.html and results.json into `folder`.
+
+    A field calibration also gets calibration.csv, for a bench file to name.
+    Protocols whose answer is not a trace also get summary.png and summary.svg.
+
+    Args:
+        folder: exists; files of these names are replaced.
+        run: the run.
+        pdf: also write figure.pdf.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    findings = find(run)
+    results = folder / "results.json"
+    # the numbers first: they survive if drawing should fail
+    results.write_text(as_json(findings), encoding="utf-8")
+    write_calibration_file(folder, findings.run)
+    png, svg = save(figure(findings), folder / "figure", pdf=pdf)
+    html = folder / "report.html"
+    second = summary(findings)
+    other = None if second is None else save(second, folder / "summary", pdf=pdf)[1]
+    html.write_text(page(findings, svg, other), encoding="utf-8")
+    return Report(
+        findings=findings,
+        png=png,
+        svg=folder / "figure.svg",
+        html=html,
+        results=results,
+    )

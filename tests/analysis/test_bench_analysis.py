@@ -1,0 +1,153 @@
+import datetime
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.field_calibration import (
+    FieldStep,
+    check_calibration,
+    fit_field,
+    write_calibration,
+)
+from tactile_lab.analysis.wiring import Levels, explaining_V_GS, hum, judge
+from tactile_lab.calibration import read_calibration
+from tactile_lab.errors import LimitError, NotIdentifiableError, SceneError
+from tactile_lab.model.circuit import Circuit, rest_V_C1
+
+DAY = datetime.date(2026, 11, 21)
+
+
+def loop(slope=0.0112, half=4e-4, noise=5e-6, seed=0, points=21):
+    """Both branches of a play operator: the field lags by `half`."""
+    rng = np.random.default_rng(seed)
+    steps = []
+    for branch, sign, currents in (
+        ("falling", 1, np.linspace(1, -1, points)),
+        ("rising", -1, np.linspace(-1, 1, points)),
+    ):
+        for current in currents:
+            field = slope * current + sign * half + rng.normal(0, noise)
+            steps.append(
+                FieldStep(branch=branch, current=current, field=field, error=noise)
+            )
+    return steps
+
+
+def test_the_calibration_finds_slope_and_loop():
+    found = fit_field(loop())
+    assert found.slope.value == pytest.approx(0.0112, rel=1e-3)
+    assert found.slope.low < 0.0112 < found.slope.high
+    assert found.half_width == pytest.approx(4e-4, rel=0.05)
+    assert found.half_width_current == pytest.approx(4e-4 / 0.0112, rel=0.05)
+    assert found.uncertainty >= found.half_width
+    assert found.warnings == ()
+    assert 0.0 in found.current
+
+
+def test_a_wide_loop_is_warned_of():
+    assert "demagnetise" in fit_field(loop(half=1.5e-3)).warnings[0]
+
+
+def test_missing_branches_are_refused():
+    one = [s for s in loop() if s.branch == "rising"]
+    with pytest.raises(NotIdentifiableError, match="falling branch has 0 steps"):
+        fit_field(one)
+    with pytest.raises(NotIdentifiableError, match="does not follow"):
+        fit_field(loop(slope=1e-6, half=0.0, noise=1e-4))
+
+
+def test_the_file_is_one_a_bench_can_use(tmp_path):
+    path = write_calibration(
+        tmp_path / "b2.csv", fit_field(loop()), coil="coil A", date=DAY
+    )
+    used = read_calibration(path)
+    assert used.slope_at_zero == pytest.approx(0.0112, rel=0.01)
+    assert used.at(0.5) == pytest.approx(0.0056, rel=0.01)
+    with pytest.raises(LimitError, match="outside the calibration"):
+        used.at(1.2)
+
+
+def test_the_file_is_dated_hashed_and_never_overwritten(tmp_path):
+    found, path = fit_field(loop()), tmp_path / "b2.csv"
+    write_calibration(path, found, coil="coil A", date=DAY)
+    head = check_calibration(path, coil="coil A", today=DAY)
+    assert head["date"] == "2026-11-21"
+    with pytest.raises(SceneError, match="exists"):
+        write_calibration(path, found, coil="coil A", date=DAY)
+    with pytest.raises(SceneError, match="expired on 2027-05-20"):
+        check_calibration(path, today=datetime.date(2027, 5, 21))
+    with pytest.raises(SceneError, match="belongs to the coil coil A, not to coil B"):
+        check_calibration(path, coil="coil B")
+    path.chmod(0o644)
+    path.write_text(path.read_text().replace("1,0.011", "1,0.012"))
+    with pytest.raises(SceneError, match="no valid hash"):
+        check_calibration(path)
+
+
+EXPECTED = Levels(
+    rest={"V_C1": 4.347, "V_C2": 1.448, "coil_current": 0.0, "field": 0.0},
+    push={"V_C1": 4.21, "V_C2": 2.05, "coil_current": 0.25, "field": 2.75e-3},
+)
+
+
+def found(**changes):
+    rest, push = dict(EXPECTED.rest), dict(EXPECTED.push)
+    for name, (at_rest, pushed) in changes.items():
+        rest[name], push[name] = at_rest, pushed
+    return judge(Levels(rest, push), EXPECTED)
+
+
+def verdict(signal, **changes):
+    return next(v for v in found(**changes) if v.signal == signal)
+
+
+def test_a_right_wiring_passes():
+    assert all(v.ok for v in found())
+    assert len(found()) == 4
+
+
+@pytest.mark.parametrize(
+    ("signal", "changes", "says"),
+    [
+        ("V_C1", {"V_C1": (1.448, 2.05), "V_C2": (4.347, 4.21)}, "swapped with V_C2"),
+        ("V_C2", {"V_C1": (1.448, 2.05), "V_C2": (4.347, 4.21)}, "swapped with V_C1"),
+        ("V_C1", {"V_C1": (4.347, 4.47)}, "reversed"),
+        ("V_C1", {"V_C1": (0.01, 0.01)}, "open probe"),
+        ("V_C1", {"V_C1": (0.4347, 0.421)}, "0.1 times too much"),
+        ("V_C2", {"V_C2": (14.48, 20.5)}, "10 times too much"),
+        ("V_C1", {"V_C1": (4.347, 4.346)}, "magnet is away"),
+        ("V_C1", {"V_C1": (3.0, 2.8)}, "check V_GS"),
+        ("coil_current", {"coil_current": (0.0, -0.25)}, "reversed"),
+        ("coil_current", {"coil_current": (0.0, 0.001)}, "not connected"),
+        ("coil_current", {"coil_current": (0.0, 2.5)}, "10 times"),
+        ("field", {"field": (0.0, -2.7e-3)}, "reversed"),
+    ],
+)
+def test_each_mistake_is_named(signal, changes, says):
+    given = verdict(signal, **changes)
+    assert not given.ok
+    assert says in given.text
+
+
+def test_hum_is_measured_in_noise():
+    rng = np.random.default_rng(0)
+    time = np.arange(0, 2, 1e-3)
+    trace = 4.3 + 0.02 * np.sin(2 * np.pi * 50 * time + 1) + rng.normal(0, 0.01, 2000)
+    assert hum(time, trace) == pytest.approx(0.02, rel=0.1)
+    assert hum(time, trace, 60.0) < 0.002
+    with pytest.raises(NotIdentifiableError, match="too coarse"):
+        hum(time[::20], trace[::20])
+
+
+@pytest.mark.parametrize("V_GS", [1.35, 1.4, 1.5])
+def test_the_rest_voltage_gives_v_gs_back(V_GS):
+    circuit = Circuit(V_GS=V_GS)
+    gate = explaining_V_GS(Circuit(), rest_V_C1(circuit), 16e-3)
+    assert gate.value == pytest.approx(V_GS, abs=1e-6)
+    assert gate.low < V_GS < gate.high
+    assert 2e-3 < gate.error < 50e-3
+
+
+def test_an_impossible_rest_voltage_is_refused():
+    with pytest.raises(NotIdentifiableError, match="no V_GS explains"):
+        explaining_V_GS(Circuit(), 4.9, 16e-3)

@@ -1,0 +1,78 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.identify import identify
+from tactile_lab.analysis.twin import Measured
+from tactile_lab.errors import NotIdentifiableError, ParameterError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.waveform import Waveform
+
+FORCE = (
+    Waveform.pulse(0.12, ramp=0.25, hold=4.0, rest=2.0)
+    .then(Waveform.pulse(0.18, ramp=0.25, hold=6.0, rest=4.0))
+)  # fmt: skip
+
+
+def run_of(circuit, *, noise=3e-3, jitter=0.0, seed=0, bins=600):
+    found = simulate(circuit, FORCE, keep=("V_C1", "spikes"))
+    rng = np.random.default_rng(seed)
+    time = (np.arange(bins) + 0.5) * FORCE.end / bins
+    value = found.sample("V_C1", time) + rng.normal(0, noise, bins)
+    spikes = found.spike_times + rng.normal(0, jitter, found.spike_times.size)
+    return Measured("V_C1", time, value), spikes
+
+
+@pytest.mark.parametrize(
+    ("names", "truth"),
+    [
+        (("V_GS", "tau"), {"V_GS": 1.412, "tau": 7.9}),
+        (("V_GS", "tau", "V_th"), {"V_GS": 1.39, "tau": 9.2, "V_th": 3.1}),
+        (("I_S", "tau"), {"I_S": 1.35e-12, "tau": 8.0}),
+    ],
+)
+def test_it_finds_what_the_run_was_made_with(names, truth):
+    trace, spikes = run_of(replace(Circuit(), **truth), jitter=1e-4)
+    found = identify(Circuit(), names, FORCE, FORCE.end, V_C1=trace, spike_times=spikes)
+    for name, value in truth.items():
+        assert found.estimates[name].value == pytest.approx(value, rel=0.01)
+        assert getattr(found.circuit, name) == found.estimates[name].value
+    assert found.scatter_V_C1 == pytest.approx(3e-3, rel=0.15)
+
+
+def test_its_intervals_cover_the_truth():
+    truth, hits, repeats = {"V_GS": 1.405, "tau": 8.3}, np.zeros(2), 60
+    for seed in range(repeats):
+        trace, _ = run_of(replace(Circuit(), **truth), seed=seed, bins=200)
+        found = identify(Circuit(), tuple(truth), FORCE, FORCE.end, V_C1=trace)
+        hits += [
+            found.estimates[n].low <= v <= found.estimates[n].high
+            for n, v in truth.items()
+        ]
+    assert np.all(hits / repeats > 0.85)
+
+
+def test_it_says_what_the_run_cannot_tell_apart():
+    trace, _ = run_of(Circuit())
+    found = identify(Circuit(), ("V_GS", "I_S"), FORCE, FORCE.end, V_C1=trace)
+    assert any("V_GS and I_S cannot be told apart" in w for w in found.warnings)
+    assert found.estimates["V_GS"].high - found.estimates["V_GS"].low > 0.5
+
+
+def test_a_parameter_without_effect_is_refused():
+    trace, _ = run_of(Circuit())
+    with pytest.raises(NotIdentifiableError, match="C2 does not act"):
+        identify(Circuit(), ("V_GS", "C2"), FORCE, FORCE.end, V_C1=trace)
+
+
+def test_no_data_is_refused():
+    with pytest.raises(NotIdentifiableError, match="0 data points"):
+        identify(Circuit(), ("V_GS",), FORCE, FORCE.end)
+
+
+@pytest.mark.parametrize("names", [(), ("V_GS", "V_GS"), ("t1",), ("voltage",)])
+def test_impossible_names_are_refused(names):
+    with pytest.raises(ParameterError):
+        identify(Circuit(), names, FORCE, FORCE.end)

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.transfer import fit_transfer, read_transfer
+from tactile_lab.errors import NotIdentifiableError, ParameterError, SceneError
+
+V = np.linspace(0, 3.5, 71)
+
+
+def curve(I_S=1.216e-12, m=5.646, noise=0.0, floor=0.0, seed=0):
+    """Subthreshold up to 2.75 V, linear beyond, on a leakage floor."""
+    ideal = I_S * np.exp(np.minimum(V, 2.75) / (m * 0.025))
+    bent = ideal * (1 + np.maximum(V - 2.75, 0))
+    rng = np.random.default_rng(seed)
+    return (bent + floor) * np.exp(rng.normal(0, noise, V.size))
+
+
+def test_it_gives_table_1_back():
+    found = fit_transfer(V, curve())
+    assert found.I_S.value == pytest.approx(1.216e-12, rel=1e-9)
+    assert found.m.value == pytest.approx(5.646, rel=1e-9)
+    assert found.swing.value == pytest.approx(0.325, abs=5e-4)
+    assert found.range[1] <= 2.75
+    assert found.current(2.0) == pytest.approx(curve()[40])
+
+
+def test_a_leakage_floor_does_not_bend_the_line():
+    found = fit_transfer(V, curve(floor=1e-10, noise=0.01))
+    assert found.m.value == pytest.approx(5.646, rel=0.03)
+    assert found.range[0] > 0.5
+
+
+def test_its_intervals_cover_the_truth():
+    hits, repeats = np.zeros(2), 300
+    for seed in range(repeats):
+        found = fit_transfer(V, curve(noise=0.05, seed=seed), between=(0, 2.75))
+        hits += [
+            found.I_S.low <= 1.216e-12 <= found.I_S.high,
+            found.m.low <= 5.646 <= found.m.high,
+        ]
+    assert np.all((hits / repeats > 0.91) & (hits / repeats < 0.985))
+
+
+def test_a_range_can_be_chosen():
+    found = fit_transfer(V, curve(), between=(1.0, 2.0))
+    assert found.range == (1.0, 2.0)
+    assert found.points == 21
+
+
+def test_it_reads_csv_of_ours_and_of_an_analyser(tmp_path):
+    for header in ("V_GS_V,I_DS_A", "VG,ID"):
+        path = tmp_path / "curve.csv"
+        path.write_text(f"{header}\n" + "\n".join(f"{v},{i}" for v, i in
+                        zip(V, curve(), strict=True)))  # fmt: skip
+        volts, amperes = read_transfer(path)
+        assert fit_transfer(volts, amperes).m.value == pytest.approx(5.646)
+
+
+def test_nan_in_the_file_is_named_with_its_line(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("VG,ID\n0,1e-12\n1,nan\n")
+    with pytest.raises(SceneError, match="line 3"):
+        read_transfer(path)
+
+
+def test_unusable_curves_are_refused():
+    with pytest.raises(NotIdentifiableError, match="5 points"):
+        fit_transfer(V[:5], curve()[:5])
+    with pytest.raises(NotIdentifiableError, match="does not rise"):
+        fit_transfer(V, curve()[::-1], between=(0, 2))
+    with pytest.raises(ParameterError):
+        fit_transfer(V, curve()[:-1])

@@ -1,0 +1,106 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactile_lab.analysis.twin import Measured, match, twin
+from tactile_lab.errors import ParameterError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.waveform import Waveform
+
+FORCE = Waveform.pulse(0.15, ramp=0.25, hold=3.0, rest=1.0)
+
+
+def measured(circuit, signal="V_C1", noise=0.0, bins=500):
+    found = simulate(circuit, FORCE, keep=("V_C1", "V_C2", "spikes"))
+    time = (np.arange(bins) + 0.5) * FORCE.end / bins
+    rng = np.random.default_rng(1)
+    value = found.sample(signal, time) + rng.normal(0, noise, bins)
+    return Measured(signal, time, value), found.spike_times
+
+
+def test_the_twin_of_the_true_circuit_leaves_the_noise():
+    trace, spikes = measured(Circuit(), noise=3e-3)
+    found = twin(Circuit(), FORCE, FORCE.end, voltages=[trace], spike_times=spikes)
+    node_a = found.residual("V_C1")
+    assert node_a.rms == pytest.approx(3e-3, rel=0.15)
+    assert abs(node_a.offset) < 1e-3
+    assert found.spikes.offsets == pytest.approx(0.0, abs=1e-6)
+    assert found.spikes.missed == found.spikes.extra == 0
+
+
+def test_the_twin_of_another_circuit_shows_what_differs():
+    trace, spikes = measured(Circuit())
+    other = replace(Circuit(), V_GS=1.41)
+    found = twin(other, FORCE, FORCE.end, voltages=[trace], spike_times=spikes)
+    assert found.residual("V_C1").offset > 5e-3
+    assert np.median(found.spikes.rate_error) < -0.02
+    assert "spikes matched" in found.spikes.sentence
+
+
+def test_resets_do_not_spoil_the_residual_of_v_c2():
+    trace, spikes = measured(Circuit(), "V_C2")
+    found = twin(Circuit(), FORCE, FORCE.end, voltages=[trace], spike_times=spikes)
+    residual = found.residual("V_C2")
+    assert residual.band < 1e-6
+    assert np.isnan(residual.difference).sum() >= spikes.size
+
+
+def test_spikes_during_a_pause_are_not_missed():
+    _, spikes = measured(Circuit())
+    seen = spikes[(spikes < 1.0) | (spikes >= 2.0)]
+    found = twin(
+        Circuit(), FORCE, FORCE.end, spike_times=seen, pauses=[(1.0, 2.0)]
+    ).spikes
+    assert found.missed == 0
+    assert found.extra == 0
+
+
+def test_the_firing_stage_is_left_out_where_nothing_needs_it():
+    trace, _ = measured(Circuit())
+    found = twin(Circuit(), FORCE, FORCE.end, voltages=[trace])
+    assert found.spikes is None
+    assert found.result.spike_times is None
+
+
+def test_a_twin_needs_something_to_compare():
+    with pytest.raises(ParameterError, match="measured voltage or spikes"):
+        twin(Circuit(), FORCE, FORCE.end)
+
+
+TRAIN = st.lists(st.integers(100, 5000), min_size=2, max_size=40).map(
+    lambda steps: np.cumsum(steps) * 1e-4
+)
+
+
+@given(TRAIN)
+def test_a_train_matches_itself(times):
+    found = match(times, times)
+    assert found.measured.size == times.size
+    assert found.rate_error == pytest.approx(0.0, abs=1e-9)
+
+
+@given(TRAIN, st.floats(-0.4, 0.4))
+def test_a_small_shift_is_found_as_an_offset(times, part):
+    shift = part * np.diff(times).min()
+    found = match(times + shift, times)
+    assert found.missed == found.extra == 0
+    assert found.offsets == pytest.approx(shift, abs=1e-12)
+
+
+@given(TRAIN, st.data())
+def test_a_lost_spike_is_missed_and_a_false_one_is_extra(times, data):
+    lost = data.draw(st.integers(0, times.size - 1))
+    rest = np.delete(times, lost)
+    assert match(rest, times).missed == 1
+    assert match(times, rest).extra == 1
+    assert match(rest, times).measured == pytest.approx(rest)
+
+
+def test_nothing_matches_nothing():
+    assert match([], [1.0]).missed == 1
+    assert match([1.0], []).extra == 1
+    assert match([], []).offsets.size == 0

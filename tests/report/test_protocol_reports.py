@@ -1,0 +1,290 @@
+"""What a report concludes from runs of each protocol, on plain values."""
+
+import datetime
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.field_calibration import (
+    FieldStep,
+    check_calibration,
+    fit_field,
+    write_calibration,
+)
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.report.calibrated import provenance
+from tactile_lab.report.figure import figure
+from tactile_lab.report.findings import find
+from tactile_lab.report.run_data import RunData, Trace, TrialData
+from tactile_lab.report.splice import spliced
+from tactile_lab.report.summary import summary
+from tactile_lab.report.write import write
+from tactile_lab.waveform import Waveform
+
+NEWTONS_PER_AMPERE = 0.2
+
+
+def modelled(protocol, steps, *, circuit=None, bins=2000, **entries):
+    """A run of (label, level, force, pause) steps as the model answers them."""
+    circuit = circuit or Circuit()
+    force, starts = None, []
+    for _, _, wave, _ in steps:
+        starts.append(0.0 if force is None else force.end)
+        force = wave if force is None else force.then(wave)
+    found = simulate(circuit, force, keep=("V_C1", "V_C2", "spikes"))
+    time = (np.arange(bins) + 0.5) * force.end / bins
+    trials = []
+    for start, (label, level, wave, pause) in zip(starts, steps, strict=True):
+        inside = (found.spike_times >= start) & (found.spike_times < start + wave.end)
+        trials.append(
+            TrialData(
+                label=label,
+                level=level,
+                start=start,
+                duration=wave.end,
+                spike_times=found.spike_times[inside] - start,
+                hold=None if level is None else (0.25, 0.25 + 1.0),
+                pause=pause,
+            )
+        )
+    traces = tuple(
+        Trace(signal=s, time=time, mean=found.sample(s, time)) for s in ("V_C1", "V_C2")
+    )
+    plain = {
+        "title": protocol,
+        "protocol": protocol,
+        "run": "a run",
+        "status": "complete",
+        "simulated": True,
+        "bench": "test",
+        "duration": force.end,
+        "trials": tuple(trials),
+        "force": force,
+        "current": np.column_stack([force.time, force.value / NEWTONS_PER_AMPERE]),
+        "traces": traces,
+        "circuit": Circuit(),
+        "parameters": {"ramp": "0.25 s", "hold": "1.0 s"},
+    }
+    return RunData(**{**plain, **entries})
+
+
+def pulse(level, rest=0.5):
+    label = f"{level * 1e3:g} mN"
+    return (label, level, Waveform.pulse(level, ramp=0.25, hold=1.0, rest=rest), False)
+
+
+def recovery(seconds=50.0):
+    quiet = Waveform.through([(0.0, 0.0), (seconds, 0.0)])
+    return ("recovery", None, quiet, True)
+
+
+@pytest.fixture(scope="module")
+def rate_force():
+    steps = []
+    for level in (0.085, 0.11, 0.15, 0.2):
+        steps += [pulse(level), recovery()]
+    return modelled("rate_force", steps[:-1])
+
+
+def test_rate_force_brackets_the_critical_force_and_compares_with_eq_15(rate_force):
+    values = find(rate_force).conclusion.values
+    assert values["critical_force_N"] == pytest.approx(0.0975)
+    assert values["critical_force_half_width_N"] == pytest.approx(0.0125)
+    assert all(0.7 < ratio < 1.02 for ratio in values["peak_rate_over_eq15"])
+
+
+def test_a_figure_closes_up_over_recoveries(rate_force):
+    shown, cuts = spliced(rate_force)
+    assert len(cuts) == 3
+    assert shown.duration == pytest.approx(rate_force.duration - 150.0)
+    assert [t.start for t in shown.trials] == pytest.approx([0.0, 2.0, 4.0, 6.0])
+    assert shown.force.end == pytest.approx(shown.duration)
+    assert shown.force.at(4.5) == pytest.approx(0.15)
+    trace = shown.trace("V_C1")
+    assert np.all(np.diff(trace.time) > -1e-9)
+    assert trace.time[-1] <= shown.duration
+    *_, last = figure(find(rate_force)).axes
+    assert "recoveries left out" in last.get_xlabel()
+
+
+def test_a_run_without_recoveries_is_left_as_it_is(demo):
+    assert spliced(demo) == (demo, ())
+
+
+def test_rate_force_gets_a_second_figure_and_the_demo_does_not(
+    rate_force, demo, tmp_path
+):
+    assert summary(find(demo)) is None
+    report = write(tmp_path, rate_force)
+    assert (tmp_path / "summary.png").exists()
+    assert report.html.read_text(encoding="utf-8").count("<figure>") == 2
+
+
+def test_repeat_tells_the_decrement():
+    run = modelled("repeat", [pulse(0.16) for _ in range(4)])
+    found = find(run)
+    rates = found.conclusion.values["peak_rates_Hz"]
+    assert rates == sorted(rates, reverse=True)
+    assert "Peak rate from one presentation" in found.conclusion.sentences[0]
+    assert summary(found) is not None
+
+
+def test_bipolar_tells_the_currents_and_tau():
+    steps = []
+    for level in (0.1, -0.1):
+        wave = Waveform.pulse(level, ramp=0.25, hold=6.0, rest=4.0)
+        steps.append((f"{level}", level, wave, False))
+    quiet = ("rest", 0.0, Waveform.through([(0.0, 0.0), (0.5, 0.0)]), False)
+    run = modelled("bipolar", [quiet, *steps], searched=False, bins=4000)
+    held = tuple(
+        replace(t, hold=(0.25, 6.25)) if t.level else replace(t, hold=None)
+        for t in run.trials
+    )
+    values = find(replace(run, trials=held)).conclusion.values
+    push, pull = values["I_DS_changes"]
+    assert push["change_A"] > 30e-9
+    assert pull["change_A"] < -5e-9
+    assert values["tau_s"]["value"] == pytest.approx(8.69, rel=0.03)
+
+
+def test_wiring_check_passes_a_right_bench_and_names_a_wrong_one():
+    quiet = Waveform.through([(0.0, 0.0), (1.25, 0.0)])
+    steps = [("rest", 0.0, quiet, False), pulse(0.05)]
+    run = modelled("wiring_check", steps)
+    channels = find(run).conclusion.values["channels"]
+    assert {name for name, given in channels.items() if given["ok"]} == {"V_C1", "V_C2"}
+    first, second = run.traces
+    swapped = (
+        replace(first, mean=second.mean),
+        replace(second, mean=first.mean),
+    )
+    wrong = find(replace(run, traces=swapped)).conclusion
+    assert "swapped with V_C2" in wrong.values["channels"]["V_C1"]["text"]
+    assert "V_C1: WRONG" in " ".join(wrong.sentences)
+
+
+def test_calibrate_field_reads_both_branches(tmp_path):
+    trials, time, rows = [], 0.0, []
+    readings, levels = [], np.linspace(-1, 1, 11)
+    for branch, sign, order in (
+        ("falling", 1, levels[::-1]),
+        ("rising", -1, levels),
+    ):
+        for level in order:
+            trials.append(
+                TrialData(
+                    label=f"{branch} {level * 1e3:.0f} mA", level=None, start=time,
+                    duration=1.8, spike_times=np.empty(0), hold=(0.8, 1.8),
+                )
+            )  # fmt: skip
+            rows.append((time + 0.5, level))
+            for at in np.arange(time + 0.85, time + 1.8, 0.2):
+                readings.append((at, 0.011 * level + sign * 3e-4))
+            time += 1.8
+    run = RunData(
+        title="", protocol="calibrate_field", run="", status="complete", bench="",
+        simulated=True, duration=time, trials=tuple(trials),
+        force=Waveform.constant(0.0), current=np.array(rows),
+        field=np.array(readings), searched=False,
+    )  # fmt: skip
+    values = find(run).conclusion.values
+    assert values["slope_T_per_A"] == pytest.approx(0.011, rel=1e-6)
+    assert values["half_width_T"] == pytest.approx(3e-4, rel=1e-6)
+    dated = replace(run, started="2026-11-21 03:00:00", settings={})
+    write(tmp_path, dated)
+    assert check_calibration(tmp_path / "calibration.csv")["date"] == "2026-11-21"
+    write(tmp_path, dated)  # again: the calibration stays
+    without = find(replace(run, field=None)).conclusion
+    assert "no teslameter readings" in without.sentences[0]
+
+
+def test_force_check_finds_the_slip_in_table_1():
+    run = modelled("force_check", [pulse(0.05), pulse(0.1)])
+    read = {"readings": "0.0051 N, 0.0099 N"}
+    found = find(replace(run, parameters=read)).conclusion
+    assert found.values["read_over_eq2"] == pytest.approx(0.0996, rel=1e-3)
+    assert "2.25e-4" in found.sentences[0]
+    assert "No independent readings" in find(run).conclusion.sentences[0]
+
+
+def test_monitor_tells_the_distance_to_threshold():
+    quiet = Waveform.through([(0.0, 0.0), (3.0, 0.0)])
+    run = modelled("monitor", [("part 1", 0.0, quiet, False)])
+    distance = find(run).conclusion.values["distance_to_threshold_V"]
+    assert distance == pytest.approx(4.347 - 3.974, abs=2e-3)
+
+
+def test_the_twin_is_reported(rate_force, tmp_path):
+    report = write(tmp_path, rate_force)
+    values = json.loads(report.results.read_text())["twin"]
+    assert values["voltages"]["V_C1"]["rms_V"] < 2e-3
+    assert values["spikes"]["missed"] == values["spikes"]["extra"] == 0
+    page = report.html.read_text(encoding="utf-8")
+    assert re.search(r"V_C1: measured less model is .{1,8} mV on average", page)
+
+
+def test_a_run_without_current_has_no_twin(rate_force):
+    assert find(replace(rate_force, current=None)).twin is None
+
+
+def test_sine_sweep_gives_the_gain_of_small_forces():
+    frequency, cycles = 0.5, 4
+    phase = np.arange(0, 24 * cycles + 1) / 24
+    wave = Waveform(phase / frequency, 0.005 * np.sin(2 * np.pi * phase))
+    run = modelled("sine_sweep", [("0.5 Hz", None, wave, False)], searched=False)
+    held = (replace(run.trials[0], hold=(0.0, cycles / frequency)),)
+    (found,) = find(replace(run, trials=held)).conclusion.values["V_C1_over_force"]
+    # small signal: dV_C1/dF = -k_F g_m R, low-passed by node A at 27 Hz
+    circuit = Circuit()
+    steep = 24.69e-9 / (circuit.m * circuit.V_T)
+    resistance = 1 / (1 / circuit.R1 + 1 / circuit.R2)
+    assert found["gain_V_per_N"] == pytest.approx(
+        circuit.k_F * steep * resistance, rel=0.02
+    )
+    assert abs(found["phase_rad"]) == pytest.approx(np.pi, abs=0.2)
+
+
+def test_the_force_s_uncertainty_reaches_the_critical_force(rate_force):
+    known = find(replace(rate_force, force_uncertainty=5e-3)).conclusion
+    expected = np.hypot(0.0125, 5e-3)
+    assert known.values["critical_force_uncertainty_N_95"] == pytest.approx(expected)
+    assert "states no uncertainty" in " ".join(find(rate_force).conclusion.sentences)
+
+
+def test_a_calibration_s_doubts_are_told(tmp_path):
+    plain = tmp_path / "plain.csv"
+    plain.write_text("current_A,field_T\n-1,-0.011\n1,0.011\n")
+    assert "no uncertainty" in provenance(plain, "2026-11-21", "").warnings[0]
+    currents = np.linspace(-1, 1, 9)
+    steps = [
+        FieldStep(branch=b, current=i, field=0.011 * i + s * 1e-4, error=1e-6)
+        for b, s in (("rising", -1), ("falling", 1))
+        for i in currents
+    ]
+    path = write_calibration(
+        tmp_path / "b2.csv", fit_field(steps), coil="A", date=datetime.date(2026, 1, 1)
+    )
+    good = provenance(path, "2026-02-01 10:00:00", "A")
+    assert good.warnings == ()
+    assert good.uncertainty == pytest.approx(1e-4, rel=0.01)
+    assert "expired" in provenance(path, "2026-11-21 10:00:00", "A").warnings[0]
+    assert "belongs to the coil A" in provenance(path, "2026-02-01", "B").warnings[0]
+
+
+def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_path):
+    first, second = rate_force.traces
+    ragged = replace(
+        first,
+        time=np.sort(np.random.default_rng(0).uniform(0, 8, first.time.size)),
+    )
+    broken = replace(
+        rate_force, traces=(ragged, second), circuit=replace(Circuit(), V_S=1e-3)
+    )
+    report = write(tmp_path, broken)
+    assert any("No I_DS" in note for note in report.findings.notes)
+    assert sum(t.response.spikes for t in report.findings.trials) > 30
+    assert report.html.exists()

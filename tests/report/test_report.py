@@ -1,0 +1,173 @@
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from tactile_lab.report.figure import figure
+from tactile_lab.report.findings import find, stretches
+from tactile_lab.report.run_data import TrialData
+from tactile_lab.report.table import table
+from tactile_lab.report.write import write
+from tactile_lab.waveform import Waveform
+
+
+class Outline(HTMLParser):
+    """Tags that stand open, and everything that would be fetched."""
+
+    void = ("meta", "link", "img", "br", "hr")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.fetched, self.tags, self.text = [], [], set(), []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        if tag not in self.void:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name in ("src", "href", "xlink:href") and not value.startswith("#"):
+                self.fetched.append(value)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.add(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def written(demo, tmp_path_factory):
+    return write(tmp_path_factory.mktemp("run"), demo, pdf=True)
+
+
+def test_it_writes_figure_page_and_numbers(written):
+    assert written.png.read_bytes().startswith(b"\x89PNG")
+    assert written.svg.read_text().count("<svg") == 1
+    assert written.png.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+    assert written.html.exists()
+
+
+def test_the_page_is_whole_and_fetches_nothing(written):
+    outline = Outline()
+    outline.feed(written.html.read_text(encoding="utf-8"))
+    assert outline.open == []
+    assert outline.fetched == []
+    assert "script" not in outline.tags
+    assert not re.search(r"url\((?!#)", written.html.read_text(encoding="utf-8"))
+
+
+def test_the_page_says_what_a_reader_must_know(written, demo):
+    outline = Outline()
+    outline.feed(written.html.read_text(encoding="utf-8"))
+    text = " ".join(outline.text)
+    for wanted in (
+        "Simulated bench", "72,000,000", "not identifiable", demo.warnings[0],
+        demo.assumptions[0], demo.accuracy, "KEPCO,BIT 4886", "163 mT", "V_GS",
+        "Eq. (16)", "complete",
+    ):  # fmt: skip
+        assert wanted in text
+
+
+def test_figures_of_the_page_follow_light_and_dark(written):
+    page = written.html.read_text(encoding="utf-8")
+    assert "prefers-color-scheme:dark" in page
+    inline = page[page.index("<svg") : page.index("</svg>")]
+    assert "var(--v-c1, #c84a00)" in inline
+    assert "#000000" not in inline
+
+
+def test_a_measured_run_is_marked_as_measured(demo, tmp_path):
+    report = write(tmp_path, replace(demo, simulated=False))
+    page = report.html.read_text(encoding="utf-8")
+    assert 'class="mark measured">Measured' in page
+    assert 'class="mark simulated"' not in page
+    assert json.loads(report.results.read_text())["simulated"] is False
+
+
+def test_results_json_holds_every_number_exactly(written, demo):
+    found = json.loads(written.results.read_text(encoding="utf-8"))
+    assert found["spikes"] == sum(t.spike_times.size for t in demo.trials)
+    assert found["loss"]["samples"] == 0
+    for trial, asked in zip(found["trials"], demo.trials, strict=True):
+        assert trial["spike_times_s"] == asked.spike_times.tolist()
+        assert trial["level_N"] == asked.level
+    silent = found["trials"][0]
+    assert silent["latency_s"] is None
+    assert silent["adaptation_why_not"] == "no spikes"
+
+
+def test_text_of_others_cannot_break_the_page(demo, tmp_path):
+    hostile = replace(
+        demo, title="<b>&", warnings=("<script>alert(1)</script>",), scene='"><i>'
+    )
+    page = write(tmp_path, hostile).html.read_text(encoding="utf-8")
+    assert "<script" not in page
+    outline = Outline()
+    outline.feed(page)
+    assert outline.open == []
+
+
+def test_the_table_has_one_row_per_trial(demo):
+    shown = table(find(demo))
+    assert [row[0] for row in shown.rows] == ["80 mN", "120 mN", "160 mN", "200 mN"]
+    assert shown.rows[0][1:] == ("0", "–", "–", "–", "–", "–")
+    spikes = [int(row[1]) for row in shown.rows]
+    assert spikes == sorted(spikes)
+    assert "10 are needed" in shown.rows[1][-1]
+    assert "a hold of 2 s is shorter" in shown.rows[3][-1]
+
+
+def test_the_table_stands_in_columns(demo):
+    lines = table(find(demo)).text.splitlines()
+    assert sum(not line.startswith(" ") for line in lines) == 6
+    assert max(map(len, lines)) <= 100
+    column = lines[0].index("Time constant")
+    assert all(line[column - 2 : column].strip() == "" for line in lines)
+
+
+def test_a_long_hold_gives_a_time_constant(run_maker):
+    findings = find(run_maker((0.2,), ramp=0.01, hold=10.0, rest=0.5))
+    fit = findings.trials[0].adaptation
+    assert fit is not None
+    assert 1 < fit.time_constant.value < 5
+    assert re.match(r"[\d.]+ s \([\d.]+ to", table(findings).rows[0][-1])
+
+
+def test_i_ds_is_derived_where_v_c1_is_known(demo):
+    findings = find(demo)
+    derived = findings.run.trace("I_DS")
+    assert derived is not None
+    assert derived.source == "derived"
+    assert derived.mean[:100].min() == pytest.approx(25e-9, abs=2e-9)
+    assert "Hz" in findings.notes[0]
+
+
+def test_pauses_are_no_results(demo):
+    pause = TrialData(
+        label="recovery", level=None, start=18.0, duration=50.0,
+        spike_times=np.array([]), pause=True,
+    )  # fmt: skip
+    findings = find(replace(demo, trials=(*demo.trials, pause), duration=68.0))
+    assert len(findings.trials) == 4
+
+
+def test_gaps_in_a_trace_split_it():
+    time = np.array([0.0, 1.0, 2.0, 9.0, 10.0])
+    assert stretches(time) == [slice(0, 3), slice(3, 5)]
+    assert stretches(np.array([])) == []
+
+
+def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
+    empty = replace(
+        demo, traces=(), trials=(), loss=None, accuracy="", warnings=(), settings={},
+        force=Waveform.constant(0.0), status="aborted",
+    )  # fmt: skip
+    report = write(tmp_path, empty)
+    assert "No trial was completed" in report.html.read_text(encoding="utf-8")
+    assert len(figure(report.findings).axes) == 2
