@@ -1,0 +1,97 @@
+"""``tactile-lab``: one verb per module of `commands`, imported when it is used."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import sys
+from collections.abc import Sequence
+
+import click
+
+VERBS = {
+    "gui": "Open the bench window.",
+    "run": "Run a scene on its bench and store every sample; the demo unless given.",
+    "plan": "What a scene needs and leaves out, its cost and limits; opens nothing.",
+    "simulate": "The model alone, no bench: spikes, error estimate, run time.",
+    "accuracy": "Error against run time: our solver and others, seven scenes.",
+    "stability": "Extreme cases: ours and others, right, wrong, NaN or timed out.",
+    "devices": "What is attached, what answers there, which dialect row fits.",
+    "doctor": "Environment, drivers, permissions, timing, disk; each with its remedy.",
+    "serve-bench": "Serve the simulated serial instruments to other programs.",
+    "runs": "The runs recorded so far; filter by protocol, sensor, date.",
+    "show": "What one run holds, in numbers, and where its figures are.",
+    "verify": "Check every sample and spike of a run; exit code 1 if damaged.",
+    "recover": "Make a run whole that was cut short by a crash.",
+    "export": "A run as CSV, MATLAB or NWB.",
+    "report": "Figure, page and numbers of a run, again from its data.",
+    "identify": "Fit parameters of the sensor to a run, with intervals.",
+    "transfer": "I_S, m and swing from a measured transfer curve.",
+}
+"""Verb and its line in ``--help``; verb ``x-y`` is `command` in commands/x_y.py."""
+
+INTERRUPTED = 130
+
+
+class LazyVerbs(click.Group):
+    """A group that imports a verb's module only when that verb is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All verbs, in the order of the table."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """The verb's command, None if there is no such verb."""
+        if name not in VERBS:
+            return None
+        module = f"tactile_lab.commands.{name.replace('-', '_')}"
+        command: click.Command = importlib.import_module(module).command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The verb called, or an error that names the nearest."""
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            import difflib
+
+            near = difflib.get_close_matches(args[0], VERBS, n=1)
+            hint = f' Did you mean "{near[0]}"?' if near else ""
+            raise click.UsageError(
+                f'There is no verb "{args[0]}".{hint} Verbs: {", ".join(VERBS)}.', ctx
+            )
+        return super().resolve_command(ctx, args)
+
+    def format_commands(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
+        """Write the verbs from the table, so that help imports none of them."""
+        with formatter.section("Verbs"):
+            formatter.write_dl(list(VERBS.items()))
+
+
+@click.group(
+    cls=LazyVerbs,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(package_name="tactile-lab")
+def cli() -> None:
+    """Instrument control for spiking, adapting piezoelectric tactile sensors."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit with its code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a pipe's encoding may lack µ or −
+    try:
+        code = cli.main(arguments, prog_name="tactile-lab", standalone_mode=False)
+    except click.ClickException as refused:
+        refused.show()
+        code = refused.exit_code
+    except click.Abort:
+        code = INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()  # nobody reads on: no message, no traceback
+        code = 1
+    sys.exit(code if isinstance(code, int) else 0)

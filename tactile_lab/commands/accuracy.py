@@ -1,0 +1,145 @@
+"""``tactile-lab accuracy``: error against run time, ours and other solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tactile_lab.commands.terminal import refusing
+
+if TYPE_CHECKING:
+    from tactile_lab.model.compare.contest import Row
+    from tactile_lab.model.compare.problem import Problem
+
+
+@click.command()
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write accuracy.md, accuracy.csv and accuracy.svg there.",
+)
+@click.option("--scene", "names", multiple=True, metavar="NAME", help="Only this one.")
+@click.option("--cap", default=20.0, show_default=True, help="Most seconds per run.")
+@click.option("--repeats", default=3, show_default=True, help="Timings; least counts.")
+@click.option(
+    "--campaign",
+    default=0,
+    metavar="N",
+    help="Also check the error estimate on N random scenes.",
+)
+def command(
+    out: Path | None, names: tuple[str, ...], cap: float, repeats: int, campaign: int
+) -> None:
+    """Compare solvers on seven scenes from easy to stiff.
+
+    Truth is a 40-digit reference. CVODE (scikit-sundae) and ngspice take part where
+    they are installed.
+    """
+    with refusing():
+        import os
+
+        # before numpy starts its threads
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
+        from tactile_lab.errors import ParameterError
+        from tactile_lab.model.compare.contest import contest, methods
+        from tactile_lab.model.compare.scenes import accuracy_scenes
+        from tactile_lab.model.compare.tables import figure, write_csv
+
+        scenes = accuracy_scenes()
+        unknown = set(names) - {s.name for s in scenes}
+        if unknown:
+            raise ParameterError(
+                f"There is no scene {min(unknown)!r}; choose from "
+                f"{', '.join(s.name for s in scenes)}."
+            )
+        chosen = [s for s in scenes if not names or s.name in names]
+        rows = list(contest(chosen, methods(repeats), cap, _say))
+        text = _report(chosen, rows, cap)
+        if campaign:
+            text += _honesty(campaign)
+        if out is None:
+            click.echo(text)
+            return
+        out.mkdir(parents=True, exist_ok=True)
+        write_csv(rows, out / "accuracy.csv")
+        figure(rows, out / "accuracy.svg")
+        (out / "accuracy.md").write_text(text, encoding="utf-8")
+        click.echo(f"Wrote accuracy.md, accuracy.csv and accuracy.svg to {out}.")
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)
+
+
+def _report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
+    from tactile_lab.model.compare.tables import best_rival, own, provenance, table
+    from tactile_lab.quantity import show
+
+    parts = [
+        "# Error against run time\n",
+        f"{provenance()} Written by `tactile-lab accuracy --out docs`.\n",
+        "Errors are the largest true error of any spike time and that of V_C1 at the "
+        "end, against a 40-digit reference. Times are the least of several, "
+        f"interleaved in one process (ngspice in its own); the cap is {cap:g} s. The "
+        "right-hand side is compiled for every solver. A wrong count, NaN, failure or "
+        "time-out is shown as such.\n",
+        "![work-precision diagram](accuracy.svg)\n",
+        "| scene | what | stiffness ratio | ours | error (s) | fastest other at 1e-9 s "
+        "or better | its time | ratio |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for scene in scenes:
+        here = [row for row in rows if row.scene == scene.name]
+        mine, rival = own(here), best_rival(here)
+        error = "" if mine.spike_error is None else f"{mine.spike_error:.1e}"
+        other = "none | | " if rival is None else (
+            f"{rival.method} {rival.setting} | {show(rival.run_time, 's', 3)} | "
+            f"{rival.run_time / mine.run_time:.0f}"
+        )  # fmt: skip
+        parts.append(
+            f"| {scene.name} | {scene.note} | {scene.stiffness:.1e} | "
+            f"{show(mine.run_time, 's', 3)} | {error} | {other} |"
+        )
+    for scene in scenes:
+        here = [row for row in rows if row.scene == scene.name]
+        parts += [f"\n## {scene.name}: {scene.note}\n", table(here)]
+    return "\n".join(parts) + "\n"
+
+
+def _honesty(count: int) -> str:
+    import numpy as np
+
+    from tactile_lab.model.campaign import compare, random_case
+
+    found = []
+    for seed in range(count):
+        found.append(compare(random_case(seed)))
+        if (seed + 1) % 50 == 0:
+            _say(f"{seed + 1} of {count} random scenes")
+    honest = sum(c.honest for c in found)
+    spiking = [c for c in found if c.spikes]
+    time_ratio = [
+        c.spike_time_estimate / c.spike_time for c in spiking if c.spike_time > 0
+    ]
+    V_ratio = [c.V_C1_estimate / c.V_C1 for c in found if c.V_C1 > 0]
+    default = [c for c in found if c.case.tolerance == 1e-9]
+    return "\n".join(
+        [
+            "\n## Is the error estimate honest?\n",
+            f"{count} random scenes and parameters (`tactile_lab/model/campaign.py`), "
+            f"{len(spiking)} of them with spikes, half at random tolerances:\n",
+            f"- count right and true errors below the estimates: {honest} of {count} "
+            f"({honest / count:.1%})",
+            f"- estimate over true error, median: {np.median(time_ratio):.1f} for "
+            f"spike times, {np.median(V_ratio):.1f} for V_C1",
+            "- largest true error at the default tolerance: "
+            f"{max(c.spike_time for c in default):.1e} s, "
+            f"{max(c.V_C1 for c in default):.1e} V",
+            "",
+        ]
+    )

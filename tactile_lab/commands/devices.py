@@ -1,0 +1,97 @@
+"""``tactile-lab devices``: what is attached, what it answers, which row fits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tactile_lab.commands.terminal import fail, print_json, refusing
+from tactile_lab.errors import TactileLabError
+
+FAULTED = 3
+
+
+@click.command()
+@click.option(
+    "--port",
+    "ports",
+    multiple=True,
+    metavar="PORT",
+    help="Ask there instead of looking for ports; any address pyserial takes.",
+)
+@click.option("--no-ask", is_flag=True, help="List only; send nothing to anything.")
+@click.option(
+    "--dialect",
+    metavar="ROW",
+    help="With one --port: open it as a run would, read back, make safe, close.",
+)
+@click.option("--baud", type=click.IntRange(50, 4_000_000), help="With --dialect.")
+@click.option(
+    "--transcript",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="With --dialect: write every byte there.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(
+    ports: tuple[str, ...],
+    no_ask: bool,
+    dialect: str | None,
+    baud: int | None,
+    transcript: Path | None,
+    as_json: bool,
+) -> None:
+    """List serial ports, scopes and what answers there.
+
+    USB serial adapters are asked for the instrument's name with the harmless *IDN?.
+    Nothing is set and no output is switched on.
+    """
+    from tactile_lab.plugins import attached
+
+    if dialect is not None:
+        if len(ports) != 1:
+            fail("--dialect needs exactly one --port.", 2)
+        _try_out(ports[0], dialect, baud, transcript, as_json)
+        return
+    if transcript is not None or baud is not None:
+        fail("--transcript and --baud need --dialect and --port.", 2)
+    with refusing():
+        found = attached(ask=not no_ask, ports=ports)
+    if as_json:
+        print_json({"devices": found})
+        return
+    if not found:
+        click.echo("Nothing is attached.")
+    for one in found:
+        _print(one)
+
+
+def _print(one: dict[str, Any]) -> None:
+    click.echo(f"{one['address']}  {one['title']}")
+    if one["identity"]:
+        click.echo(f"    answers   {one['identity']}")
+    if one["fits"]:
+        click.echo(f"    fits      {', '.join(one['fits'])}")
+    if one["problem"]:
+        click.echo(f"    problem   {one['problem']}")
+
+
+def _try_out(
+    port: str, dialect: str, baud: int | None, transcript: Path | None, as_json: bool
+) -> None:
+    from tactile_lab.errors import SceneError
+    from tactile_lab.plugins import try_out_device
+
+    try:
+        settings = try_out_device(port, dialect, baud=baud, transcript=transcript)
+    except SceneError as reason:
+        fail(str(reason), 2)
+    except TactileLabError as reason:
+        fail(str(reason), FAULTED)
+    else:
+        if as_json:
+            print_json(settings)
+        else:
+            for name, value in settings.items():
+                click.echo(f"{name:20}{value}")

@@ -1,0 +1,52 @@
+"""``tactile-lab doctor``: can this computer run an experiment, and if not, why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+PROBLEM = 1
+BYTES_PER_SAMPLE = 2
+
+
+@click.command()
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("runs"),
+    show_default=True,
+    metavar="DIR",
+    help="Where runs are to be stored.",
+)
+@click.option(
+    "--rate",
+    type=click.FloatRange(min=0, min_open=True),
+    default=4e6,
+    show_default=True,
+    metavar="SAMPLES/S",
+    help="Samples a second over all channels that a run must store.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(out: Path, rate: float, as_json: bool) -> None:
+    """Look at environment, drivers, permissions, timing and disk.
+
+    Opens no port and no instrument. Exit code 1 if there is a problem.
+    """
+    from tactile_lab.plugins import diagnose
+
+    with refusing():
+        findings = diagnose(out, rate * BYTES_PER_SAMPLE)
+    problems = sum(one["state"] == "problem" for one in findings)
+    if as_json:
+        print_json({"problems": problems, "findings": findings})
+    else:
+        for one in findings:
+            click.echo(f"{one['state']:8} {one['topic']:9} {one['text']}")
+            if one["remedy"]:
+                click.echo(f"{'':18} remedy: {one['remedy']}")
+        click.echo(f"{problems or 'no'} problem{'' if problems == 1 else 's'}")
+    if problems:
+        raise click.exceptions.Exit(PROBLEM)

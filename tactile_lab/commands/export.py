@@ -1,0 +1,71 @@
+"""``tactile-lab export``: a run for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tactile_lab.commands.terminal import fail, print_json, refusing
+
+FORMATS = ("csv", "mat", "nwb")
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--to", "form", type=click.Choice(FORMATS), required=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="PATH",
+    help="Folder (csv) or file (mat, nwb); beside the run's data unless given.",
+)
+@click.option("--signal", "signals", multiple=True, help="Only this one; repeatable.")
+@click.option("--from", "start", metavar="TIME", help='Such as "2 s".')
+@click.option("--until", "end", metavar="TIME", help='Such as "4.5 s".')
+@click.option("--rate", metavar="RATE", help='Average down, such as "1 kS/s".')
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(
+    run: Path,
+    form: str,
+    out: Path | None,
+    signals: tuple[str, ...],
+    start: str | None,
+    end: str | None,
+    rate: str | None,
+    as_json: bool,
+) -> None:
+    """Export RUN as CSV (SI, units in the header), MATLAB or NWB file."""
+    with refusing():
+        from tactile_lab.quantity import parse
+        from tactile_lab.store.export.selection import Selection
+        from tactile_lab.store.run import Run
+
+        selection = Selection(
+            signals=signals or None,
+            start=0.0 if start is None else parse(start, "s"),
+            end=None if end is None else parse(end, "s"),
+            rate=None if rate is None else parse(rate, "S/s"),
+        )
+        target = out or run / (
+            "csv" if form == "csv" else f"{run.resolve().name}.{form}"
+        )
+        with Run.load(run) as loaded:
+            try:
+                written = _exporter(form)(loaded, target, selection)
+            except OSError as error:
+                fail(f"{target} cannot be written: {error.strerror or error}.", 2)
+                return
+    if as_json:
+        print_json({"run": str(run), "files": [str(file) for file in written]})
+    else:
+        for file in written:
+            click.echo(str(file))
+
+
+def _exporter(form: str) -> Any:
+    """The `export` of that format; loads only its own libraries."""
+    import importlib
+
+    return importlib.import_module(f"tactile_lab.store.export.{form}").export

@@ -1,0 +1,52 @@
+"""``tactile-lab gui``: the bench window."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+
+import click
+
+INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
+
+
+@click.command()
+@click.argument("target", required=False, metavar="[SCENE|RUN]")
+@click.option(
+    "--bench",
+    default="sim",
+    show_default=True,
+    metavar="FILE|sim|none",
+    help="Bench to connect to.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("runs"),
+    show_default=True,
+    metavar="DIR",
+    help="Where run folders are put.",
+)
+@click.option(
+    "--theme", type=click.Choice(["system", "light", "dark"]), default="system",
+    show_default=True, help="Colours.",
+)  # fmt: skip
+def command(target: str | None, bench: str, out: Path, theme: str) -> None:
+    """Open the bench window, on SCENE, PROTOCOL.py or a RUN folder if given."""
+    if importlib.util.find_spec("PySide6") is None:
+        raise click.ClickException(
+            "The window needs Qt, which is not installed. In the checkout: "
+            f'pip install -e ".[gui]"; or alone: {INSTALL}'
+        )
+    try:
+        app = importlib.import_module("gui.app")
+    except ImportError as error:
+        raise click.ClickException(
+            f"Qt does not load: {error}. On Debian its libraries come with: apt-get "
+            "install libegl1 libgl1 libxkbcommon0 libdbus-1-3 libfontconfig1"
+        ) from error
+    sys.exit(
+        app.main(target, out=out, bench=None if bench == "none" else bench, theme=theme)
+    )

@@ -1,0 +1,64 @@
+"""``tactile-lab identify``: fit parameters of the sensor to a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing, warn
+
+if TYPE_CHECKING:
+    from tactile_lab.analysis.identify import Identified
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("parameters", nargs=-1, required=True)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
+    """Fit PARAMETERS (such as V_GS tau) to V_C1 and the spikes of RUN.
+
+    The others keep the values of the run's scene. Warns of parameters that the run does
+    not determine.
+    """
+    with refusing():
+        from tactile_lab.report.from_run import read
+        from tactile_lab.report.identified import identify_run
+
+        found = identify_run(read(run), parameters)
+    if as_json:
+        print_json(answer(found))
+        return
+    for name, estimate in found.estimates.items():
+        click.echo(
+            f"{name:8} {estimate.value:.6g}  "
+            f"({estimate.low:.6g} to {estimate.high:.6g}, 95 %)"
+        )
+    if found.scatter_V_C1 is not None:
+        click.echo(
+            f"V_C1 is left with {found.scatter_V_C1 * 1e3:.2g} mV of scatter. The "
+            "intervals are of noise alone, without the offset of the scope's channel."
+        )
+    for text in found.warnings:
+        warn(text)
+
+
+def answer(found: Identified) -> dict[str, Any]:
+    """The object printed by ``--json``; SI units."""
+    return {
+        "parameters": {
+            name: {
+                "value": e.value,
+                "error": e.error,
+                "low_95": e.low,
+                "high_95": e.high,
+            }
+            for name, e in found.estimates.items()
+        },
+        "correlation": found.correlation.tolist(),
+        "scatter_V_C1_V": found.scatter_V_C1,
+        "scatter_V_fire_V": found.scatter_V_fire,
+        "warnings": list(found.warnings),
+    }

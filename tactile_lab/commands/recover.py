@@ -1,0 +1,40 @@
+"""``tactile-lab recover``: make a run whole that was cut short."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(run: Path, as_json: bool) -> None:
+    """Recover RUN after a crash: readable by any program, status and spikes restored.
+
+    Works on a copy; the file as the crash left it stays as data.killed.h5.
+    """
+    with refusing():
+        from tactile_lab.store.recover import recover
+
+        done = recover(run)
+    if as_json:
+        print_json(
+            {
+                "run": str(run),
+                "samples": done.samples,
+                "dropped": done.dropped,
+                "spikes": done.spikes,
+                "original": None if done.original is None else str(done.original),
+            }
+        )
+        return
+    click.echo(
+        f"{run}: {done.samples} samples per channel and {done.spikes} spikes "
+        f"recovered, {done.dropped} samples dropped because not all channels had them"
+    )
+    if done.original is not None:
+        click.echo(f"the file as it was: {done.original} (delete it when content)")

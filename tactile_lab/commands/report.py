@@ -1,0 +1,46 @@
+"""``tactile-lab report``: figure, page and numbers of a run, again from its data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--pdf", is_flag=True, help="Also write the figures as PDF.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder to write into; the run's own unless given.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print results.json to stdout.")
+def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
+    """Write figure, report.html and results.json of RUN from its stored data."""
+    with refusing():
+        from tactile_lab.errors import RunFolderError
+        from tactile_lab.report.from_run import read
+        from tactile_lab.report.results import results
+        from tactile_lab.report.table import table
+        from tactile_lab.report.write import write
+
+        data, folder = read(run), out or run
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            written = write(folder, data, pdf=pdf)
+        except OSError as reason:
+            raise RunFolderError(
+                f"{folder} cannot be written: {reason.strerror}. Name another folder "
+                "with --out."
+            ) from reason
+    if as_json:
+        print_json(results(written.findings))
+        return
+    click.echo(table(written.findings).text)
+    for sentence in written.findings.conclusion.sentences:
+        click.echo(sentence)
+    click.echo(f"figure  {written.png}")
+    click.echo(f"report  {written.html}")

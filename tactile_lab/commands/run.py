@@ -1,0 +1,310 @@
+"""``tactile-lab run``: execute a scene on its bench, the main job."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactile_lab.commands.terminal import (
+    Progress,
+    fail,
+    print_json,
+    refusing,
+    scene_options,
+    warn,
+)
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.events import Event
+    from tactile_lab.acquisition.execution import Executed, Execution
+    from tactile_lab.bench import Bench
+    from tactile_lab.report.write import Report
+    from tactile_lab.scene.scene import Scene
+    from tactile_lab.store.compare import Differences
+
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+
+
+@click.command()
+@scene_options
+@click.option("--realtime", is_flag=True, help="Pace the simulated bench by the clock.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("runs"),
+    show_default=True,
+    metavar="DIR",
+    help="Where run folders are put.",
+)
+@click.option(
+    "--note",
+    "notes",
+    multiple=True,
+    metavar="KEY=TEXT",
+    help='Kept with the run, such as --note operator="A. Petaru".',
+)
+@click.option(
+    "--transcript",
+    "transcripts",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write every byte to and from the serial instruments into files there.",
+)
+@click.option(
+    "--again",
+    type=click.Path(path_type=Path),
+    metavar="RUN",
+    help="Repeat the run in folder RUN and say what differs.",
+)
+@click.option("--no-report", is_flag=True, help="Leave out figure and report.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(
+    scene: str | None,
+    overrides: tuple[str, ...],
+    bench: str | None,
+    realtime: bool,
+    out: Path,
+    notes: tuple[str, ...],
+    transcripts: Path | None,
+    again: Path | None,
+    no_report: bool,
+    as_json: bool,
+) -> None:
+    """Run SCENE (or PROTOCOL.py; the demo unless given) and store every sample.
+
+    Exit codes: 0 complete, 2 refused before anything was opened, 3 faulted with the
+    coil verified off, 4 the coil's state could not be verified, 129, 130 or 143
+    interrupted by SIGHUP, SIGINT or SIGTERM with the coil verified off.
+    """
+    began = time.monotonic()
+    with refusing():
+        from tactile_lab.acquisition.execution import Execution
+
+        loaded = _scene(scene, overrides, bench, again)
+        narrator = Narrator(loaded.name)
+        execution = Execution(
+            loaded, out, realtime=realtime, emit=narrator, notes=_notes(notes)
+        )
+        if transcripts is not None:
+            record(execution.bench, transcripts)
+        for text in execution.plan.warnings:
+            warn(text)
+    narrator.expect(execution.plan.estimate.duration)
+    done, error = run_guarded(execution)
+    narrator.close()
+    if done is None:
+        fail(str(error), 3)
+        return
+    report = None if no_report else _report(done)
+    changed = None if again is None else _differences(again, done)
+    if as_json:
+        print_json(answer(done, report, changed))
+    else:
+        _print(done, report, time.monotonic() - began)
+        if changed is not None:
+            click.echo(f"against {again}\n{changed}")
+    if done.ending.exit_code:
+        fail(_why(done), done.ending.exit_code)
+
+
+def record(bench: Bench, folder: Path) -> None:
+    """Have each serial instrument of `bench` write a transcript into `folder`.
+
+    Raises:
+        SceneError: the files cannot be written.
+    """
+    from tactile_lab.errors import SceneError
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise SceneError(
+            f"Transcripts cannot be put into {folder}: {reason}"
+        ) from reason
+    for name in ("coil", "field_meter"):
+        start = getattr(getattr(bench, name), "record", None)
+        if start is not None:
+            start(folder / f"{name}.txt")
+
+
+class Narrator:
+    """Tells on stderr how the run goes."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._progress: Progress | None = None
+        self._trial = ""
+
+    def expect(self, duration: float) -> None:
+        """The run will take `duration` s of its own time."""
+        self._progress = Progress(duration, self._label)
+
+    def __call__(self, event: Event) -> None:
+        """Take an event of the run."""
+        from tactile_lab.acquisition import events
+
+        progress = self._progress
+        if progress is None:
+            return
+        match event:
+            case events.TrialStarted(trial=trial):
+                self._trial = trial.label
+            case events.Progress(elapsed=elapsed):
+                progress.update(elapsed, self._trial)
+            case events.Message(level=level, text=text):
+                progress.note(f"{level}: {text}")
+            case events.StateChanged(state=events.RunState.STOPPING, text=text):
+                progress.note(text)
+
+    def close(self) -> None:
+        """Leave the terminal ready for other output."""
+        if self._progress is not None:
+            self._progress.close()
+
+
+def run_guarded(execution: Execution) -> tuple[Executed | None, Exception | None]:
+    """Run in a thread of its own while this one minds the signals.
+
+    The first signal asks for a safe end, a second for one without ramp; no number of
+    them ends the program before the coil's state has been verified or given up.
+    """
+    done: list[Executed] = []
+    failed: list[Exception] = []
+
+    def work() -> None:
+        try:
+            done.append(execution.run())
+        except Exception as error:
+            failed.append(error)
+
+    worker = threading.Thread(target=work, name="runner")
+    with _caught_signals() as caught:
+        worker.start()
+        told = 0
+        while worker.is_alive():
+            worker.join(0.05)
+            for number in caught[told:]:
+                name = signal.Signals(number).name
+                execution.stop(f"stopped by {name}", signal=number)
+            told = len(caught)
+    return (done[0] if done else None, failed[0] if failed else None)
+
+
+@contextmanager
+def _caught_signals() -> Iterator[list[int]]:
+    """The numbers of the signals that ask to stop, as they come."""
+    caught: list[int] = []
+    numbers = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
+    before = {n: signal.signal(n, lambda got, _: caught.append(got)) for n in numbers}
+    try:
+        yield caught
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def answer(
+    done: Executed, report: Report | None, changed: Differences | None = None
+) -> dict[str, Any]:
+    """The documented object (docs/json.md)."""
+    return {
+        "run": str(done.folder),
+        "status": str(done.ending.state),
+        "spikes": done.spikes,
+        "loss": dict(done.loss),
+        "duration_s": done.duration,
+        "run_time_s": done.took,
+        "reason": done.ending.reason,
+        "coil": done.ending.off.text,
+        "coil_verified_off": done.ending.off.verified,
+        "report": None if report is None else str(report.html),
+        "differences": None if changed is None else asdict(changed),
+    }
+
+
+def _scene(
+    path: str | None, overrides: tuple[str, ...], bench: str | None, again: Path | None
+) -> Scene:
+    """The scene asked for, or the resolved one of the run to repeat."""
+    from tactile_lab.errors import SceneError
+    from tactile_lab.scene.load import load
+
+    if again is None:
+        return load(path, overrides, bench)
+    if path is not None:
+        raise SceneError(f"--again {again} repeats that run; leave {path} out.")
+    from tactile_lab.store.folder import read_info
+
+    name = str(read_info(again).get("scene", again.name))
+    return replace(load(again / "scene.toml", overrides, bench), name=name)
+
+
+def _differences(again: Path, done: Executed) -> Differences | None:
+    from tactile_lab.errors import TactileLabError
+    from tactile_lab.store.compare import differences
+
+    try:
+        return differences(again, done.folder)
+    except TactileLabError as error:
+        warn(f"the runs cannot be compared: {error}")
+        return None
+
+
+def _notes(notes: tuple[str, ...]) -> dict[str, str]:
+    from tactile_lab.errors import SceneError
+
+    found = {}
+    for note in notes:
+        key, equals, text = note.partition("=")
+        if not (key and equals):
+            raise SceneError(
+                f'--note "{note}": write KEY=TEXT, such as operator="Ada".'
+            )
+        found[key.strip()] = text
+    return found
+
+
+def _report(done: Executed) -> Report | None:
+    from tactile_lab.errors import TactileLabError
+    from tactile_lab.report.from_run import read
+    from tactile_lab.report.write import write
+
+    try:
+        return write(done.folder, read(done.folder))
+    except (TactileLabError, OSError) as error:
+        warn(f"the report could not be written: {error}")
+        return None
+
+
+def _print(done: Executed, report: Report | None, took: float) -> None:
+    from tactile_lab.report.table import table
+
+    if report is not None:
+        run = report.findings.run
+        click.echo(table(report.findings).text)
+        click.echo()
+        for sentence in report.findings.conclusion.sentences:
+            click.echo(sentence)
+        click.echo(
+            f"{done.duration:.1f} s of experiment in {took:.1f} s "
+            f"({done.took:.1f} s of it running)."
+        )
+        if run.accuracy:
+            click.echo(run.accuracy)
+        if run.loss is not None:
+            click.echo(run.loss.sentence)
+        click.echo(f"figure  {report.png}")
+        click.echo(f"report  {report.html}")
+    click.echo(f"run     {done.folder}")
+
+
+def _why(done: Executed) -> str:
+    return f"{done.ending.state}: {done.ending.reason} {done.ending.off.text}"

@@ -1,0 +1,82 @@
+"""``tactile-lab serve-bench``: the simulated serial instruments for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+
+@click.command()
+@click.option("--coil", metavar="pty|tcp:PORT", help="Serve a current source there.")
+@click.option("--teslameter", metavar="pty|tcp:PORT", help="Serve a teslameter there.")
+@click.option("--coil-dialect", default="kepco-bop", show_default=True, metavar="ROW")
+@click.option(
+    "--teslameter-dialect", default="lakeshore-425", show_default=True, metavar="ROW"
+)
+@click.option("--baud", type=click.IntRange(50, 4_000_000), help="Of the source.")
+@click.option(
+    "--paced", is_flag=True, help="Let bytes take the time the baud rate gives them."
+)
+@click.option(
+    "--log",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Append what the source is told, one JSON line each.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(
+    coil: str | None,
+    teslameter: str | None,
+    coil_dialect: str,
+    teslameter_dialect: str,
+    baud: int | None,
+    paced: bool,
+    log: Path | None,
+    as_json: bool,
+) -> None:
+    """Serve the simulated coil source and teslameter until Ctrl-C.
+
+    One coil is behind both. Without --coil and --teslameter both are served on
+    pseudo-terminals. The addresses printed are ports for a bench file, and for any
+    program that uses pyserial.
+    """
+    from tactile_lab.plugins import serve_bench
+
+    if coil is None and teslameter is None:
+        coil = teslameter = "pty"
+    with refusing():
+        served = serve_bench(
+            coil=coil,
+            teslameter=teslameter,
+            coil_row=coil_dialect,
+            meter_row=teslameter_dialect,
+            baud=baud,
+            paced=paced,
+            log=log,
+        )
+    served.start()
+    if as_json:
+        print_json(served.addresses)
+    else:
+        for name, address in served.addresses.items():
+            click.echo(f"{name:12}{address}")
+        click.echo("Ctrl-C ends.", err=True)
+    try:
+        wait_for_end()
+    finally:
+        served.close()
+
+
+def wait_for_end() -> None:
+    """Return at Ctrl-C, or when the program is asked to end."""
+    import signal
+    import threading
+
+    ended = threading.Event()
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: ended.set())
+    while not ended.wait(0.2):
+        pass  # short waits, so that Windows lets Ctrl-C through

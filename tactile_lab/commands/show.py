@@ -1,0 +1,122 @@
+"""``tactile-lab show``: what one run holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+FIGURES = (".png", ".svg", ".pdf", ".html")
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(run: Path, as_json: bool) -> None:
+    """Show what RUN is, what it holds and where its figures are."""
+    with refusing():
+        summary = describe(run)
+    if as_json:
+        print_json(summary)
+    else:
+        _print(summary)
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """The documented object (docs/run-folder.md); also for runs without samples.
+
+    Raises:
+        RunFolderError: not a run folder, or its data cannot be read.
+    """
+    from tactile_lab.errors import RunFolderError
+    from tactile_lab.store.folder import DATA, is_live, read_info
+    from tactile_lab.store.run import Run
+
+    info = read_info(path)
+    cut = info["status"] == "running" and not is_live(path)
+    summary: dict[str, Any] = {
+        "run": str(path),
+        "status": "cut short" if cut else info["status"],
+        "reason": info.get("reason"),
+        "started": info.get("started"),
+        "protocol": info.get("protocol"),
+        "scene": info.get("scene"),
+        "bench": info.get("bench"),
+        "simulated": info.get("simulated"),
+        "notes": info.get("notes") or {},
+        "loss": info.get("loss"),
+        "duration_s": None,
+        "signals": {},
+        "spikes": None,
+        "trials": [],
+        "overrange_blocks": 0,
+        "figures": sorted(
+            str(file) for file in path.iterdir() if file.suffix in FIGURES
+        ),
+    }
+    try:
+        loaded = Run.load(path) if (path / DATA).exists() else None
+    except RunFolderError:
+        if not cut:
+            raise
+        loaded = None  # killed before its first sample
+    if loaded is not None:
+        with loaded as run:
+            summary["duration_s"] = run.duration
+            summary["signals"] = {
+                name: {
+                    "unit": signal.unit,
+                    "samples": len(signal),
+                    "sample_rate_Hz": 1.0 / signal.interval,
+                    "resolution": abs(signal.gain),
+                }
+                for name in run.signals
+                for signal in [run.signal(name)]
+            }
+            summary["spikes"] = int(run.spikes.size)
+            summary["trials"] = [
+                {
+                    "label": row["label"].decode(),
+                    "level_N": None if row["level"] != row["level"] else row["level"],
+                    "start_s": float(row["start"]),
+                    "end_s": float(row["end"]),
+                    "spikes": int(row["spikes"]),
+                }
+                for row in run.trials
+            ]
+            summary["overrange_blocks"] = int(run.records("overrange").size)
+    return summary
+
+
+def _print(summary: dict[str, Any]) -> None:
+    from tactile_lab.quantity import show
+
+    kind = "simulated" if summary["simulated"] else "measured"
+    click.echo(f"{summary['run']}: {summary['status']}, {kind}")
+    for key in ("reason", "started", "protocol", "scene", "bench"):
+        if summary[key]:
+            click.echo(f"{key:<11} {summary[key]}")
+    for key, text in summary["notes"].items():
+        click.echo(f"{key:<11} {text}")
+    if summary["duration_s"] is not None:
+        click.echo(f"duration    {show(summary['duration_s'], 's')}")
+    for name, signal in summary["signals"].items():
+        rate = show(signal["sample_rate_Hz"], "S/s")
+        step = show(signal["resolution"], signal["unit"], 3)
+        click.echo(f"{name:<11} {signal['samples']} samples, {rate}, step {step}")
+    if summary["spikes"] is not None:
+        click.echo(f"spikes      {summary['spikes']}")
+    for trial in summary["trials"]:
+        click.echo(
+            f"trial       {trial['label']:<12} {trial['start_s']:.3f} to "
+            f"{trial['end_s']:.3f} s, {trial['spikes']} spikes"
+        )
+    if summary["overrange_blocks"]:
+        click.echo(f"over range  in {summary['overrange_blocks']} blocks")
+    if summary["loss"]:
+        click.echo(summary["loss"]["text"])
+    for figure in summary["figures"]:
+        click.echo(f"figure      {figure}")

@@ -1,0 +1,124 @@
+"""``tactile-lab simulate``: the model alone; the force is taken as given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing, scene_options, warn
+
+if TYPE_CHECKING:
+    from tactile_lab.model.simulate import Result
+    from tactile_lab.scene.scene import Scene
+
+MOST_SAMPLES = 10_000_000
+
+
+@click.command()
+@scene_options
+@click.option(
+    "--samples",
+    type=click.IntRange(2, MOST_SAMPLES),
+    help="Also sample the recorded signals at so many points, both ends included.",
+)
+@click.option(
+    "--tolerance",
+    type=float,
+    default=1e-9,
+    show_default=True,
+    metavar="SECONDS",
+    help="Error of spike times aimed at, s (and of V_C1, V).",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(
+    scene: str | None,
+    overrides: tuple[str, ...],
+    bench: str | None,
+    samples: int | None,
+    tolerance: float,
+    as_json: bool,
+) -> None:
+    """Simulate the sensor of SCENE (the demo unless given) under its force.
+
+    Opens no bench and writes nothing: no coil, calibration or limit applies.
+    """
+    with refusing():
+        from tactile_lab.plan.preview import model
+        from tactile_lab.plan.timeline import timeline
+        from tactile_lab.scene.load import load
+        from tactile_lab.signals import BENCH_ONLY
+
+        loaded = load(scene, overrides, bench)
+        drive = timeline(loaded, through_coil=False)
+        keep = [name for name in loaded.record.signals if name not in BENCH_ONLY]
+        result = model(loaded, drive.force, drive.duration, keep, tolerance)
+        report = answer(loaded, result, samples)
+    if as_json:
+        for text in report["warnings"]:
+            warn(text)
+        print_json(report)
+    else:
+        _print(loaded, result, report)
+
+
+def answer(scene: Scene, result: Result, samples: int | None) -> dict[str, Any]:
+    """The documented object (docs/json.md)."""
+    from tactile_lab.signals import BENCH_ONLY
+
+    wanted = scene.record.signals
+    bench_only = [name for name in wanted if name in BENCH_ONLY]
+    warnings = list(result.warnings)
+    for name in bench_only:
+        warnings.append(f"{name} exists only on a bench; simulate leaves it out.")
+    spikes = result.spike_times if "spikes" in wanted else None
+    return {
+        "spike_times_s": None if spikes is None else spikes.tolist(),
+        "samples": None if samples is None else _sampled(scene, result, samples),
+        "error_estimate": {
+            "spike_time_s": result.error.spike_time,
+            "V_C1_V": result.error.V_C1,
+        },
+        "run_time_s": result.run_time,
+        "left_out": [*result.left_out, *bench_only],
+        "warnings": warnings,
+    }
+
+
+def _sampled(scene: Scene, result: Result, samples: int) -> dict[str, list[float]]:
+    import numpy as np
+
+    from tactile_lab.signals import BENCH_ONLY
+
+    times = np.linspace(0.0, result.duration, samples)
+    found = {"time_s": times.tolist()}
+    for name in scene.record.signals:
+        if name not in BENCH_ONLY and name != "spikes":
+            found[name] = result.sample(name, times).tolist()
+    return found
+
+
+def _print(scene: Scene, result: Result, report: dict[str, Any]) -> None:
+    from tactile_lab.quantity import show
+
+    click.echo(f"{scene.name}: {show(result.duration, 's')} of the model")
+    spikes = report["spike_times_s"]
+    if spikes is not None:
+        when = f", first {spikes[0]:.9f} s, last {spikes[-1]:.9f} s" if spikes else ""
+        click.echo(f"spikes      {len(spikes)}{when}")
+    error = report["error_estimate"]
+    known = [
+        f"{show(value, unit, 2)} {what}"
+        for value, unit, what in (
+            (error["spike_time_s"], "s", "in spike times"),
+            (error["V_C1_V"], "V", "in V_C1"),
+        )
+        if value is not None
+    ]
+    if known:
+        click.echo(f"error       at most about {', '.join(known)}")
+    click.echo(f"run time    {show(report['run_time_s'], 's', 3)}")
+    if report["left_out"]:
+        click.echo(f"left out    {', '.join(report['left_out'])}")
+    for text in report["warnings"]:
+        warn(text)

@@ -1,0 +1,61 @@
+"""``tactile-lab transfer``: I_S, m and swing from a transfer curve (Fig. 1c)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+
+@click.command()
+@click.argument("curve", type=click.Path(path_type=Path))
+@click.option(
+    "--between",
+    nargs=2,
+    metavar="LOW HIGH",
+    help='V_GS to fit, such as --between "0.5 V" "2.5 V".',
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(curve: Path, between: tuple[str, str] | None, as_json: bool) -> None:
+    """Fit the subthreshold regime of CURVE, a CSV of V_GS and I_DS.
+
+    The first line is "V_GS_V,I_DS_A" or an analyser's "VG,ID"; SI units.
+    """
+    with refusing():
+        from tactile_lab.analysis.transfer import fit_transfer, read_transfer
+        from tactile_lab.quantity import parse, show
+
+        limits = None
+        if between is not None:
+            limits = (parse(between[0], "V"), parse(between[1], "V"))
+        fit = fit_transfer(*read_transfer(curve), between=limits)
+    found = {"I_S_A": fit.I_S, "m": fit.m, "swing_V_per_decade": fit.swing}
+    if as_json:
+        print_json(
+            {
+                **{
+                    name: {
+                        "value": e.value,
+                        "error": e.error,
+                        "low_95": e.low,
+                        "high_95": e.high,
+                    }
+                    for name, e in found.items()
+                },
+                "points": fit.points,
+                "between_V": list(fit.range),
+                "scatter": fit.scatter,
+            }
+        )
+        return
+    for name, estimate, unit in (
+        ("I_S", fit.I_S, "A"),
+        ("m", fit.m, ""),
+        ("swing", fit.swing, "V"),
+    ):
+        interval = f"{show(estimate.low, unit)} to {show(estimate.high, unit)}"
+        click.echo(f"{name:6} {show(estimate.value, unit)}  ({interval}, 95 %)")
+    low, high = fit.range
+    click.echo(f"from {fit.points} points between {low:g} V and {high:g} V")

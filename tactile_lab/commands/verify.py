@@ -1,0 +1,52 @@
+"""``tactile-lab verify``: is a run as it was written?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.terminal import print_json, refusing
+
+DAMAGED = 1
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(run: Path, as_json: bool) -> None:
+    """Check every chunk, checksum, counter and spike of RUN; change nothing.
+
+    Exit codes: 0 sound, 1 damage was found (and where), 2 not a folder.
+    """
+    with refusing():
+        from tactile_lab.errors import RunFolderError
+        from tactile_lab.store.verify import verify
+
+        if not run.is_dir():
+            raise RunFolderError(f"{run} is no folder; give the folder of one run.")
+        verdict = verify(run)
+    proof = verdict.certificate
+    if as_json:
+        print_json(
+            {
+                "run": str(run),
+                "sound": verdict.sound,
+                "findings": [
+                    {"where": finding.where, "what": finding.what}
+                    for finding in verdict.findings
+                ],
+                "notes": list(verdict.notes),
+                "loss": proof.to_json() if proof else None,
+            }
+        )
+    else:
+        for finding in verdict.findings:
+            click.echo(f"damage      {finding}")
+        for note in verdict.notes:
+            click.echo(f"note        {note}")
+        if proof is not None:
+            click.echo(str(proof))
+        click.echo("sound" if verdict.sound else f"{len(verdict.findings)} findings")
+    if not verdict.sound:
+        raise click.exceptions.Exit(DAMAGED)

@@ -1,0 +1,78 @@
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tactile_lab.acquisition.execution import Execution
+from tactile_lab.cli import cli
+from tactile_lab.scene.load import load
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    scene = load("demo", ['protocol.levels=["180 mN"]', 'protocol.rest="0.5 s"'])
+    return Execution(scene, tmp_path_factory.mktemp("runs")).run().folder
+
+
+def call(*arguments):
+    return CliRunner().invoke(cli, [str(a) for a in arguments])
+
+
+def test_report_writes_all_files_again(run_folder, tmp_path):
+    done = call("report", run_folder, "--pdf", "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    assert "180 mN" in done.output
+    for name in ("figure.png", "figure.svg", "figure.pdf", "report.html"):
+        assert (tmp_path / name).exists()
+    printed = json.loads(call("report", run_folder, "--out", tmp_path, "--json").stdout)
+    assert printed == json.loads((tmp_path / "results.json").read_text())
+
+
+def test_report_of_no_run_is_refused(tmp_path):
+    done = call("report", tmp_path)
+    assert done.exit_code == 2
+    assert done.stdout == ""
+
+
+def test_report_into_an_unwritable_place_is_refused(run_folder, tmp_path):
+    (tmp_path / "file").write_text("")
+    done = call("report", run_folder, "--out", tmp_path / "file" / "inside")
+    assert done.exit_code == 2
+    assert "cannot be written" in done.stderr
+
+
+def test_identify_finds_the_bench_s_own_parameters(run_folder):
+    found = json.loads(call("identify", run_folder, "V_GS", "tau", "--json").stdout)
+    assert found["parameters"]["V_GS"]["value"] == pytest.approx(1.4, abs=5e-3)
+    assert found["parameters"]["tau"]["value"] == pytest.approx(8.69, rel=0.1)
+    assert "V_GS" in call("identify", run_folder, "V_GS").stdout
+
+
+def test_identify_refuses_what_is_no_parameter(run_folder):
+    done = call("identify", run_folder, "voltage")
+    assert done.exit_code == 2
+    assert "no numeric parameter" in done.stderr
+
+
+def test_transfer_fits_a_csv(tmp_path):
+    volts = np.linspace(0, 2.5, 26)
+    amperes = 1.216e-12 * np.exp(volts / (5.646 * 0.025))
+    path = tmp_path / "curve.csv"
+    path.write_text(
+        "VG,ID\n" + "\n".join(f"{v},{i}" for v, i in zip(volts, amperes, strict=True))
+    )
+    found = json.loads(call("transfer", path, "--json").stdout)
+    assert found["m"]["value"] == pytest.approx(5.646)
+    said = call("transfer", path, "--between", "1 V", "2 V").stdout
+    assert "11 points between 1 V and 2 V" in said
+
+
+def test_transfer_refuses_a_bad_file_and_a_bad_unit(tmp_path):
+    assert call("transfer", tmp_path / "none.csv").exit_code == 2
+    path = tmp_path / "curve.csv"
+    path.write_text("VG,ID\n0,1e-12\n1,nan\n")
+    done = call("transfer", path)
+    assert done.exit_code == 2
+    assert "line 3" in done.stderr
+    assert call("transfer", path, "--between", "1 A", "2 V").exit_code == 2

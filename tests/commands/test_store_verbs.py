@@ -1,0 +1,92 @@
+"""runs, show, verify, recover and export, as a user types them."""
+
+import json
+import runpy
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tactile_lab.cli import cli
+from tactile_lab.store.certificate import write_certificate
+from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.layout import Layout
+from tactile_lab.store.recorder import Recorder
+
+BENCH = runpy.run_path(str(Path(__file__).parents[1] / "store" / "conftest.py"))
+
+
+@pytest.fixture
+def run(tmp_path):
+    folder = RunFolder.create(
+        tmp_path / "runs",
+        "pulses",
+        {"protocol": "pulses", "simulated": True, "notes": {"sensor": "S12"}},
+    )
+    layout = Layout(
+        signals=BENCH["SIGNALS"], detection=BENCH["DETECTION"], simulated=True
+    )
+    recorder = Recorder(folder, layout, reserve=0)
+    BENCH["play"](recorder, BENCH["codes"](5000), 500)
+    recorder.close("complete", 5000, duration_s=5.0)
+    write_certificate(folder.path)
+    return folder.path
+
+
+def tell(*arguments):
+    return CliRunner().invoke(cli, [str(a) for a in arguments])
+
+
+def test_runs_lists_and_filters(run):
+    listed = tell("runs", run.parent)
+    assert listed.exit_code == 0
+    assert run.name in listed.output
+    assert "0 of 10000 samples" in listed.output
+    found = json.loads(tell("runs", run.parent, "--sensor", "S12", "--json").stdout)
+    assert [entry["name"] for entry in found["runs"]] == [run.name]
+    none = tell("runs", run.parent, "--protocol", "hold")
+    assert none.exit_code == 0
+    assert run.name not in none.output
+
+
+def test_show_tells_what_a_run_holds(run):
+    shown = tell("show", run)
+    assert shown.exit_code == 0
+    for part in ("complete, simulated", "V_K", "5000 samples", "7", "S12"):
+        assert part in shown.output
+    summary = json.loads(tell("show", run, "--json").stdout)
+    assert summary["signals"]["V_C1"]["samples"] == 5000
+    assert summary["loss"]["spikes"] == 0
+
+
+def test_verify_tells_sound_from_damaged(run):
+    sound = tell("verify", run)
+    assert (sound.exit_code, "sound" in sound.output) == (0, True)
+    data = bytearray((run / "data.h5").read_bytes())
+    (run / "data.h5").write_bytes(data[: len(data) // 3])
+    damaged = tell("verify", run, "--json")
+    assert damaged.exit_code == 1
+    assert json.loads(damaged.stdout)["findings"][0]["where"].startswith("data.h5")
+
+
+def test_recover_refuses_a_whole_run(run):
+    refused = tell("recover", run)
+    assert refused.exit_code == 2
+    assert "not cut short" in refused.output
+
+
+def test_export_writes_beside_the_data(run):
+    done = tell("export", run, "--to", "csv", "--from", "1 s", "--until", "2 s")
+    assert done.exit_code == 0, done.output
+    assert len((run / "csv" / "signals.csv").read_text().splitlines()) == 1001
+    assert tell("export", run, "--to", "mat").exit_code == 0
+    wrong = tell("export", run, "--to", "csv", "--from", "1 V")
+    assert wrong.exit_code == 2
+    assert "unit V" in wrong.output
+
+
+@pytest.mark.parametrize("verb", ["show", "verify", "recover"])
+def test_a_folder_that_is_no_run_is_one_clear_message(verb, tmp_path):
+    missing = tell(verb, tmp_path / "nothing")
+    assert missing.exit_code == 2
+    assert "Traceback" not in missing.output

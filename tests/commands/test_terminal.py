@@ -1,0 +1,93 @@
+"""Progress, warnings, and errors as one message with a code."""
+
+import io
+
+import click
+import pytest
+
+from tactile_lab.commands.terminal import Progress, print_json, refusing
+from tactile_lab.errors import SceneError
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+class Watch:
+    def __init__(self):
+        self.time = 0.0
+
+    def __call__(self):
+        return self.time
+
+
+def test_piped_progress_is_a_plain_line_per_tenth():
+    stream, watch = io.StringIO(), Watch()
+    with Progress(100.0, "demo", stream, watch) as progress:
+        for done in range(1001):
+            watch.time = done / 100
+            progress.update(done / 10)
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 11
+    assert "\r" not in stream.getvalue()
+    assert "50%" in lines[5]
+    assert "5 s left" in lines[5]
+
+
+def test_progress_on_a_terminal_redraws_one_line_with_the_time_left():
+    stream, watch = Terminal(), Watch()
+    with Progress(10.0, "demo", stream, watch) as progress:
+        watch.time = 30.0
+        progress.update(5.0, "120 mN")
+        shown = stream.getvalue()
+        assert "30 s left" in shown
+        assert "120 mN" in shown
+        assert "\n" not in shown
+    assert stream.getvalue().endswith("\r")
+
+
+def test_redraws_are_few():
+    stream, watch = Terminal(), Watch()
+    progress = Progress(1.0, "demo", stream, watch)
+    for step in range(1000):
+        watch.time += 1e-3
+        progress.update(step / 1000)
+    assert stream.getvalue().count("\r") <= 12
+
+
+def test_notes_stand_on_their_own_lines():
+    stream = Terminal()
+    progress = Progress(1.0, "demo", stream, Watch())
+    progress.update(0.5)
+    progress.note("warning: something")
+    assert "\rwarning: something\n" in stream.getvalue()
+
+
+def test_progress_of_nothing_and_beyond_the_end():
+    stream = io.StringIO()
+    Progress(0.0, "demo", stream, Watch()).update(0.0)
+    Progress(1.0, "demo", stream, Watch()).update(2.0)
+    assert stream.getvalue().count("100%") == 2
+
+
+def test_our_errors_become_one_message_and_code_2(capsys):
+    with pytest.raises(click.exceptions.Exit) as end, refusing():
+        raise SceneError("no such thing")
+    assert end.value.exit_code == 2
+    assert capsys.readouterr().err == "tactile-lab: no such thing\n"
+
+
+def test_other_errors_are_bugs_and_keep_their_trace():
+    with pytest.raises(ZeroDivisionError), refusing():
+        _ = 1 / 0
+
+
+def test_json_refuses_nan():
+    with pytest.raises(ValueError, match="JSON"):
+        print_json({"x": float("nan")})
+
+
+def test_json_keeps_full_precision(capsys):
+    print_json({"x": 0.1 + 0.2})
+    assert capsys.readouterr().out == '{"x": 0.30000000000000004}\n'
