@@ -1,0 +1,1 @@
+"""One file per measurement protocol; scenes/ holds ready-to-run scenes."""

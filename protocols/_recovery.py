@@ -1,0 +1,95 @@
+"""Recovery between trials: V_P is a high-pass of force and must die away first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from tactile_lab.errors import LimitError
+from tactile_lab.quantity import Duration, Unit, show
+from tactile_lab.trial import Outcome, Protocol, Trial
+from tactile_lab.waveform import Waveform
+
+Steps = Generator[Trial, Outcome, None]
+SmallVoltage = Annotated[float, Unit("V", above=0.0)]
+PerForce = Annotated[float, Unit("V/N", above=0.0)]
+
+MOST_EXTENSIONS = 6
+"""After so many extensions V_C1 is taken to have drifted, not to be recovering."""
+LOOK = 0.2
+"""Time the bench streams to look at V_C1 before it goes on, s."""
+
+
+class Recovering(Protocol):
+    """A protocol whose trials each start from rest.
+
+    After a force F the recovery lasts tau ln(k_F |F| / residual): about 50 s after
+    200 mN. It is neither streamed nor stored. Where V_C1 is recorded it is looked at
+    afterwards and the recovery extended until V_C1 is back.
+    """
+
+    tau: Duration = Field(default=8.69, description="Leakage time of the AlScN film")
+    volts_per_newton: PerForce = Field(
+        default=1.529750693, description="V_P per force, Eqs. (3)-(6)"
+    )
+    residual: SmallVoltage = Field(
+        default=1e-3, description="V_P that may be left when the next trial starts"
+    )
+    settled: SmallVoltage = Field(
+        default=20e-3, description="How near V_C1 must be to its first rest value"
+    )
+    drift_limit: SmallVoltage = Field(
+        default=0.2, description="Drift of V_C1 at rest that ends the run"
+    )
+
+    def recovery_time(self, force: float) -> float:
+        """Time until |V_P| is below the residual after a change by `force` N, s."""
+        return self.tau * math.log(
+            max(self.volts_per_newton * abs(force) / self.residual, math.e)
+        )
+
+    def recover(self, force: float, first: float | None) -> Steps:
+        """Pauses after `force` N until V_C1 is back at `first` V (None: not looked at).
+
+        Raises:
+            LimitError: V_C1 at rest has drifted beyond the limit.
+        """
+        yield pause(self.recovery_time(force))
+        if first is None:
+            return
+        for _ in range(MOST_EXTENSIONS):
+            seen = yield Trial(
+                force=Waveform.constant(0.0), duration=LOOK, label="look at rest"
+            )
+            off = resting(seen) - first
+            if abs(off) <= self.settled:
+                return
+            yield pause(self.tau)
+        if abs(off) > self.drift_limit:
+            raise LimitError(
+                f"V_C1 at rest has drifted by {show(off, 'V')} since the first trial; "
+                f"{show(self.drift_limit, 'V')} is the limit. Check V_GS, the supply "
+                "and the temperature, or raise protocol.drift_limit."
+            )
+
+
+def pause(seconds: float) -> Trial:
+    """A planned pause without force, neither streamed nor stored."""
+    return Trial(
+        force=Waveform.constant(0.0), duration=seconds, label="recovery", pause=True
+    )
+
+
+def resting(outcome: Outcome) -> float:
+    """V_C1 just before the trial, V; not a number where it is not recorded."""
+    return outcome.rest.get("V_C1", math.nan)
+
+
+def first_rest(outcome: Outcome) -> float | None:
+    """V_C1 before the first trial, to compare the later ones with, or None."""
+    value = resting(outcome)
+    return None if np.isnan(value) else value

@@ -1,0 +1,35 @@
+"""Free running without force, to watch the sensor while V_GS is trimmed by hand."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field
+
+from tactile_lab.quantity import Duration
+from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.waveform import Waveform
+
+
+class Monitor(Protocol):
+    """No force at all: V_C1, V_C2 and the rate, live, until stopped or `duration`."""
+
+    name: ClassVar[str] = "monitor"
+    title: ClassVar[str] = "Monitor"
+    signals: ClassVar[tuple[str, ...]] = ("V_C1", "V_C2", "V_K", "spikes")
+
+    duration: Duration = Field(default=600.0, description="Ends by itself after this")
+    part: Duration = Field(default=10.0, description="Length of one trial")
+
+    def trials(self) -> Trials:
+        """Equal parts without force."""
+        left, number = self.duration, 0
+        while left > 1e-9:
+            length, number = min(self.part, left), number + 1
+            yield Trial(
+                force=Waveform.constant(0.0),
+                duration=length,
+                label=f"part {number}",
+                level=0.0,
+            )
+            left -= length

@@ -1,0 +1,257 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from protocols._demagnetise import demagnetising_current
+from protocols.bipolar import Bipolar
+from protocols.calibrate_field import CalibrateField
+from protocols.force_check import ForceCheck
+from protocols.hold import Hold
+from protocols.monitor import Monitor
+from protocols.rate_force import RateForce
+from protocols.repeat import Repeat
+from protocols.sine_sweep import SineSweep
+from protocols.staircase import Staircase
+from protocols.threshold_search import ThresholdSearch
+from protocols.wiring_check import WiringCheck
+from tactile_lab.errors import LimitError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.trial import Outcome
+
+
+def outcome_of(trial, index=0, *, spikes=(), rest=None):
+    return Outcome(
+        trial=trial,
+        index=index,
+        start=0.0,
+        spike_times=np.array(spikes, dtype=float),
+        current=np.empty((0, 2)),
+        rest={} if rest is None else {"V_C1": rest},
+    )
+
+
+def drive(protocol, answer):
+    """All trials, each answered by `answer(trial)`."""
+    trials, generator = [], protocol.trials()
+    trial = next(generator)
+    while True:
+        trials.append(trial)
+        try:
+            trial = generator.send(answer(trial))
+        except StopIteration:
+            return trials
+
+
+def quiet(trial):
+    return outcome_of(trial)
+
+
+def test_hold_is_one_trial_whose_force_is_constant_during_the_hold():
+    (trial,) = drive(Hold(level=0.1, ramp=0.5, hold=3.0, before=1.0, rest=2.0), quiet)
+    assert trial.hold == (1.5, 4.5)
+    assert trial.force.at(np.linspace(*trial.hold, 50)) == pytest.approx(0.1)
+    assert trial.length == pytest.approx(7.0)
+    assert trial.force.at(0.99) == 0
+
+
+def test_rate_force_separates_its_steps_by_recovery_down_to_1_mv():
+    levels = (0.1, 0.2, 0.15)
+    trials = drive(RateForce(levels=levels), quiet)
+    steps = [t for t in trials if not t.pause]
+    pauses = [t for t in trials if t.pause]
+    assert [t.level for t in steps] == list(levels)
+    assert len(pauses) == 2
+    assert pauses[1].length == pytest.approx(49.7, abs=0.1)
+    k_F, tau = Circuit().k_F, Circuit().tau
+    for level, pause in zip(levels, pauses, strict=False):
+        assert k_F * level * np.exp(-pause.length / tau) <= 1e-3 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("order", "expected"),
+    [("given", [0.2, 0.1, 0.15]), ("rising", [0.1, 0.15, 0.2]),
+     ("falling", [0.2, 0.15, 0.1])],
+)  # fmt: skip
+def test_levels_come_in_the_order_asked_for(order, expected):
+    trials = drive(RateForce(levels=(0.2, 0.1, 0.15), order=order), quiet)
+    assert [t.level for t in trials if t.level is not None] == expected
+
+
+def test_a_random_order_repeats_from_its_seed():
+    levels = tuple(np.linspace(0.1, 0.2, 12).tolist())
+
+    def order(seed):
+        protocol = RateForce(levels=levels, order="random", seed=seed)
+        return [t.level for t in drive(protocol, quiet) if t.level is not None]
+
+    assert order(3) == order(3)
+    assert order(3) != order(4)
+    assert sorted(order(3)) == list(levels)
+
+
+def test_recovery_is_extended_until_v_c1_is_back():
+    looks = iter([4.30, 4.34])
+
+    def answer(trial):
+        if trial.label == "look at rest":
+            return outcome_of(trial, rest=next(looks))
+        return outcome_of(trial, rest=4.347)
+
+    trials = drive(RateForce(levels=(0.1, 0.2)), answer)
+    assert [t.label for t in trials] == [
+        "100 mN", "recovery", "look at rest", "recovery", "look at rest", "200 mN",
+    ]  # fmt: skip
+
+
+def test_a_drifted_rest_ends_the_run_with_what_to_do():
+    def answer(trial):
+        return outcome_of(trial, rest=4.0 if trial.label == "look at rest" else 4.347)
+
+    with pytest.raises(LimitError, match="V_C1 at rest has drifted by −347 mV"):
+        drive(RateForce(levels=(0.1, 0.2)), answer)
+
+
+def test_demagnetising_comes_first_and_dies_away():
+    trials = drive(RateForce(levels=(0.1,), demagnetise=True), quiet)
+    assert [t.label for t in trials] == ["demagnetise", "recovery", "100 mN"]
+    assert trials[0].pause
+    current = demagnetising_current()
+    turns = np.abs(current.value[1:-1])
+    assert np.all(np.diff(turns) < 0)
+    assert turns[0] == pytest.approx(1.0)
+    assert turns[-1] < 6e-3
+    assert np.all(np.sign(current.value[1:-1:2]) == -np.sign(current.value[2:-1:2]))
+    assert current.steepest < 5.0
+
+
+def test_a_staircase_steps_without_a_jump_and_says_what_it_is():
+    trials = drive(Staircase(levels=(0.1, 0.2, 0.0)), quiet)
+    for before, after in pairwise(trials):
+        assert before.force.value[-1] == after.force.value[0]
+    assert "no rate-force curve" in Staircase.title
+
+
+def test_a_staircase_step_acts_as_less_than_a_step_from_rest():
+    """The reason why `rate_force` exists."""
+    step = simulate(Circuit(), drive(RateForce(levels=(0.15,)), quiet)[0].force)
+    force, stairs = None, drive(Staircase(levels=(0.075, 0.15), hold=3.0), quiet)
+    for trial in stairs:
+        force = trial.force if force is None else force.then(trial.force)
+    climbed = simulate(Circuit(), force)
+    fastest_step = 1 / np.diff(step.spike_times).min()
+    fastest_stair = 1 / np.diff(climbed.spike_times).min()
+    assert fastest_stair < 0.95 * fastest_step
+
+
+def test_repeat_gives_equal_presentations():
+    trials = drive(Repeat(level=0.16, count=5), quiet)
+    assert len(trials) == 5
+    assert len({t.force for t in trials}) == 1
+
+
+def test_bipolar_pushes_and_pulls():
+    trials = drive(Bipolar(levels=(0.1, -0.1)), quiet)
+    assert [t.force.value.max() for t in trials] == [0.1, 0.0]
+    assert [t.force.value.min() for t in trials] == [0.0, -0.1]
+    assert "I_DS" in Bipolar.signals
+
+
+def test_sine_sweep_is_a_sine_at_each_frequency():
+    sweep = SineSweep(amplitude=0.04, bias=0.05, lowest=0.2, highest=0.8, count=3)
+    *trials, last = drive(sweep, quiet)
+    assert last.force.value[-1] == 0
+    for trial, frequency in zip(trials, (0.2, 0.4, 0.8), strict=True):
+        start, end = trial.hold
+        assert end - start == pytest.approx(sweep.cycles / frequency)
+        time = np.linspace(start, end, 997)
+        sine = 0.05 + 0.04 * np.sin(2 * np.pi * frequency * (time - start))
+        assert trial.force.at(time) == pytest.approx(sine, abs=0.04 * 0.01)
+
+
+@pytest.mark.parametrize("critical", [0.071, 0.0926, 0.1333])
+def test_threshold_search_closes_in_on_the_critical_force(critical):
+    def answer(trial):
+        fires = trial.level is not None and trial.level >= critical
+        return outcome_of(trial, spikes=[0.3] if fires else [])
+
+    search = ThresholdSearch(resolution=1e-3)
+    tried = {
+        t.level: t.level >= critical
+        for t in drive(search, answer)
+        if t.level is not None
+    }
+    low = max(level for level, fires in tried.items() if not fires)
+    high = min(level for level, fires in tried.items() if fires)
+    assert low < critical <= high
+    assert high - low <= 1e-3 * (1 + 1e-6)
+    assert len(tried) <= 10
+
+
+def test_threshold_search_finds_the_models_critical_force():
+    def answer(trial):
+        if trial.pause:
+            return outcome_of(trial)
+        found = simulate(Circuit(), trial.force)
+        return outcome_of(trial, spikes=found.spike_times)
+
+    trials = drive(ThresholdSearch(ramp=0.01, hold=1.0, resolution=2e-4), answer)
+    levels = [t.level for t in trials if t.level is not None]
+    assert levels[-1] == pytest.approx(96.1e-3, abs=3e-4)
+
+
+@pytest.mark.parametrize(
+    ("spikes", "message"), [([], "does not make the sensor fire"), ([0.2], "already")]
+)
+def test_threshold_search_says_when_the_range_does_not_hold_it(spikes, message):
+    with pytest.raises(LimitError, match=message):
+        drive(ThresholdSearch(), lambda trial: outcome_of(trial, spikes=spikes))
+
+
+def test_calibrate_field_never_overshoots_a_step():
+    trials = drive(CalibrateField(most=0.8, points=11), quiet)
+    prepared = [t.label for t in trials if t.pause]
+    assert prepared == [
+        "demagnetise", "conditioning 1", "conditioning 2", "turn", "turn",
+        "back to 0 A",
+    ]  # fmt: skip
+    steps = [t for t in trials if not t.pause]
+    levels = [t.current.value[-1] for t in steps]
+    assert levels[:11] == pytest.approx(np.linspace(0.8, -0.8, 11))
+    assert levels[11:] == pytest.approx(np.linspace(-0.8, 0.8, 11))
+    for before, after in pairwise(trials):
+        if after.label != "demagnetise":
+            assert before.current.value[-1] == pytest.approx(after.current.value[0])
+    assert all(t.label.startswith("falling") for t in steps[:11])
+
+
+def test_wiring_check_pushes_little():
+    rest, push, again = drive(WiringCheck(), quiet)
+    assert rest.force.peak == again.force.peak == 0
+    assert push.force.peak <= 0.1
+
+
+def test_monitor_asks_for_no_force():
+    trials = drive(Monitor(duration=25.0, part=10.0), quiet)
+    assert [t.length for t in trials] == pytest.approx([10, 10, 5])
+    assert all(t.force.peak == 0 for t in trials)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "values"),
+    [(ThresholdSearch, {"low": 0.2, "high": 0.1}), (RateForce, {"levels": ()}),
+     (SineSweep, {"lowest": 2.0, "highest": 1.0}), (Repeat, {"count": 1}),
+     (ForceCheck, {"levels": (0.1, 0.2), "readings": (0.1,)}),
+     (WiringCheck, {"push": 0.5}), (Hold, {"hold": 0.0}), (Hold, {"levle": 0.1})],
+)  # fmt: skip
+def test_impossible_parameters_are_refused(protocol, values):
+    with pytest.raises(ValidationError):
+        protocol(**values)
+
+
+def test_parameters_are_frozen_values():
+    protocol = Hold()
+    with pytest.raises(ValidationError):
+        protocol.level = 0.2

@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+
+from tactile_lab.plan.timeline import timeline
+from tactile_lab.scene.load import load
+
+SHIPPED = (
+    "hold_10s", "fig5b", "rate_force", "staircase", "repeat", "bipolar", "sine_sweep",
+    "threshold_search", "calibrate_field", "force_check", "wiring_check", "monitor",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_shipped_scene_plays_through_the_coil_without_a_warning(name):
+    planned = timeline(load(name), through_coil=True)
+    assert planned.warnings == ()
+    assert planned.duration > 5
+    for step in planned.steps:
+        if step.trial.hold is not None:
+            start, end = step.trial.hold
+            assert 0 <= start < end <= step.trial.length + 1e-9
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_shipped_scene_is_simulated_only(name):
+    scene = load(name)
+    assert scene.bench.simulated
+    assert scene.bench.path is None
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_scene_survives_being_written_and_read(name, tmp_path):
+    copy = tmp_path / f"{name}.toml"
+    copy.write_text(load(name).to_toml(), encoding="utf-8")
+    assert load(copy).protocol == load(name).protocol
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_force_ends_at_zero(name):
+    planned = timeline(load(name), through_coil=True)
+    last = planned.steps[-1].trial
+    assert (last.current or last.force).value[-1] == pytest.approx(0.0, abs=1e-15)
+    assert np.all(np.isfinite(planned.force.value))
