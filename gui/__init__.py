@@ -1,0 +1,1 @@
+"""The bench window: state in, frames out."""

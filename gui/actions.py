@@ -1,0 +1,225 @@
+"""Shortcuts and the menu.
+
+Single keys are taken only where no widget wanted them: text fields keep their letters,
+buttons their space bar.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, QPoint, Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QMenu
+
+from gui.dialogs.choosing import ask_run, ask_scene
+
+if TYPE_CHECKING:
+    from gui.window import Window
+
+
+@dataclass(frozen=True)
+class Key:
+    """One shortcut.
+
+    Attributes:
+        keys: as written for `QKeySequence`.
+        words: what it does, for the list.
+        act: does it.
+        single: a key without Ctrl: text fields and buttons come first.
+    """
+
+    keys: tuple[str, ...]
+    words: str
+    act: Callable[[], object]
+    single: bool = False
+
+
+class Actions(QObject):
+    """All shortcuts of the window."""
+
+    def __init__(self, window: Window) -> None:
+        super().__init__(window)
+        self._window = window
+        self.keys = self._all()
+        self._shortcuts: list[QShortcut] = []
+        for key in self.keys:
+            for keys in () if key.single else key.keys:
+                self._bind(keys, key)
+        self._bind_stop()
+        window.header.help_asked.connect(self.show_help)
+        window.header.menu_asked.connect(self.show_menu)
+        window.header.picture_asked.connect(self.copy_picture)
+
+    def _bind_stop(self) -> None:
+        escape = QShortcut(QKeySequence("Esc"), self._window)
+        escape.activated.connect(self.escape)
+        stop = QShortcut(QKeySequence("F12"), self._window)
+        stop.setContext(Qt.ShortcutContext.ApplicationShortcut)
+        stop.activated.connect(lambda: self._window.session.stop("STOP by F12"))
+        self._shortcuts += [escape, stop]
+
+    def escape(self) -> None:
+        """STOP; in the closing question: keep running."""
+        if self._window.closing.isVisible():
+            self._window.closing.keep.click()
+        else:
+            self._window.session.stop("STOP by Esc")
+
+    def _bind(self, keys: str, key: Key) -> None:
+        shortcut = QShortcut(QKeySequence(keys), self._window)
+        shortcut.activated.connect(lambda: key.act())
+        self._shortcuts.append(shortcut)
+
+    def take_key(self, event: QKeyEvent) -> bool:
+        """A key no widget wanted; whether it was one of the single ones."""
+        pressed = _written(event)
+        for key in self.keys:
+            if key.single and pressed in key.keys:
+                key.act()
+                return True
+        return False
+
+    def _all(self) -> list[Key]:
+        window = self._window
+        tools, view = window.centre.tools, window.centre.view
+        form = window.setup.form
+        return [
+            Key(("Ctrl+R",), "Run", window.setup.start),
+            Key(("Ctrl+Return",), "Queue", window.setup.enqueue),
+            Key(("Space",), "Freeze the display", tools.freeze.toggle, single=True),
+            Key(("F",), "Follow", tools.follow.click, single=True),
+            Key(("A",), "Fit the whole run", view.show_all, single=True),
+            Key(("Z",), "Zoom to a box", tools.zoom.toggle, single=True),
+            Key(("C",), "Cursors", tools.cursors.click, single=True),
+            Key(("1",), "Grab cursor A", lambda: tools.bring(0), single=True),
+            Key(("2",), "Grab cursor B", lambda: tools.bring(1), single=True),
+            Key(("M",), "Model", tools.twin.toggle, single=True),
+            Key(("Shift+M",), "Residual", tools.residual.toggle, single=True),
+            Key(("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True),
+            Key(("-",), "Zoom out", lambda: view.zoom(1 / 1.5), single=True),
+            Key(("Left",), "Earlier", lambda: self._nudge(-1), single=True),
+            Key(("Right",), "Later", lambda: self._nudge(1), single=True),
+            Key(("Home",), "Start of the run", self._home, single=True),
+            Key(("End",), "End of the run", lambda: view.set_follow(True), single=True),
+            Key(("N",), "Note", window.centre.log.note.setFocus, single=True),
+            Key(("Ctrl+O",), "Open a scene", lambda: ask_scene(window)),
+            Key(("Ctrl+Shift+O",), "Open a run", lambda: ask_run(window)),
+            Key(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
+            Key(("Ctrl+E",), "Export the view", lambda: self.export_view()),
+            Key(("Ctrl+F",), "Search runs", self._search),
+            Key(("Ctrl+1",), "Results", lambda: self._tab(0)),
+            Key(("Ctrl+2",), "Runs", lambda: self._tab(1)),
+            Key(("Ctrl+3",), "Manual", lambda: self._tab(2)),
+            Key(("Ctrl+Z",), "Undo in the form", form.undo.undo),
+            Key(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.undo.redo),
+            Key(("F7",), "Fold the left panel", lambda: self._fold(window.setup)),
+            Key(("F8",), "Fold the right panel", lambda: self._fold(window.review)),
+            Key(("F11",), "Lanes only", self._focus),
+            Key(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
+            Key(("?", "F1"), "Help and shortcuts", self.show_help, single=True),
+        ]
+
+    def _nudge(self, way: int) -> None:
+        view = self._window.centre.view
+        if view.cursors is not None:
+            view.move_cursor(1, view.cursors[1] + way * view.width / 400)
+        else:
+            view.pan(way * view.width / 10)
+
+    def _home(self) -> None:
+        view = self._window.centre.view
+        view.show_span(0.0, view.width)
+
+    def _tab(self, number: int) -> None:
+        window = self._window
+        if window.review.isHidden():
+            window.fold(window.review, False)
+        window.review.show_tab(number)
+
+    def _search(self) -> None:
+        self._tab(1)
+        self._window.review.runs.search.setFocus()
+
+    def _fold(self, side: object) -> None:
+        window = self._window
+        panel = window.setup if side is window.setup else window.review
+        window.fold(panel, panel.isVisible())
+
+    def _focus(self) -> None:
+        window = self._window
+        folded = window.setup.isVisible() or window.review.isVisible()
+        window.fold(window.setup, folded)
+        window.fold(window.review, folded)
+
+    def copy_picture(self) -> None:
+        """Put a picture of the window on the clipboard."""
+        QGuiApplication.clipboard().setPixmap(self._window.grab())
+
+    def save_scene(self) -> None:
+        """Save the form as a scene file."""
+        from gui.dialogs.saving import save_scene
+
+        save_scene(self._window)
+
+    def export_view(self) -> None:
+        """Export what the lanes show."""
+        from gui.dialogs.saving import export_view
+
+        export_view(self._window)
+
+    def show_help(self) -> None:
+        """Show the shortcut list and the help of the panels."""
+        from gui.dialogs.help import show_help
+
+        show_help(self._window)
+
+    def connect_dialog(self) -> None:
+        """Show the connect dialog."""
+        from gui.dialogs.connect import show_connect
+
+        show_connect(self._window)
+
+    def show_menu(self) -> None:
+        """Open the menu below its button."""
+        window, menu = self._window, QMenu(self._window)
+        session, theme = window.session, window.theme
+        menu.addAction("Open scene …", partial(ask_scene, window))
+        menu.addAction("Save scene …", self.save_scene)
+        menu.addAction("Open run …", partial(ask_run, window))
+        menu.addAction("Export view …", self.export_view)
+        menu.addSeparator()
+        menu.addAction("Use simulated bench", lambda: session.connect_bench("sim"))
+        menu.addAction("Connect instruments …", self.connect_dialog)
+        menu.addAction("Disconnect", session.disconnect_bench)
+        menu.addSeparator()
+        for word in ("system", "light", "dark"):
+            one = menu.addAction(f"Theme: {word}", partial(theme.choose, word))
+            one.setCheckable(True)
+            one.setChecked(theme.choice == word)
+        menu.addSeparator()
+        menu.addAction("Copy command line", self._copy_command)
+        menu.addAction("Help and shortcuts", self.show_help)
+        menu.addAction("Quit", window.close)
+        button = window.header.menu_button
+        menu.popup(button.mapToGlobal(QPoint(0, button.height())))
+
+    def _copy_command(self) -> None:
+        QGuiApplication.clipboard().setText(self._window.setup.request().command())
+
+
+def _written(event: QKeyEvent) -> str:
+    """A key as it is written in the list of shortcuts."""
+    if event.text() in ("+", "-", "=", "?"):
+        return event.text()
+    shift = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+    other = event.modifiers() & ~(
+        Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
+    )
+    if other:
+        return ""
+    name = QKeySequence(event.key()).toString()
+    return f"Shift+{name}" if shift else name

@@ -1,0 +1,87 @@
+"""Starting the window."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QSettings, QTimer
+from PySide6.QtWidgets import QApplication
+
+from gui.look import fonts
+from gui.look.theme import Theme
+from gui.session.session import Session
+from gui.window import Window
+
+
+def application(arguments: Sequence[str] = ()) -> QApplication:
+    """The one application, in Fusion style with the bundled font."""
+    found = QApplication.instance()
+    app = found if isinstance(found, QApplication) else QApplication(list(arguments))
+    app.setApplicationName("Tactile Lab")
+    app.setOrganizationName("tactile-lab")
+    app.setStyle("Fusion")
+    app.setFont(fonts.load())
+    return app
+
+
+def main(
+    target: str | None = None,
+    *,
+    out: Path = Path("runs"),
+    bench: str | None = "sim",
+    theme: str = "system",
+) -> int:
+    """Open the window and stay until it is closed.
+
+    Args:
+        target: scene, protocol file or run folder to open; None for the demo.
+        out: folder for run folders.
+        bench: "sim", a bench file, or None for the empty state.
+        theme: "system", "light" or "dark".
+
+    Returns:
+        Exit code: 0, or 4 where the coil's safe state could not be verified.
+    """
+    # Python threads hand over every 5 ms by default: too long for a frame of 33 ms
+    sys.setswitchinterval(1e-3)
+    app = application(["tactile-lab"])
+    chosen = Theme(theme)
+    chosen.apply()
+    session = Session(out)
+    window = Window(session, chosen, QSettings())
+    window.show()
+    _close_on_signals(window)
+    QTimer.singleShot(0, lambda: begin(window, target, bench))
+    app.exec()
+    left = session.coil_view()
+    return 4 if left is not None and left.verified_off is False else 0
+
+
+def begin(window: Window, target: str | None, bench: str | None) -> None:
+    """What happens right after the window has appeared."""
+    path = None if target is None else Path(target)
+    is_run = path is not None and path.is_dir()
+    window.opening.open_scene(None if is_run else target)
+    if is_run and path is not None:
+        window.opening.open_run(path)
+    window.opening.list_runs()
+    window.page.setFocus()
+    if bench is not None:
+        window.session.connect_bench(bench)
+
+
+def _close_on_signals(window: Window) -> None:
+    """SIGINT, SIGTERM and SIGHUP end the window as its close button, without asking."""
+
+    def leave(number: int, frame: object) -> None:
+        if window.session.busy:
+            window.leave()
+        else:
+            window.close()
+
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), leave)

@@ -1,0 +1,54 @@
+"""The fault's banner: what, when, consequence, and what to do next."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout
+
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import label, push
+from gui.state import Fault
+
+
+class Banner(QFrame):
+    """Shown from the fault until it is acknowledged."""
+
+    acknowledged = Signal()
+    log_asked = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setProperty("role", "banner")
+        self._theme = theme
+        self._sign = QLabel()
+        self._title = label("", "bannertitle", wrap=True)
+        self._text = label("", "", wrap=True)
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        words.addWidget(self._title)
+        words.addWidget(self._text)
+        self.show_log = push("Show in log")
+        self.acknowledge = push("Acknowledge and reset", "primary")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16, 9, 12, 9)
+        row.setSpacing(12)
+        row.addWidget(self._sign)
+        row.addLayout(words, 1)
+        row.addWidget(self.show_log)
+        row.addWidget(self.acknowledge)
+        self.show_log.clicked.connect(self.log_asked)
+        self.acknowledge.clicked.connect(self.acknowledged)
+        self.hide()
+
+    def show_fault(self, fault: Fault | None) -> None:
+        """Show a fault, or hide."""
+        self.setVisible(fault is not None)
+        if fault is not None:
+            self._sign.setPixmap(pixmap("warning", self._theme.tokens.red, 26))
+            self._title.setText(fault.title)
+            # a driver tells every step it tried: the first says what happened
+            first, _, rest = fault.consequence.partition(" | ")
+            self._text.setText(f"{first} …" if rest else first)
+            self._text.setToolTip(fault.consequence)
+            self.setAccessibleName(f"Fault: {fault.title} {fault.consequence}")

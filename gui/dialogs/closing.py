@@ -1,0 +1,101 @@
+"""The question asked when the window is closed while the coil is in use."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from gui.dialogs.overlay import Overlay
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import label, push
+from gui.state import Snapshot, milliamperes, minutes
+
+
+class Closing(Overlay):
+    """Keep running (the default, and Esc) or stop, verify off and close."""
+
+    kept = Signal()
+    stopped = Signal()
+
+    def __init__(self, window: QWidget, theme: Theme) -> None:
+        super().__init__(window, 490)
+        self._theme = theme
+        self._sign = QLabel()
+        self._title = label("", "big", wrap=True)
+        self._text = label("", "", wrap=True)
+        self._now = label("", "muted", wrap=True)
+        self.keep = push("Keep running", "primary")
+        self.stop = push("Stop, coil off and close", "danger")
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        buttons.addWidget(self.stop)
+        buttons.addWidget(self.keep)
+        words = QVBoxLayout()
+        words.setSpacing(8)
+        words.addWidget(self._title)
+        words.addWidget(self._text)
+        words.addWidget(self._now)
+        words.addSpacing(8)
+        words.addLayout(buttons)
+        row = QHBoxLayout(self.card)
+        row.setContentsMargins(24, 22, 22, 20)
+        row.setSpacing(16)
+        row.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(words, 1)
+        self.keep.clicked.connect(self._keep)
+        self.stop.clicked.connect(self._stop)
+
+    def ask(self, snapshot: Snapshot) -> None:
+        """Ask; says what happens to coil and data."""
+        self._sign.setPixmap(pixmap("warning", self._theme.tokens.amber, 28))
+        current = milliamperes(snapshot.coil.current) if snapshot.coil else "not in use"
+        if snapshot.manual:
+            self._title.setText("The coil is driven by hand. Close anyway?")
+            self._text.setText(
+                "Closing ramps the coil to <b>0 mA</b>, switches the output off and "
+                "verifies it by read-back."
+            )
+            self.keep.setText("Keep open")
+        else:
+            self._title.setText("A run is in progress. Close anyway?")
+            self._text.setText(
+                f"Closing stops <b>{snapshot.title}</b> at {snapshot.elapsed:.1f} s, "
+                "ramps the coil to <b>0 mA</b>, verifies it by read-back, and keeps "
+                "the data so far as an <i>aborted</i> run."
+            )
+            self.keep.setText("Keep running")
+        left = ""
+        if snapshot.expected is not None:
+            rest = max(0.0, snapshot.expected - snapshot.elapsed)
+            left = f" · remaining {minutes(rest)}"
+        self._now.setText(f"Coil now {current}{left}")
+        self.open()
+        self.keep.setDefault(True)
+        self.keep.setFocus()
+
+    def say(self, title: str, text: str) -> None:
+        """Tell how the closing goes, without a question."""
+        self._title.setText(title)
+        self._text.setText(text)
+        self._now.setText("")
+        self.keep.hide()
+        self.stop.setEnabled(False)
+        self._place()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Esc keeps running; the arrows move between the buttons."""
+        if event.key() == Qt.Key.Key_Escape:
+            self._keep()
+        elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+            (self.stop if self.keep.hasFocus() else self.keep).setFocus()
+        else:
+            super().keyPressEvent(event)
+
+    def _keep(self) -> None:
+        self.hide()
+        self.kept.emit()
+
+    def _stop(self) -> None:
+        self.stopped.emit()

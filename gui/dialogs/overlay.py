@@ -1,0 +1,81 @@
+"""A card above the dimmed window. The header and STOP stay uncovered and usable."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QRect, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QFrame, QGraphicsDropShadowEffect, QLabel, QWidget
+
+HEADER = 68
+
+
+class Overlay(QWidget):
+    """Covers the window below the header and centres a card.
+
+    Args:
+        window: what is covered.
+        width: of the card, px.
+    """
+
+    def __init__(self, window: QWidget, width: int) -> None:
+        super().__init__(window)
+        self._window = window
+        self.card = QFrame(self)
+        self.card.setProperty("role", "dialog")
+        self._width = width
+        shadow = QGraphicsDropShadowEffect(self.card)
+        shadow.setBlurRadius(40)
+        shadow.setOffset(0, 10)
+        shadow.setColor(QColor(0, 0, 0, 110))
+        self.card.setGraphicsEffect(shadow)
+        self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        window.installEventFilter(self)
+        self.hide()
+
+    def open(self) -> None:
+        """Show the card."""
+        self._place()
+        self.show()
+        self.raise_()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Follow the window's size."""
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return False
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Dim what lies below."""
+        QPainter(self).fillRect(self.rect(), QColor(8, 12, 20, 120))
+
+    def _place(self) -> None:
+        window = self._window
+        self.setGeometry(0, HEADER, window.width(), window.height() - HEADER)
+        width = min(self._width, self.width() - 24)
+        self.card.setFixedWidth(width)
+        self.card.ensurePolished()
+        self._unwrap(width)
+        height = min(self.card.sizeHint().height(), self.height() - 24)
+        self.card.setGeometry(
+            QRect(
+                (self.width() - width) // 2,
+                max((self.height() - height) // 2 - 20, 12),
+                width,
+                height,
+            )
+        )
+
+    def _unwrap(self, width: int) -> None:
+        """Give wrapped labels the height they need at this width."""
+        layout = self.card.layout()
+        wrapped = [x for x in self.card.findChildren(QLabel) if x.wordWrap()]
+        for one in wrapped:
+            one.setMinimumHeight(0)
+        self.card.resize(width, max(self.card.height(), 400))
+        for _ in range(2):
+            if layout is not None:
+                layout.invalidate()
+                layout.activate()
+            for one in wrapped:
+                if one.isVisibleTo(self.card):
+                    one.setMinimumHeight(max(one.heightForWidth(one.width()), 0))

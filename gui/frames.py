@@ -1,0 +1,111 @@
+"""The frame loop: polls the session, repaints what moved, keeps to its budget."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Qt, QTimer
+
+from gui.state import State
+
+if TYPE_CHECKING:
+    from gui.window import Window
+
+FAST, SLOW = 33, 100
+"""Milliseconds between frames."""
+
+NUMBERS = 0.1
+"""Seconds between updates of the numbers: faster cannot be read."""
+
+BUDGET = 0.6
+"""Share of the interval a frame may cost before the interval is doubled."""
+
+
+class Frames(QObject):
+    """Drives the window; `costs` holds the newest frame costs, s, for diagnostics."""
+
+    def __init__(self, window: Window) -> None:
+        super().__init__(window)
+        self._window = window
+        self.frozen = False
+        self.costs: list[float] = []
+        self.paints: list[float] = []
+        self._numbers = 0.0
+        self._watched = False
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start(FAST)
+
+    @property
+    def interval(self) -> int:
+        """Milliseconds between frames now."""
+        return self._timer.interval()
+
+    def stop(self) -> None:
+        """End the loop."""
+        self._timer.stop()
+
+    def tick(self) -> None:
+        """One frame."""
+        begun = time.perf_counter()
+        window, session = self._window, self._window.session
+        moved = session.poll()
+        now = time.monotonic()
+        live = session.source is not None and window.opening.run is None
+        if live and not self.frozen and not window.isMinimized():
+            source = session.source
+            assert source is not None
+            view = window.centre.view
+            if source.running or moved:
+                view.set_now(source.reach, source.length)
+                window.centre.stack.refresh()
+        window.opening.take_fetched()
+        if now - self._numbers >= NUMBERS:
+            self._numbers = now
+            self._show_numbers(live)
+        self._keep_budget(time.perf_counter() - begun)
+
+    def _show_numbers(self, live: bool) -> None:
+        window, session = self._window, self._window.session
+        snapshot = session.snapshot()
+        window.render_clock(snapshot)
+        self._show_monitor()
+        source = session.source
+        if source is not None and live:
+            if not self.frozen:
+                window.centre.stack.show_values()
+            planned = source.preview.holds if source.preview else []
+            holds = planned if source.running and planned else source.holds
+            window.centre.progress.show_run(
+                snapshot, holds, source.length, source.reach, session.trial,
+                "Monitor: nothing is kept" if session.monitor.alive
+                else window.opening.ending,
+            )  # fmt: skip
+            running = session.state in (State.RUNNING, State.ABORTING)
+            window.setup.show_head(source.reach if running else None)
+
+    def _show_monitor(self) -> None:
+        window, monitor = self._window, self._window.session.monitor
+        if monitor.alive:
+            window.centre.notice.setText(monitor.words())
+            window.centre.notice.show()
+            self._watched = True
+        elif self._watched:
+            window.centre.notice.hide()
+            self._watched = False
+        if window.centre.tools.monitor.isChecked() is not monitor.alive:
+            window.centre.tools.monitor.setChecked(monitor.alive)
+
+    def _keep_budget(self, cost: float) -> None:
+        self.costs.append(cost)
+        del self.costs[:-600]
+        recent = self.costs[-20:]
+        mean = sum(recent) / len(recent)
+        interval = self._timer.interval()
+        if mean > BUDGET * interval / 1e3 and interval < SLOW:
+            self._timer.setInterval(min(2 * interval, SLOW))
+            self.costs.clear()
+        elif mean < 0.2 * BUDGET * interval / 1e3 and interval > FAST:
+            self._timer.setInterval(FAST)

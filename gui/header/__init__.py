@@ -1,0 +1,1 @@
+"""The dark bar on top: identity, instruments, clock, STOP."""

@@ -1,0 +1,147 @@
+"""The header: identity and SIM badge, instrument chips, state and clock, STOP."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFont
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout
+
+from gui.header.chip import Chip
+from gui.header.stop import StopButton
+from gui.look import tokens as look
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import IconButton, elided, label
+from gui.state import Snapshot, State, clock_text
+
+_CLOCK_COLOURS = {
+    State.DISCONNECTED: look.LAMP_GREY,
+    State.CONNECTING: look.LAMP_AMBER,
+    State.READY: look.LAMP_GREEN,
+    State.RUNNING: look.LAMP_BLUE,
+    State.ABORTING: look.LAMP_AMBER,
+    State.FAULT: look.LAMP_RED,
+}
+
+
+class Header(QFrame):
+    """Dark in both themes, 68 px high."""
+
+    picture_asked = Signal()
+    menu_asked = Signal()
+    help_asked = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setProperty("role", "header")
+        self.setFixedHeight(68)
+        self.setAccessibleName("Header")
+        self.stop = StopButton()
+        self.badge = label("SIMULATED BENCH", "sim")
+        self.badge.setAccessibleName("This bench is simulated")
+        self._title = label("", "hsub")
+        self._title.setMinimumWidth(190)
+        self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._state = QLabel()
+        self._state.setMinimumWidth(112)
+        self._clock = label("", "hsub")
+        self._chips: list[Chip] = []
+        self._compact = self._narrow = False
+        self._chip_row = QHBoxLayout()
+        self._chip_row.setSpacing(6)
+        self._buttons = [
+            IconButton(theme, name, words, role="hflat", on_header=True)
+            for name, words in (
+                ("camera", "Copy a picture of the window (Ctrl+Shift+C)"),
+                ("settings", "Menu"),
+                ("help", "Help and shortcuts (?)"),
+            )
+        ]
+        asks = (self.picture_asked, self.menu_asked, self.help_asked)
+        for button, asked in zip(self._buttons, asks, strict=True):
+            button.clicked.connect(asked)
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._lay_out()
+
+    @property
+    def chips(self) -> list[Chip]:
+        """Chips of the instruments in use."""
+        return [chip for chip in self._chips if not chip.isHidden()]
+
+    @property
+    def minor_buttons(self) -> list[IconButton]:
+        """Picture, menu, help."""
+        return self._buttons
+
+    @property
+    def menu_button(self) -> IconButton:
+        """The button below which the menu opens."""
+        return self._buttons[1]
+
+    def set_compact(self, compact: bool, narrow: bool) -> None:
+        """Chips without their limits; in a narrow window without minor buttons."""
+        self._compact, self._narrow = compact, narrow
+        for chip in self._chips:
+            chip.set_compact(compact, narrow)
+        self._buttons[0].setVisible(not narrow)
+        self._title.setMinimumWidth(120 if narrow else 190)
+        self.badge.setText("SIM" if compact else "SIMULATED BENCH")
+
+    def render_snapshot(self, snapshot: Snapshot) -> None:
+        """Render identity, chips, clock and STOP."""
+        self.badge.setVisible(snapshot.simulated)
+        elided(self._title, snapshot.title)
+        while len(self._chips) < len(snapshot.instruments):
+            chip = Chip()
+            chip.set_compact(self._compact, self._narrow)
+            self._chips.append(chip)
+            self._chip_row.addWidget(chip)
+        for number, chip in enumerate(self._chips):
+            chip.setVisible(number < len(snapshot.instruments))
+            if number < len(snapshot.instruments):
+                chip.show_instrument(snapshot.instruments[number])
+        word, clock = clock_text(snapshot)
+        colour = _CLOCK_COLOURS[snapshot.state]
+        if self._state.text() != word:
+            self._state.setText(word)
+            self._state.setStyleSheet(
+                f"color: {colour}; font-weight: 700; font-size: 15px;"
+            )
+        if self._clock.text() != clock:
+            self._clock.setText(clock)
+        self._state.setAccessibleName(f"{word}, {clock}")
+        self.stop.show_coil(snapshot.state, snapshot.coil)
+
+    def _lay_out(self) -> None:
+        logo = QLabel()
+        logo.setPixmap(pixmap("logo", look.LAMP_BLUE, 26))
+        name = label("Tactile Lab", "hidentity")
+        name.font().setWeight(QFont.Weight.DemiBold)
+        first = QHBoxLayout()
+        first.setSpacing(9)
+        first.addWidget(name)
+        first.addWidget(self.badge)
+        first.addStretch(1)
+        words = QVBoxLayout()
+        words.setSpacing(3)
+        words.setContentsMargins(0, 13, 0, 11)
+        words.addLayout(first)
+        words.addWidget(self._title)
+        clock = QVBoxLayout()
+        clock.setSpacing(1)
+        clock.setContentsMargins(0, 14, 0, 12)
+        clock.addWidget(self._state)
+        clock.addWidget(self._clock)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16, 0, 14, 0)
+        row.setSpacing(11)
+        row.addWidget(logo)
+        row.addLayout(words)
+        row.addSpacing(8)
+        row.addLayout(self._chip_row)
+        row.addStretch(1)
+        for button in self._buttons:
+            row.addWidget(button)
+        row.addSpacing(6)
+        row.addLayout(clock)
+        row.addWidget(self.stop)

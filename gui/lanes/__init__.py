@@ -1,0 +1,1 @@
+"""The centre: linked traces against time."""

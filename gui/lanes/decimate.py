@@ -1,0 +1,123 @@
+"""Minimum and maximum per pixel column: what a trace looks like at any zoom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A trace ready to draw.
+
+    Attributes:
+        time: shape (n,), s.
+        low, high: shape (n,), SI; equal where a column holds one sample.
+        mean: shape (n,), SI, mean of each column.
+        gap: shape (n,), true where the point is not joined to the one before.
+    """
+
+    time: FloatArray
+    low: FloatArray
+    high: FloatArray
+    mean: FloatArray
+    gap: NDArray[np.bool_]
+
+    @classmethod
+    def nothing(cls) -> Drawn:
+        """No points."""
+        none = np.empty(0)
+        return cls(none, none, none, none, np.empty(0, np.bool_))
+
+    @classmethod
+    def line(cls, time: FloatArray, value: FloatArray) -> Drawn:
+        """A line through points, unbroken."""
+        gap = np.zeros(time.size, np.bool_)
+        gap[:1] = True
+        return cls(time, value, value, value, gap)
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing to draw."""
+        return self.time.size == 0
+
+    @property
+    def extent(self) -> tuple[float, float] | None:
+        """Least and largest value; None without points."""
+        if self.empty:
+            return None
+        return float(self.low.min()), float(self.high.max())
+
+
+def columns(rows: FloatArray, count: int, width: float) -> Drawn:
+    """At most `count` columns of consecutive bins.
+
+    Args:
+        rows: shape (4, n): start of each bin, ascending, s; least, largest and mean
+            value of each bin.
+        count: columns wanted, above 0.
+        width: length of one bin, s; a step longer than 1.5 of it is a gap.
+    """
+    time, low, high, mean = rows
+    if time.size == 0:
+        return Drawn.nothing()
+    gap = np.zeros(time.size, np.bool_)
+    gap[1:] = np.diff(time) > 1.5 * width
+    gap[0] = True
+    if time.size <= count:
+        return Drawn(time, low, high, mean, gap)
+    # edges on a grid of absolute time: bins do not wander as the view scrolls
+    per = -(-time.size // count)
+    first = round(float(time[0]) / width) if width > 0 else 0
+    offset = (-first) % per
+    edges = np.concatenate([[0], np.arange(offset or per, time.size, per)])
+    edges = np.union1d(edges, np.flatnonzero(gap))
+    counts = np.diff(np.append(edges, time.size))
+    return Drawn(
+        time[edges],
+        np.minimum.reduceat(low, edges),
+        np.maximum.reduceat(high, edges),
+        np.add.reduceat(mean, edges) / counts,
+        gap[edges],
+    )
+
+
+def zigzag(drawn: Drawn) -> tuple[FloatArray, FloatArray]:
+    """One polyline through all columns: down to the low, up to the high, and on.
+
+    The nearer extreme comes first, so that the line does not cross itself needlessly.
+    """
+    n = drawn.time.size
+    x = np.repeat(drawn.time, 2)
+    y = np.empty(2 * n)
+    y[0::2], y[1::2] = drawn.low, drawn.high
+    if n > 1:
+        middle = (drawn.low + drawn.high) / 2
+        falling = np.empty(n, np.bool_)
+        falling[1:] = middle[1:] < middle[:-1]
+        falling[0] = falling[1]
+        y[0::2] = np.where(falling, drawn.high, drawn.low)
+        y[1::2] = np.where(falling, drawn.low, drawn.high)
+    return x, y
+
+
+def line_between(
+    time: FloatArray, value: FloatArray, start: float, end: float, count: int
+) -> Drawn:
+    """A polyline's part around [start, end] s, its extremes kept where it is dense."""
+    if time.size == 0:
+        return Drawn.nothing()
+    first, last = np.searchsorted(time, [start, end])
+    first, last = max(0, first - 1), min(time.size, last + 1)
+    t, v = time[first:last], value[first:last]
+    if t.size <= 4 * count:
+        return Drawn.line(t, v)
+    edges = np.arange(0, t.size, -(-t.size // count))
+    low, high = np.minimum.reduceat(v, edges), np.maximum.reduceat(v, edges)
+    gap = np.zeros(edges.size, np.bool_)
+    gap[0] = True
+    return Drawn(t[edges], low, high, (low + high) / 2, gap)

@@ -1,0 +1,45 @@
+"""Traces computed from traces: shown units, means, rate, residual."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gui.lanes.decimate import Drawn, FloatArray
+
+
+def scaled(drawn: Drawn, by: float) -> Drawn:
+    """The trace in shown units."""
+    if by == 1.0 or drawn.empty:
+        return drawn
+    return Drawn(
+        drawn.time, drawn.low * by, drawn.high * by, drawn.mean * by, drawn.gap
+    )
+
+
+def averaged(drawn: Drawn) -> Drawn:
+    """The means alone."""
+    return Drawn(drawn.time, drawn.mean, drawn.mean, drawn.mean, drawn.gap)
+
+
+def rate_of(spikes: FloatArray, start: float, end: float) -> Drawn:
+    """Instantaneous rate at each spike around [start, end] s; 0 at the first, Hz."""
+    first, last = np.searchsorted(spikes, [start, end])
+    first, last = max(0, first - 2), min(spikes.size, last + 1)
+    times = spikes[first:last]
+    if times.size < 2:
+        return Drawn.nothing()
+    rate = np.zeros(times.size)
+    rate[1:] = 1 / np.maximum(np.diff(times), 1e-9)
+    if first > 0:
+        times, rate = times[1:], rate[1:]
+    return Drawn.line(times, rate)
+
+
+def difference(measured: Drawn, model: Drawn) -> Drawn:
+    """Measured less model, at the measured times that the model covers."""
+    if measured.empty or model.empty:
+        return Drawn.nothing()
+    inside = measured.time <= model.time[-1]
+    time = measured.time[inside]
+    rest = measured.mean[inside] - np.interp(time, model.time, model.mean)
+    return Drawn(time, rest, rest, rest, measured.gap[inside])

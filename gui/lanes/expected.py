@@ -1,0 +1,146 @@
+"""What is expected of a run: the plan, the model, and where they really came to lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gui.lanes.decimate import Drawn, FloatArray, line_between
+from tactile_lab.waveform import Waveform
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A stretch of the run that has a name, such as "120 mN", in run time, s."""
+
+    start: float
+    end: float
+    label: str
+    pause: bool = False
+
+
+@dataclass(eq=False)
+class Preview:
+    """What the model expects of the run.
+
+    Attributes:
+        force: N against run time.
+        traces: signal -> (times, values).
+        spikes: times, s.
+        holds: named stretches.
+        length: s.
+    """
+
+    force: Waveform
+    traces: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    spikes: FloatArray = field(default_factory=lambda: np.empty(0))
+    holds: list[Hold] = field(default_factory=list)
+    length: float = 0.0
+
+
+class Aligned:
+    """A preview moved, trial by trial, to where the trials really started."""
+
+    def __init__(self, preview: Preview) -> None:
+        self.preview = preview
+        self._planned = np.array([hold.start for hold in preview.holds])
+        self._offsets = np.zeros(max(len(preview.holds), 1))
+        self._known = 0
+        self._cache: dict[str, tuple[int, FloatArray]] = {}
+
+    def begin(self, index: int, start: float) -> None:
+        """Trial `index` really started at `start` s; later ones will be as late."""
+        if index < self._planned.size:
+            self._offsets[index:] = start - self._planned[index]
+            self._known += 1
+
+    @property
+    def length(self) -> float:
+        """Expected length, s."""
+        return self.preview.length + float(self._offsets[-1])
+
+    def times(self, name: str, planned: FloatArray) -> FloatArray:
+        """Planned times where they really are; kept under `name` until they move."""
+        known, kept = self._cache.get(name, (-1, planned))
+        if known == self._known:
+            return kept
+        if self._planned.size:
+            at = np.searchsorted(self._planned, planned, side="right") - 1
+            moved = planned + self._offsets[np.maximum(at, 0)]
+            moved = np.maximum.accumulate(moved)
+        else:
+            moved = planned
+        self._cache[name] = (self._known, moved)
+        return moved
+
+    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """What the model has for a signal."""
+        if signal not in self.preview.traces:
+            return Drawn.nothing()
+        time, value = self.preview.traces[signal]
+        return line_between(self.times(signal, time), value, start, end, count)
+
+    @property
+    def spikes(self) -> FloatArray:
+        """The model's spikes."""
+        return self.times("spikes", self.preview.spikes)
+
+    def planned(self) -> tuple[FloatArray, FloatArray]:
+        """Times and forces of the plan, N."""
+        force = self.preview.force
+        return self.times("force", force.time), force.value
+
+
+class Nothing:
+    """A source without data: the lanes of the empty state."""
+
+    reach = 0.0
+    length = 5.0
+    running = False
+
+    def __init__(self) -> None:
+        self.holds: list[Hold] = []
+        self.spikes = np.empty(0)
+        self.twin_spikes = np.empty(0)
+
+    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """No points."""
+        return Drawn.nothing()
+
+    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """No points."""
+        return Drawn.nothing()
+
+    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """No plan."""
+        return np.empty(0), np.empty(0)
+
+
+class PlanSource:
+    """No data yet: the plan and what the model expects of it."""
+
+    reach = 0.0
+    running = True
+
+    def __init__(self, preview: Preview) -> None:
+        self.preview = preview
+        self.length = preview.length
+        self.holds = preview.holds
+        self.spikes = np.empty(0)
+        self.twin_spikes = preview.spikes
+
+    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """Nothing is measured."""
+        return Drawn.nothing()
+
+    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The model's."""
+        if signal not in self.preview.traces:
+            return Drawn.nothing()
+        time, value = self.preview.traces[signal]
+        return line_between(time, value, start, end, count)
+
+    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """The planned force."""
+        return self.preview.force.time, self.preview.force.value

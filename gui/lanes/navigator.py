@@ -1,0 +1,177 @@
+"""The whole run at a glance, with the visible window to drag."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QWidget
+
+from gui.lanes import paint
+from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.derive import rate_of
+from gui.lanes.expected import Nothing
+from gui.lanes.ground import AXIS, GUTTER
+from gui.lanes.paint import Frame
+from gui.lanes.row import CARD
+from gui.lanes.source import Source
+from gui.lanes.view import TimeView
+from gui.look.fonts import sized
+from gui.look.theme import Theme
+
+HEIGHT = 62
+
+
+class Navigator(QWidget):
+    """Force outline and spike rate of the whole run; drag the window, wheel zooms."""
+
+    def __init__(self, view: TimeView, theme: Theme) -> None:
+        super().__init__()
+        self.source: Source = Nothing()
+        self._view, self._theme = view, theme
+        self._grabbed: tuple[str, float, float, float] | None = None
+        self.setFixedHeight(HEIGHT)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Whole run; arrow keys move the visible window")
+
+    def frame(self) -> Frame:
+        """The map from run time to pixels; forces 0 to 1."""
+        length = max(self.source.length, 1e-3)
+        return Frame(
+            CARD + AXIS, self.width() - GUTTER, 6, HEIGHT - 20, 0.0, length, 0.0, 1.0
+        )
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw outline, rate, window and time."""
+        painter = QPainter(self)
+        tokens = self._theme.tokens
+        painter.fillRect(self.rect(), QColor(tokens.sunken))
+        frame = self.frame()
+        painter.setPen(QColor(tokens.text))
+        painter.setFont(sized(13, QFont.Weight.DemiBold))
+        painter.drawText(12, 24, "Whole run")
+        painter.setPen(QColor(tokens.muted))
+        painter.setFont(sized(11))
+        painter.drawText(12, 41, "drag · wheel zooms")
+        painter.save()
+        painter.setClipRect(frame.area.adjusted(-1, -4, 1, 4))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._force(painter, frame)
+        self._rate(painter, frame)
+        self._window(painter, frame)
+        painter.restore()
+        most = max(2, int((frame.right - frame.left) / 80))
+        step = step_of(frame.end, most)
+        for value in ticks(0.0, frame.end, most):
+            at = QPointF(frame.x1(value), frame.bottom + 11)
+            words = number(value, decimals(step))
+            paint.write(painter, at, words, tokens.muted, align=0.5)
+        if self.hasFocus():
+            painter.setPen(paint.pen(tokens.accent))
+            painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+
+    def _force(self, painter: QPainter, frame: Frame) -> None:
+        tokens, source = self._theme.tokens, self.source
+        count = max(50, int(frame.right - frame.left))
+        measured = source.trace("force", 0.0, source.length, count)
+        time, force = source.planned(0.0, source.length)
+        peak = max(
+            [1e-12, *np.abs(force[:1]), float(np.abs(force).max(initial=0.0))]
+            + ([] if measured.empty else [abs(v) for v in measured.extent or ()])
+        )
+        if force.size > 1:
+            y = frame.y(np.abs(force) / peak)
+            paint.polyline(painter, frame.x(time), y, paint.pen(tokens.border_strong))
+        if measured.empty:
+            return
+        colour = QColor(tokens.force)
+        colour.setAlpha(50)
+        shown = type(measured)(
+            measured.time,
+            measured.low / peak,
+            measured.high / peak,
+            measured.mean / peak,
+            measured.gap,
+        )
+        paint.fill(painter, frame, shown, colour)
+        paint.trace(painter, frame, shown, paint.pen(tokens.force))
+
+    def _rate(self, painter: QPainter, frame: Frame) -> None:
+        rate = rate_of(self.source.spikes, 0.0, self.source.length)
+        if rate.empty:
+            return
+        top = max(float(rate.high.max()), 1e-9) * 1.1
+        keep = slice(None, None, max(1, rate.time.size // 400))
+        x, y = frame.x(rate.time[keep]), frame.y(rate.low[keep] / top)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self._theme.tokens.rate))
+        points = zip(x.tolist(), y.tolist(), strict=True)
+        painter.drawRects([QRectF(a - 1.2, b - 1.2, 2.4, 2.4) for a, b in points])
+
+    def _window(self, painter: QPainter, frame: Frame) -> None:
+        left = max(frame.x1(self._view.start), frame.left)
+        right = min(frame.x1(self._view.end), frame.right)
+        accent = QColor(self._theme.tokens.accent)
+        soft = QColor(accent)
+        soft.setAlpha(36)
+        box = QRectF(left, 2, max(right - left, 3), frame.bottom)
+        painter.fillRect(box, soft)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        painter.fillRect(QRectF(box.left(), 2, 2, frame.bottom), accent)
+        painter.fillRect(QRectF(box.right() - 2, 2, 2, frame.bottom), accent)
+
+    def _time(self, x: float) -> float:
+        frame = self.frame()
+        share = (x - frame.left) / max(1.0, frame.right - frame.left)
+        return share * frame.end
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Grab an edge or the window; a click elsewhere moves the window there."""
+        at, frame = event.position().x(), self.frame()
+        left, right = frame.x1(self._view.start), frame.x1(self._view.end)
+        part = "middle"
+        if abs(at - left) <= 5:
+            part = "left"
+        elif abs(at - right) <= 5:
+            part = "right"
+        elif not left < at < right:
+            self._view.show_span(
+                self._time(at) - self._view.width / 2, self._view.width
+            )
+        self._grabbed = (part, self._time(at), self._view.start, self._view.end)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag on."""
+        if self._grabbed is None:
+            return
+        part, begin, start, end = self._grabbed
+        moved = self._time(event.position().x()) - begin
+        if part == "left":
+            self._view.show_span(
+                min(start + moved, end - 1e-3), 0.0 + end - start - moved
+            )
+        elif part == "right":
+            self._view.show_span(start, max(end + moved - start, 1e-3))
+        else:
+            self._view.show_span(start + moved, end - start)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """End of the drag."""
+        self._grabbed = None
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer."""
+        turns = event.angleDelta().y() / 120
+        self._view.zoom(1.25**turns, self._time(event.position().x()))
+
+    def point_of(self, time: float) -> QPointF:
+        """Where a time lies, for tests and help."""
+        return QPointF(self.frame().x1(time), HEIGHT / 2)

@@ -1,0 +1,241 @@
+"""Numpy arrays onto a painter: the fast path of every trace.
+
+Pen width is 1 px exactly: wider antialiased polylines cost tens of times more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import shiboken6
+from numpy.typing import NDArray
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QPainter,
+    QPen,
+    QPolygonF,
+    QStaticText,
+    QTransform,
+)
+
+from gui.lanes.decimate import Drawn, FloatArray, zigzag
+from gui.look.fonts import sized
+
+FAR = 1e5
+"""Pixels beyond which coordinates are clamped: Qt's rasteriser loses precision."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The map from time and value to pixels.
+
+    Attributes:
+        left, right, top, bottom: of the plot, px.
+        start, end: of the visible time, s.
+        low, high: of the visible values.
+    """
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+    start: float
+    end: float
+    low: float
+    high: float
+
+    def x(self, time: FloatArray) -> FloatArray:
+        """Pixels of times."""
+        per = (self.right - self.left) / (self.end - self.start)
+        return np.clip(self.left + (time - self.start) * per, -FAR, FAR)
+
+    def y(self, value: FloatArray) -> FloatArray:
+        """Pixels of values."""
+        per = (self.bottom - self.top) / (self.high - self.low)
+        return np.clip(self.bottom - (value - self.low) * per, -FAR, FAR)
+
+    def x1(self, time: float) -> float:
+        """Pixel of one time."""
+        per = (self.right - self.left) / (self.end - self.start)
+        return min(max(self.left + (time - self.start) * per, -FAR), FAR)
+
+    def y1(self, value: float) -> float:
+        """Pixel of one value."""
+        per = (self.bottom - self.top) / (self.high - self.low)
+        return min(max(self.bottom - (value - self.low) * per, -FAR), FAR)
+
+    @property
+    def area(self) -> QRectF:
+        """The plot's rectangle."""
+        return QRectF(
+            self.left, self.top, self.right - self.left, self.bottom - self.top
+        )
+
+
+def polygon(x: FloatArray, y: FloatArray) -> QPolygonF:
+    """A polygon filled straight from arrays, without a Python loop."""
+    made = QPolygonF()
+    made.resize(x.size)
+    if x.size:
+        # its stubs know nothing of memory
+        whole: Any = shiboken6.VoidPtr
+        pointer = whole(made.data(), 16 * x.size, True)
+        memory = np.frombuffer(pointer, dtype=np.float64).reshape(-1, 2)
+        memory[:, 0] = x
+        memory[:, 1] = y
+    return made
+
+
+@lru_cache(maxsize=256)
+def pen(colour: str, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    """A 1 px pen."""
+    return QPen(QColor(colour), 1, style)
+
+
+def trace(painter: QPainter, frame: Frame, drawn: Drawn, line: QPen) -> None:
+    """Draw a decimated trace, broken at gaps."""
+    if drawn.empty:
+        return
+    x, y = zigzag(drawn)
+    starts = 2 * np.flatnonzero(drawn.gap)
+    if np.array_equal(drawn.low, drawn.high):
+        x, y, starts = drawn.time, drawn.low, starts // 2
+    polyline(painter, frame.x(x), frame.y(y), line, starts)
+
+
+def polyline(
+    painter: QPainter,
+    x: FloatArray,
+    y: FloatArray,
+    line: QPen,
+    starts: NDArray[np.intp] | None = None,
+) -> None:
+    """Draw a line through pixels; a new stroke begins at each index in `starts`."""
+    painter.setPen(line)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    if starts is None or starts.size <= 1:
+        painter.drawPolyline(polygon(x, y))
+        return
+    ends = np.append(starts[1:], x.size)
+    for first, last in zip(starts, ends, strict=True):
+        painter.drawPolyline(polygon(x[first:last], y[first:last]))
+
+
+def fill(painter: QPainter, frame: Frame, drawn: Drawn, colour: QColor) -> None:
+    """Fill between a trace and the value 0."""
+    if drawn.empty:
+        return
+    x, y = frame.x(drawn.time), frame.y(drawn.high)
+    zero = frame.y1(min(max(0.0, frame.low), frame.high))
+    x = np.concatenate([[x[0]], x, [x[-1]]])
+    y = np.concatenate([[zero], y, [zero]])
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(colour)
+    painter.drawPolygon(polygon(x, y))
+
+
+def envelope(painter: QPainter, frame: Frame, drawn: Drawn, colour: str) -> None:
+    """Fill between least and largest, so that averaging hides nothing.
+
+    A line up and down through every pixel column: Qt fills polygons of so many corners
+    ten times more slowly.
+    """
+    if drawn.empty or np.array_equal(drawn.low, drawn.high):
+        return
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    trace(painter, frame, drawn, pen(colour))
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+
+
+@lru_cache(maxsize=64)
+def mixed(colour: str, ground: str, share: float) -> str:
+    """`share` of a colour over a ground, opaque."""
+    one, other = QColor(colour), QColor(ground)
+    parts = [
+        round(share * a + (1 - share) * b)
+        for a, b in zip(one.getRgb()[:3], other.getRgb()[:3], strict=True)  # type: ignore[index]
+    ]
+    return QColor(*parts).name()
+
+
+def pulses(painter: QPainter, frame: Frame, drawn: Drawn, colour: str) -> None:
+    """Draw columns that stand out of the noise from least to largest value."""
+    if drawn.empty:
+        return
+    reach = drawn.high - drawn.low
+    stands = reach > 4 * float(np.median(reach)) + 1e-12
+    x = frame.x(drawn.time[stands]).tolist()
+    low, high = (
+        frame.y(drawn.low[stands]).tolist(),
+        frame.y(drawn.high[stands]).tolist(),
+    )
+    painter.setPen(pen(colour))
+    painter.drawLines(
+        [QLineF(a, b, a, c) for a, b, c in zip(x, low, high, strict=True)]
+    )
+
+
+def bars(
+    painter: QPainter,
+    frame: Frame,
+    times: FloatArray,
+    span: tuple[float, float],
+    line: QPen,
+) -> None:
+    """Draw a vertical bar at each time, from one pixel row to another."""
+    x = np.unique(np.round(frame.x(times)))
+    x = x[(x >= frame.left) & (x <= frame.right)]
+    painter.setPen(line)
+    painter.drawLines([QLineF(v + 0.5, span[0], v + 0.5, span[1]) for v in x.tolist()])
+
+
+def dots(painter: QPainter, x: FloatArray, y: FloatArray, colour: str) -> None:
+    """Draw small squares at pixels."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colour))
+    painter.drawRects(
+        [
+            QRectF(a - 2, b - 2, 4, 4)
+            for a, b in zip(x.tolist(), y.tolist(), strict=True)
+        ]
+    )
+
+
+@lru_cache(maxsize=2048)
+def _laid_out(text: str, pixels: int) -> tuple[QStaticText, float, float]:
+    """A short text laid out once: drawing it again costs a tenth."""
+    made = QStaticText(text)
+    made.setTextFormat(Qt.TextFormat.PlainText)
+    made.prepare(QTransform(), sized(pixels))
+    size = made.size()
+    return made, size.width(), size.height()
+
+
+def write(
+    painter: QPainter,
+    at: QPointF,
+    text: str,
+    colour: str,
+    *,
+    align: float = 0.0,
+    pixels: int = 11,
+) -> None:
+    """Write a number or a name.
+
+    Args:
+        painter: its font is changed.
+        at: the text's middle in height; in width its start, middle or end.
+        text: in one line.
+        colour: as "#rrggbb".
+        align: 0 starts at the point, 0.5 is centred there, 1 ends there.
+        pixels: size.
+    """
+    laid_out, width, height = _laid_out(text, pixels)
+    painter.setFont(sized(pixels))
+    painter.setPen(pen(colour))
+    where = QPointF(round(at.x() - align * width), round(at.y() - height / 2))
+    painter.drawStaticText(where, laid_out)

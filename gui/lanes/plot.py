@@ -1,0 +1,261 @@
+"""The plot of one lane, painted directly: traces, now, cursors, value tag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QPainter, QPen
+
+from gui.lanes import paint
+from gui.lanes.axis import nice_range, number
+from gui.lanes.compare import Comparison, paint_lane
+from gui.lanes.decimate import Drawn
+from gui.lanes.derive import averaged, difference, rate_of, scaled
+from gui.lanes.ground import AXIS, GUTTER, TIME_AXIS, Place, ground, row_names, rows_of
+from gui.lanes.lane import Kind, Lane
+from gui.lanes.paint import Frame
+from gui.lanes.source import Source
+from gui.lanes.view import TimeView
+from gui.look.fonts import sized
+from gui.look.tokens import Tokens
+
+DOTS = 160
+"""Most rate markers drawn; more would be a smear and slow."""
+
+
+@dataclass
+class Options:
+    """What to draw besides the measured trace."""
+
+    twin: bool = True
+    band: float = 0.05
+
+
+class LanePainter:
+    """Paints one lane onto anything that paints: a widget, a picture, an SVG."""
+
+    def __init__(self, lane: Lane, view: TimeView, options: Options) -> None:
+        self.lane = lane
+        self.view = view
+        self.options = options
+        self.range = (0.0, 1.0)
+        self.manual: tuple[float, float] | None = None
+        self.bottom = False
+        self.top = False
+        self.last: float | None = None
+
+    def paint(
+        self, painter: QPainter, size: QSize, source: Source, tokens: Tokens
+    ) -> None:
+        """Draw the lane at `size`."""
+        below = TIME_AXIS if self.bottom else 0
+        right = max(size.width() - GUTTER, AXIS + 20)
+        bottom = max(size.height() - below - 5, 12)
+        view = self.view
+        if isinstance(source, Comparison):
+            self._compare(painter, size, QSize(right, bottom), source, tokens)
+            return
+        count = max(50, int(right - AXIS))
+        measured, twin = self._data(source, view.start, view.end, count)
+        self._fit(measured, twin, source)
+        low, high = self.range
+        frame = Frame(AXIS, right, 5, bottom, view.start, view.end, low, high)
+        painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        place = Place(self.top, self.bottom, self.lane.kind is not Kind.RASTER)
+        ground(painter, frame, source, tokens, place)
+        painter.save()
+        painter.setClipRect(QRectF(frame.left, 0, right - frame.left, bottom + 4))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+        self._traces(painter, frame, source, measured, twin, tokens)
+        painter.restore()
+        self._cursors(painter, frame, tokens, size)
+        self._tag(painter, frame, tokens)
+
+    def _compare(
+        self,
+        painter: QPainter,
+        size: QSize,
+        corner: QSize,
+        source: Comparison,
+        tokens: Tokens,
+    ) -> None:
+        """Draw two or three runs instead of one."""
+        view, right, bottom = self.view, corner.width(), corner.height()
+        frame = Frame(AXIS, right, 5, bottom, view.start, view.end, 0.0, 1.0)
+        painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        place = Place(self.top, self.bottom, True)
+        self.range = paint_lane(painter, frame, self.lane, place, source, tokens)
+        self.last = None
+        self._cursors(painter, frame, tokens, size)
+
+    def _data(
+        self, source: Source, start: float, end: float, count: int
+    ) -> tuple[Drawn, Drawn]:
+        lane, none = self.lane, Drawn.nothing()
+        if lane.kind is Kind.RASTER:
+            return none, none
+        if lane.kind is Kind.RATE:
+            twin = none
+            if self.options.twin:
+                twin = scaled(rate_of(source.twin_spikes, start, end), lane.scale)
+            return rate_of(source.spikes, start, end), twin
+        measured = source.trace(lane.signal, start, end, count)
+        if lane.kind is Kind.RESIDUAL:
+            model = source.twin(lane.signal, start, end, 4 * count)
+            return scaled(difference(measured, model), lane.scale), none
+        twin = none
+        if self.options.twin and lane.kind is not Kind.FORCE:
+            twin = scaled(source.twin(lane.signal, start, end, count), lane.scale)
+        return scaled(measured, lane.scale), twin
+
+    def _fit(self, measured: Drawn, twin: Drawn, source: Source) -> None:
+        """Choose the value range: round, and steady while the data allows it."""
+        if self.manual is not None:
+            self.range = self.manual
+            return
+        extents = [e for e in (measured.extent, twin.extent) if e is not None]
+        if self.lane.kind is Kind.FORCE:
+            _, force = source.planned(self.view.start, self.view.end)
+            if force.size:
+                extents.append((float(force.min()) * 1e3, float(force.max()) * 1e3))
+        if self.lane.kind in (Kind.FORCE, Kind.RATE):
+            extents.append((0.0, 0.0))
+        if self.lane.kind is Kind.RESIDUAL:
+            reach = max([abs(v) for e in extents for v in e] + [self.lane.least / 2])
+            extents = [(-reach, reach)]
+        if not extents:
+            return
+        low, high = min(e[0] for e in extents), max(e[1] for e in extents)
+        if low == high == 0.0:
+            self.range = (0.0, self.lane.least)
+            return
+        wanted = nice_range(low, high, self.lane.least)
+        now = self.range
+        roomy = (now[1] - now[0]) > 1.6 * (wanted[1] - wanted[0])
+        if low < now[0] or high > now[1] or roomy or now == (0.0, 1.0):
+            self.range = wanted
+
+    def _traces(
+        self,
+        painter: QPainter,
+        frame: Frame,
+        source: Source,
+        measured: Drawn,
+        twin: Drawn,
+        tokens: Tokens,
+    ) -> None:
+        kind = self.lane.kind
+        colour = tokens.trace("residual" if kind is Kind.RESIDUAL else self.lane.signal)
+        if kind is Kind.RASTER:
+            self._raster(painter, frame, source, tokens)
+        elif kind is Kind.RESIDUAL:
+            self._tolerance(painter, frame, tokens)
+        elif kind is Kind.FORCE:
+            soft = QColor(colour)
+            soft.setAlpha(34)
+            paint.fill(painter, frame, measured, soft)
+            self._plan(painter, frame, source, tokens)
+        if self.lane.averaged:
+            tint = paint.mixed(colour, tokens.plot, 0.3)
+            paint.envelope(painter, frame, measured, tint)
+            spiky = self.lane.signal == "V_K"
+            shown = twin if spiky else averaged(twin)
+            paint.trace(painter, frame, shown, paint.pen(tokens.twin))
+            paint.trace(painter, frame, averaged(measured), paint.pen(colour))
+            if spiky:
+                paint.pulses(painter, frame, measured, colour)
+        else:
+            paint.trace(painter, frame, twin, paint.pen(tokens.twin))
+            paint.trace(painter, frame, measured, paint.pen(colour))
+        if kind is Kind.RATE:
+            inside = (measured.time >= frame.start) & (measured.time <= frame.end)
+            if 0 < np.count_nonzero(inside) <= DOTS:
+                x, y = measured.time[inside], measured.low[inside]
+                paint.dots(painter, frame.x(x), frame.y(y), colour)
+        if source.running and frame.start <= source.reach <= frame.end:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+            at = round(frame.x1(source.reach)) + 0.5
+            painter.setPen(paint.pen(tokens.border_strong))
+            painter.drawLine(QPointF(at, 0), QPointF(at, frame.bottom + 3))
+        self.last = None
+        if not measured.empty and kind is not Kind.RASTER:
+            self.last = float(measured.mean[-1])
+
+    def _plan(
+        self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
+    ) -> None:
+        time, force = source.planned(frame.start, frame.end)
+        if not source.running or time.size < 2:
+            return
+        ahead = time > source.reach
+        at = np.interp(source.reach, time, force)
+        t = np.concatenate([[source.reach], time[ahead]])
+        f = np.concatenate([[at], force[ahead]]) * self.lane.scale
+        line = QPen(QColor(tokens.trace("force")), 1, Qt.PenStyle.DashLine)
+        paint.polyline(painter, frame.x(t), frame.y(f), line)
+
+    def _tolerance(self, painter: QPainter, frame: Frame, tokens: Tokens) -> None:
+        half = self.options.band * self.lane.scale
+        top, bottom = frame.y1(half), frame.y1(-half)
+        painter.fillRect(
+            QRectF(frame.left, top, frame.right - frame.left, bottom - top),
+            QColor(tokens.green_soft),
+        )
+        painter.setPen(QPen(QColor(tokens.green), 1, Qt.PenStyle.DotLine))
+        for y in (top, bottom):
+            painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
+
+    def _raster(
+        self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
+    ) -> None:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        two = self.options.twin and source.twin_spikes.size > 0
+        names = ("meas.", "model") if two else ("meas.",)
+        rows = rows_of(frame, len(names))
+        painter.setClipping(False)
+        row_names(painter, frame, tokens, names)
+        both = (source.spikes, source.twin_spikes)
+        colours = (tokens.spikes, tokens.twin)
+        for span, times, colour in zip(rows, both, colours, strict=False):
+            first, last = np.searchsorted(times, [frame.start, frame.end])
+            paint.bars(painter, frame, times[first:last], span, paint.pen(colour))
+
+    def _cursors(
+        self, painter: QPainter, frame: Frame, tokens: Tokens, size: QSize
+    ) -> None:
+        if self.view.cursors is None:
+            return
+        for name, time, colour in zip(
+            "AB", self.view.cursors, (tokens.accent, tokens.V_C1), strict=True
+        ):
+            x = frame.x1(time)
+            if not frame.left <= x <= frame.right:
+                continue
+            painter.setPen(QPen(QColor(colour), 1, Qt.PenStyle.DashLine))
+            x = round(x) + 0.5
+            painter.drawLine(QPointF(x, 0), QPointF(x, frame.bottom + 4))
+            if self.top:
+                box = QRectF(x - 8, frame.bottom - 14, 16, 17)
+                painter.fillRect(box, QColor(colour))
+                painter.setPen(QColor(tokens.on_accent))
+                painter.setFont(sized(11, QFont.Weight.Bold))
+                painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+
+    def _tag(self, painter: QPainter, frame: Frame, tokens: Tokens) -> None:
+        """The newest value, beside where it is."""
+        if self.last is None or self.lane.kind is Kind.RESIDUAL:
+            return
+        y = min(max(frame.y1(self.last), frame.top + 8), frame.bottom - 8)
+        text = number(self.last, min(self.lane.places, 2))
+        box = QRectF(frame.right + 4, y - 9, GUTTER - 9, 18)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(tokens.trace(self.lane.signal)))
+        painter.drawRoundedRect(box, 3, 3)
+        painter.setPen(QColor(tokens.plot))
+        painter.setFont(sized(11, QFont.Weight.DemiBold))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)

@@ -1,0 +1,184 @@
+"""Where lanes take their data from: a run in progress or a run on disk, alike."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from gui.lanes.decimate import Drawn, FloatArray
+from gui.lanes.expected import Aligned, Hold, Preview
+from gui.lanes.history import SlowTrack, Track
+from gui.lanes.twinned import TwinTracks, joined
+from tactile_lab.acquisition.live import Live
+
+
+class Source(Protocol):
+    """What a lane may ask for. All times are on the run's axis, s; values are SI."""
+
+    @property
+    def reach(self) -> float:
+        """Time up to which there is data."""
+        ...
+
+    @property
+    def length(self) -> float:
+        """Time the whole run takes or took."""
+        ...
+
+    @property
+    def running(self) -> bool:
+        """Whether data still comes in."""
+        ...
+
+    @property
+    def holds(self) -> list[Hold]:
+        """Named stretches, ascending."""
+        ...
+
+    @property
+    def spikes(self) -> FloatArray:
+        """Times of detected spikes, ascending."""
+        ...
+
+    @property
+    def twin_spikes(self) -> FloatArray:
+        """Times of the twin's spikes, ascending."""
+        ...
+
+    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The measured signal in about `count` columns."""
+        ...
+
+    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The same signal as the model has it, also ahead of the data."""
+        ...
+
+    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """Times and forces of the plan, N."""
+        ...
+
+
+class LiveSource:
+    """A run in progress: polls the newest bins, remembers them all, decimated.
+
+    Args:
+        live: the run's ring of bins.
+        preview: the model's expectation; None until it is known.
+        newtons_per_ampere: turns coil current into force.
+    """
+
+    def __init__(
+        self, live: Live, preview: Preview | None, newtons_per_ampere: float
+    ) -> None:
+        self.preview = preview
+        self.aligned = None if preview is None else Aligned(preview)
+        self.tracks = TwinTracks()
+        self.running = True
+        self.holds: list[Hold] = []
+        self._live = live
+        self._gain = newtons_per_ampere
+        self._loop: list[tuple[float, float]] = []
+        self._seen = 0
+        self._tracks: dict[str, Track] = {}
+        self._slow = {name: SlowTrack() for name in ("force", "field")}
+        self._spikes = np.empty(1024)
+        self._spike_count = 0
+
+    @property
+    def reach(self) -> float:
+        """Time up to which there is data, s."""
+        ends = [track.end for track in self._tracks.values()]
+        slow = max(track.end for track in self._slow.values())
+        return max(ends) if ends else slow
+
+    @property
+    def length(self) -> float:
+        """Expected length, or the reach where that is longer, s."""
+        planned = self.aligned.length if self.aligned and self.running else 0.0
+        return max(planned, self.reach, 1.0)
+
+    @property
+    def spikes(self) -> FloatArray:
+        """Detected so far."""
+        return self._spikes[: self._spike_count]
+
+    @property
+    def twin_spikes(self) -> FloatArray:
+        """The twin's so far, then the plan's."""
+        planned = np.empty(0) if self.aligned is None else self.aligned.spikes
+        known = self.tracks.end
+        return np.concatenate([self.tracks.spikes, planned[planned > known]])
+
+    def poll(self) -> bool:
+        """Take what is new from the ring; whether there was anything."""
+        written = self._live.written
+        if written == self._seen:
+            return False
+        if written < self._seen:
+            self._seen = 0
+        for signal in self._live.signals:
+            track = self._tracks.setdefault(signal, Track())
+            track.add(self._live.since(self._seen, signal))
+        self._seen = written
+        return True
+
+    def add_spikes(self, times: tuple[float, ...]) -> None:
+        """Detected spikes, ascending."""
+        need = self._spike_count + len(times)
+        if need > self._spikes.size:
+            self._spikes = np.concatenate([self._spikes, np.empty(max(need, 1024))])
+        self._spikes[self._spike_count : need] = times
+        self._spike_count = need
+
+    def add_current(self, time: float, amperes: float) -> None:
+        """A read-back of the coil."""
+        self._slow["force"].add(time, amperes * self._gain)
+
+    def add_field(self, time: float, tesla: float) -> None:
+        """A reading of the teslameter."""
+        self._slow["field"].add(time, tesla)
+        force = self._slow["force"].last
+        if force is not None and len(self._loop) < 50_000:
+            self._loop.append((force / self._gain, tesla))
+
+    @property
+    def loop(self) -> FloatArray:
+        """Shape (n, 2): coil current, A, and the field read then, T."""
+        return np.array(self._loop, dtype=np.float64).reshape(-1, 2)
+
+    def begin_trial(self, index: int, hold: Hold) -> None:
+        """A trial starts; the preview is moved to where it really starts."""
+        if not self.holds or self.holds[-1].start < hold.start:
+            self.holds.append(hold)
+        if self.aligned is not None:
+            self.aligned.begin(index, hold.start)
+
+    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The measured signal; the force holds from its last set-point to now."""
+        if signal in self._slow and signal not in self._tracks:
+            hold = self.reach if signal == "force" and self.running else None
+            return self._slow[signal].between(start, end, hold)
+        track = self._tracks.get(signal)
+        return Drawn.nothing() if track is None else track.between(start, end, count)
+
+    def mean(self, signal: str) -> float | None:
+        """Mean of the newest bins; None without any."""
+        if signal in self._slow and signal not in self._tracks:
+            return self._slow[signal].last
+        track = self._tracks.get(signal)
+        return None if track is None or track.mean != track.mean else track.mean
+
+    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The twin under the applied current so far, then what the plan expects."""
+        found = self.tracks.between(signal, start, end, count)
+        if self.aligned is None or end <= self.tracks.end:
+            return found
+        ahead = max(start, self.tracks.end)
+        return joined(found, self.aligned.twin(signal, ahead, end, count))
+
+    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """The planned force."""
+        if self.aligned is None:
+            return np.empty(0), np.empty(0)
+        return self.aligned.planned()

@@ -1,0 +1,247 @@
+"""A run on disk as a source: pyramids in memory, samples fetched when zoomed in."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gui.lanes.decimate import Drawn, FloatArray, columns, line_between
+from gui.lanes.expected import Hold
+from gui.lanes.twinned import TwinSlice, TwinTracks
+from tactile_lab.store.layout import BIN
+from tactile_lab.store.run import Run
+from tactile_lab.store.signal import StoredSignal
+
+BRANCH = 16
+"""Bins joined into one on the next level."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Bins of equal length: rows are time, least, largest, mean."""
+
+    rows: FloatArray
+    width: float
+
+
+class Pyramid:
+    """One stored signal at every resolution; the finest is its bins of samples."""
+
+    def __init__(self, signal: StoredSignal) -> None:
+        whole = signal.envelope(cells=max(1, -(-len(signal) // BIN)))
+        rows = np.array([whole.time, whole.low, whole.high, whole.mean])
+        self.levels = [Level(rows, typical_step(whole.time))]
+        while self.levels[-1].rows.shape[1] > 4096:
+            last = self.levels[-1]
+            self.levels.append(Level(joined(last.rows), last.width * BRANCH))
+
+    def between(self, start: float, end: float, count: int) -> Drawn:
+        """What lies in [start, end] s in about `count` columns."""
+        level = self.levels[0]
+        for coarser in self.levels[1:]:
+            if (end - start) / coarser.width < 2 * count:
+                break
+            level = coarser
+        first, last = np.searchsorted(level.rows[0], [start, end])
+        first, last = max(0, first - 1), min(level.rows.shape[1], last + 1)
+        return columns(level.rows[:, first:last], count, level.width)
+
+    def coarse(self, start: float, end: float, count: int) -> bool:
+        """Whether samples would show more than bins do."""
+        return (end - start) / self.levels[0].width < count
+
+
+def typical_step(time: FloatArray) -> float:
+    """Time from one entry to the next, s; gaps do not count."""
+    return float(np.median(np.diff(time[:10_001]))) if time.size > 1 else 1.0
+
+
+def joined(rows: FloatArray) -> FloatArray:
+    """Every `BRANCH` bins as one."""
+    edges = np.arange(0, rows.shape[1], BRANCH)
+    counts = np.diff(np.append(edges, rows.shape[1]))
+    return np.array(
+        [
+            rows[0, edges],
+            np.minimum.reduceat(rows[1], edges),
+            np.maximum.reduceat(rows[2], edges),
+            np.add.reduceat(rows[3], edges) / counts,
+        ]
+    )
+
+
+class RunSource:
+    """A run on disk. Opening reads the pyramids: do that away from the window's thread.
+
+    Args:
+        path: folder of the run.
+
+    Raises:
+        RunFolderError: it cannot be read as a run.
+
+    Attributes:
+        info: contents of `run.json`.
+        fetched: set each time samples asked for have arrived.
+    """
+
+    running = False
+
+    def __init__(self, path: Path) -> None:
+        self._run = Run.load(path)
+        self.path = path
+        self.info: dict[str, Any] = self._run.info
+        self.tracks: TwinTracks | None = None
+        self.fetched = threading.Event()
+        run = self._run
+        self._pyramids = {name: Pyramid(run.signal(name)) for name in run.signals}
+        self.length = max(run.duration, 1e-3)
+        self.reach = self.length
+        self.spikes = run.spikes["time"].copy()
+        self.trials = run.trials
+        self.holds = [
+            Hold(
+                float(t["start"]), float(t["end"]), _text(t["label"]), bool(t["pause"])
+            )
+            for t in self.trials
+        ]
+        attributes = run.attributes
+        self.simulated = run.simulated
+        self._gain = float(attributes.get("newtons_per_ampere", 1.0)) or 1.0
+        self._slow = _slow(run, self._gain)
+        self._details: dict[str, tuple[float, float, int, Drawn]] = {}
+        self._wanted: dict[str, tuple[float, float, int]] = {}
+        self._lock = threading.Lock()
+        self._closed = False
+        self._reader: threading.Thread | None = None
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What the run stored, force and spikes included."""
+        slow = tuple(name for name, (time, _) in self._slow.items() if time.size)
+        found = (*slow, *self._pyramids)
+        return (*found, "spikes") if "spikes" in self._recorded() else found
+
+    def _recorded(self) -> set[str]:
+        return {"spikes"} if self._run.detection is not None else set()
+
+    @property
+    def loop(self) -> FloatArray:
+        """Shape (n, 2): coil current, A, and the field read then, T."""
+        (at, force), (time, field) = self._slow["force"], self._slow["field"]
+        if not (at.size and time.size):
+            return np.empty((0, 2))
+        return np.column_stack([np.interp(time, at, force) / self._gain, field])
+
+    def add_twin(self, parts: list[TwinSlice]) -> None:
+        """Put the twin beside the data."""
+        tracks = TwinTracks()
+        for part in parts:
+            tracks.add(part)
+        self.tracks = tracks
+        self.fetched.set()
+
+    @property
+    def current(self) -> FloatArray:
+        """Shape (n, 2): time, s, and applied current, A."""
+        time, force = self._slow["force"]
+        return np.column_stack([time, force / self._gain])
+
+    @property
+    def twin_spikes(self) -> FloatArray:
+        """The twin's."""
+        return np.empty(0) if self.tracks is None else self.tracks.spikes
+
+    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The stored signal; where zoomed in, samples as soon as they are read."""
+        if signal in self._slow and signal not in self._pyramids:
+            time, value = self._slow[signal]
+            return line_between(time, value, start, end, 1 << 14)
+        pyramid = self._pyramids.get(signal)
+        if pyramid is None:
+            return Drawn.nothing()
+        if pyramid.coarse(start, end, count):
+            have = self._details.get(signal)
+            if have is not None and have[:3] == (start, end, count):
+                return have[3]
+            self._fetch(signal, (start, end, count))
+            if have is not None and have[0] <= start and end <= have[1]:
+                return have[3]
+        return pyramid.between(start, end, count)
+
+    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
+        """The model's."""
+        if self.tracks is None:
+            return Drawn.nothing()
+        return self.tracks.between(signal, start, end, count)
+
+    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """The run is over: what was applied is shown, not what was planned."""
+        return np.empty(0), np.empty(0)
+
+    def take_fetched(self) -> bool:
+        """Whether samples have arrived since this was last asked."""
+        arrived = self.fetched.is_set()
+        self.fetched.clear()
+        return arrived
+
+    def close(self) -> None:
+        """Let go of the file, as soon as nobody reads in it."""
+        with self._lock:
+            self._wanted.clear()
+            self._closed = True
+            reading = self._reader is not None
+        if not reading:
+            self._run.close()
+
+    def _fetch(self, signal: str, view: tuple[float, float, int]) -> None:
+        """Have samples read; the newest wish for each signal wins."""
+        with self._lock:
+            if self._closed:
+                return
+            self._wanted[signal] = view
+            if self._reader is None:
+                self._reader = threading.Thread(
+                    target=self._read, name="zoom", daemon=True
+                )
+                self._reader.start()
+
+    def _read(self) -> None:
+        while True:
+            with self._lock:
+                if not self._wanted:
+                    self._reader = None
+                    if self._closed:
+                        self._run.close()
+                    return
+                signal, view = self._wanted.popitem()
+            start, end, count = view
+            margin = 0.5 * (end - start)
+            stored = self._run.signal(signal)
+            part = stored.between(max(0.0, start - margin), end + margin)
+            cells = max(count, min(part.stop - part.start, 2 * count))
+            found = stored.envelope(part.start, part.stop, cells=cells)
+            rows = np.array([found.time, found.low, found.high, found.mean])
+            drawn = columns(rows, 1 << 30, typical_step(found.time))
+            self._details[signal] = (start, end, count, drawn)
+            self.fetched.set()
+
+
+def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Force from the applied current, and the field, as (times, values)."""
+    current = run.current
+    measured = np.where(
+        np.isnan(current["measured"]), current["setpoint"], current["measured"]
+    )
+    field = run.field
+    return {
+        "force": (current["time"].copy(), measured * gain),
+        "field": (field["time"].copy(), field["field"].copy()),
+    }
+
+
+def _text(raw: bytes) -> str:
+    return bytes(raw).decode("utf-8", "replace").rstrip("\0")

@@ -1,0 +1,209 @@
+"""The bar above the lanes: follow, width, fit, zoom, cursors, model, residual."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPoint, Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QWidget
+
+from gui.lanes.stack import LaneStack
+from gui.lanes.view import TimeView
+from gui.look.theme import Theme
+from gui.parts import IconButton, Segments
+from tactile_lab.quantity import show
+
+WIDTHS = (1.0, 5.0, 10.0)
+
+
+class Tools(QWidget):
+    """Buttons that change the view, and the cursors' times as text."""
+
+    export_asked = Signal()
+
+    def __init__(self, stack: LaneStack, view: TimeView, theme: Theme) -> None:
+        super().__init__()
+        self._stack, self._view, self._theme = stack, view, theme
+        self.follow = IconButton(
+            theme,
+            "follow",
+            "Follow the newest data (F)",
+            text="Follow",
+            role="toggle",
+            checkable=True,
+        )
+        self.freeze = IconButton(
+            theme,
+            "freeze",
+            "Freeze the display; acquisition goes on (Space)",
+            role="toggle",
+            checkable=True,
+        )
+        self.widths = Segments(["1 s", "5 s", "10 s", "Run"], "Visible time")
+        self.fit = IconButton(theme, "fit", "Fit the whole run (A)")
+        self.zoom = IconButton(
+            theme, "zoom", "Zoom to a box (Z)", role="toggle", checkable=True
+        )
+        self.cursors = IconButton(
+            theme,
+            "cursors",
+            "Cursors A and B (C)",
+            text="Cursors",
+            role="toggle",
+            checkable=True,
+        )
+        self.twin = IconButton(
+            theme,
+            "twin",
+            "Show what the model expects (M)",
+            text="Model",
+            role="toggle",
+            checkable=True,
+        )
+        self.residual = IconButton(
+            theme, "residual", "Show measured less model (Shift+M)",
+            text="Residual", role="toggle", checkable=True,
+        )  # fmt: skip
+        self.monitor = IconButton(
+            theme,
+            "eye",
+            "Monitor: watch the sensor between runs, coil off",
+            text="Monitor",
+            role="toggle",
+            checkable=True,
+        )
+        self.lanes = IconButton(theme, "layers", "Choose lanes")
+        self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
+        self._readout = QLabel()
+        self._texts = [
+            self.follow,
+            self.cursors,
+            self.twin,
+            self.residual,
+            self.monitor,
+        ]
+        self._lay_out()
+        self._connect()
+
+    def set_width(self, width: int) -> None:
+        """Text beside the icons where there is room, else icons alone."""
+        wide = width > (1330 if self._view.cursors is not None else 960)
+        for button in self._texts:
+            button.set_wide(wide)
+
+    def toggle_cursors(self, on: bool) -> None:
+        """Put the cursors into view, or take them away."""
+        if on and self._view.cursors is None:
+            start, width = self._view.start, self._view.width
+            self._view.place_cursors(start + 0.35 * width, start + 0.65 * width)
+        elif not on:
+            self._view.clear_cursors()
+        self.cursors.setChecked(on)
+
+    def bring(self, which: int) -> None:
+        """Bring cursor A (0) or B (1) to the middle of the view."""
+        if self._view.cursors is None:
+            self.toggle_cursors(True)
+        self._view.move_cursor(which, self._view.start + self._view.width / 2)
+
+    @property
+    def readout(self) -> str:
+        """The cursors as text."""
+        return self._readout.text()
+
+    def _connect(self) -> None:
+        self.follow.clicked.connect(self._view.set_follow)
+        self._view.follow_changed.connect(self._follow_changed)
+        self.widths.group.idClicked.connect(self._width_chosen)
+        self.fit.clicked.connect(self._view.show_all)
+        self.zoom.toggled.connect(self._box)
+        self._stack.box_zoomed.connect(self._boxed)
+        self.cursors.clicked.connect(self.toggle_cursors)
+        self.twin.toggled.connect(self._twin)
+        self.residual.toggled.connect(self._residual)
+        self.lanes.clicked.connect(self._choose_lanes)
+        self.export.clicked.connect(self.export_asked)
+        self._view.cursors_changed.connect(self.show_cursors)
+        self.follow.setChecked(True)
+        self.widths.choose(1)
+        self.twin.setChecked(True)
+        self.residual.setChecked(True)
+
+    def _width_chosen(self, number: int) -> None:
+        if number == len(WIDTHS):
+            self._view.show_all()
+        else:
+            self._view.set_width(WIDTHS[number])
+
+    def _follow_changed(self, follow: bool) -> None:
+        self.follow.setChecked(follow)
+
+    def _box(self, on: bool) -> None:
+        self._stack.zoom_box = on
+        self._stack.arrange()
+
+    def _boxed(self, start: float, end: float) -> None:
+        self.zoom.setChecked(False)
+        self.widths.choose(-1)
+        self._view.show_span(start, end - start)
+
+    def _twin(self, on: bool) -> None:
+        self._stack.options.twin = on
+        self._stack.refresh()
+
+    def _residual(self, on: bool) -> None:
+        self._stack.show_residual = on
+        self._stack.arrange()
+
+    def _choose_lanes(self) -> None:
+        menu = QMenu(self)
+        for row in self._stack.rows:
+            key = row.lane.key
+            one = menu.addAction(row.lane.plain)
+            one.setCheckable(True)
+            one.setChecked(not self._stack.is_hidden(key))
+            one.toggled.connect(lambda on, key=key: self._stack.hide_lane(key, not on))
+        menu.popup(self.lanes.mapToGlobal(QPoint(0, self.lanes.height())))
+
+    def show_cursors(self) -> None:
+        """Times of A and B, their difference, and the spikes between, as text."""
+        cursors = self._view.cursors
+        self.set_width(self.width())
+        if cursors is None:
+            self._readout.setText("")
+            return
+        tokens = self._theme.tokens
+        low, high = sorted(cursors)
+        spikes = self._stack.source.spikes
+        count = int(np.diff(np.searchsorted(spikes, [low, high]))[0])
+        span = high - low
+        rate = f" · <b>{count / span:.3g} Hz</b>" if span > 0 else ""
+        boxes = [
+            f'<span style="background:{colour};color:{tokens.on_accent};'
+            f'font-weight:700">&nbsp;{name}&nbsp;</span> <b>{time:.4f} s</b>'
+            for name, time, colour in zip(
+                "AB", cursors, (tokens.accent, tokens.V_C1), strict=True
+            )
+        ]
+        self._readout.setText(
+            f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; Δt <b>{show(span, 's')}</b>"
+            f" &nbsp; {count} spikes{rate}"
+        )
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 7, 10, 7)
+        row.setSpacing(5)
+        for widget in (
+            self.follow, self.freeze, self.widths, self.fit, self.zoom, self.cursors,
+            self.twin, self.residual,
+        ):  # fmt: skip
+            row.addWidget(widget)
+        row.addSpacing(8)
+        row.addWidget(self._readout, 1)
+        row.addWidget(self.monitor)
+        row.addWidget(self.lanes)
+        row.addWidget(self.export)
+        self._readout.setSizePolicy(
+            QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed
+        )
+        self._readout.setAccessibleName("Cursors")

@@ -1,0 +1,77 @@
+"""Which theme is on: the system's, unless the user chose one."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QPalette
+from PySide6.QtWidgets import QApplication
+
+from gui.look.style import sheet
+from gui.look.tokens import DARK, LIGHT, Tokens
+
+
+class Theme(QObject):
+    """Holds the tokens in force and tells when they change.
+
+    Args:
+        choice: "system", "light" or "dark".
+    """
+
+    changed = Signal()
+
+    def __init__(self, choice: str = "system", parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.choice = choice
+        self.tokens = self._wanted()
+        hints = QGuiApplication.styleHints()
+        hints.colorSchemeChanged.connect(self._system_changed)
+
+    def choose(self, choice: str) -> None:
+        """Follow the "system", or stay "light" or "dark"."""
+        self.choice = choice
+        self.apply()
+
+    def apply(self) -> None:
+        """Put the theme on the application; widgets that paint listen to `changed`."""
+        self.tokens = self._wanted()
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        app.setPalette(palette(self.tokens))
+        app.setStyleSheet(sheet(self.tokens))
+        self.changed.emit()
+
+    def _wanted(self) -> Tokens:
+        if self.choice != "system":
+            return DARK if self.choice == "dark" else LIGHT
+        scheme = QGuiApplication.styleHints().colorScheme()
+        return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
+
+    def _system_changed(self) -> None:
+        if self.choice == "system":
+            self.apply()
+
+
+def palette(tokens: Tokens) -> QPalette:
+    """Qt's palette, for what style sheets do not reach."""
+    role = QPalette.ColorRole
+    made = QPalette()
+    for where, colour in (
+        (role.Window, tokens.page),
+        (role.Base, tokens.field),
+        (role.AlternateBase, tokens.sunken),
+        (role.Text, tokens.text),
+        (role.WindowText, tokens.text),
+        (role.Button, tokens.panel),
+        (role.ButtonText, tokens.text),
+        (role.Highlight, tokens.accent),
+        (role.HighlightedText, tokens.on_accent),
+        (role.PlaceholderText, tokens.faint),
+        (role.ToolTipBase, tokens.header),
+        (role.ToolTipText, tokens.header_text),
+        (role.Link, tokens.accent),
+    ):
+        made.setColor(where, QColor(colour))
+    disabled = QPalette.ColorGroup.Disabled
+    for where in (role.Text, role.WindowText, role.ButtonText):
+        made.setColor(disabled, where, QColor(tokens.faint))
+    return made

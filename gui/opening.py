@@ -1,0 +1,297 @@
+"""Opening scenes and runs, and what the lanes show because of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+
+from gui.comparing import compare, show_comparison
+from gui.lanes.compare import Comparison
+from gui.lanes.decimate import FloatArray
+from gui.lanes.expected import PlanSource
+from gui.lanes.source import LiveSource
+from gui.review.finding import Finding, facts_of, of_outcome, of_run
+from gui.review.runs import Entry, entries
+from gui.session.messages import Level, Planned
+from gui.session.request import Request
+from gui.session.threads import start
+from gui.state import State
+from tactile_lab.errors import TactileLabError
+from tactile_lab.trial import Outcome
+
+if TYPE_CHECKING:
+    from gui.lanes.stored import RunSource
+    from gui.window import Window
+    from tactile_lab.acquisition.execution import Executed
+
+
+class Opening(QObject):
+    """What is on screen: the plan, the run in progress, or a run from disk.
+
+    Attributes:
+        run: the run from disk on screen, None while plan or live run are.
+        ending: how the run on screen ended, in words.
+    """
+
+    loaded = Signal(object)
+    failed = Signal(str)
+    listed = Signal(object)
+    compared = Signal(object)
+
+    def __init__(self, window: Window) -> None:
+        super().__init__(window)
+        self._window = window
+        self.run: RunSource | Comparison | None = None
+        self.ending = ""
+        self.findings: list[Finding] = []
+        self._folder: Path | None = None
+        self.loaded.connect(self._show_run)
+        self.failed.connect(self.say)
+        self.listed.connect(self._list)
+        self.compared.connect(lambda comparison: show_comparison(window, comparison))
+        runs = window.review.runs
+        runs.opened.connect(lambda entry: self.open_run(entry.folder))
+        runs.again.connect(self._again)
+        runs.compared.connect(lambda chosen: compare(window, chosen))
+        bar = window.centre.compare_bar
+        bar.changed.connect(window.centre.stack.refresh)
+        view = window.centre.view
+        view.changed.connect(lambda: bar.look_at(view.start + view.width / 2))
+        bar.closed.connect(self.close_run)
+        window.review.results.report_asked.connect(self._open_report)
+        window.review.export.clicked.connect(self._open_folder)
+
+    # --- asked by the user
+
+    def open_path(self, path: Path) -> None:
+        """Open a scene, a protocol file, a run folder or a run's data file."""
+        if path.is_dir() or path.suffix in (".h5", ".json"):
+            self.open_run(path if path.is_dir() else path.parent)
+        elif self._window.session.state in (State.RUNNING, State.ABORTING):
+            self._queue_scene(path)
+        else:
+            self.open_scene(str(path))
+
+    def open_scene(self, name: str | None) -> None:
+        """Put a scene into the form; a mistake in it is shown, nothing else changes."""
+        before = self._window.setup.form.texts()
+        try:
+            self._window.setup.open_scene(name)
+        except (TactileLabError, OSError) as error:
+            self.say(str(error))
+            return
+        after = self._window.setup.form.texts()
+        new = [f"{key} {before[key]} → {value}" for key, value in after.items()
+               if key in before and before[key] != value]  # fmt: skip
+        said = f"Scene {name or 'demo'} loaded"
+        self._window.session.log(
+            Level.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
+        )
+
+    def open_run(self, folder: Path) -> None:
+        """Open a run from disk in the same lanes; read away from this thread."""
+
+        def work() -> None:
+            from gui.lanes.stored import RunSource
+
+            try:
+                source = RunSource(folder)
+            except (TactileLabError, OSError) as error:
+                self.failed.emit(str(error))
+                return
+            self.loaded.emit(source)
+            try:
+                from gui.session.twin import twin_of
+
+                scene = Request(str(folder / "scene.toml"), (), None).load()
+                source.add_twin(twin_of(scene, source.current, source.length))
+            except (TactileLabError, OSError) as error:
+                self.failed.emit(f"No model beside {folder.name}: {error}")
+
+        start(work, "open run")
+
+    def list_runs(self) -> None:
+        """Read the run folder anew, away from this thread."""
+        out = self._window.session.out
+        start(lambda: self.listed.emit(entries(out)), "list runs")
+
+    # --- told by the session
+
+    def plan_arrived(self, planned: Planned) -> None:
+        """Show the plan in the lanes, unless a run is on screen."""
+        session = self._window.session
+        busy = session.state in (State.RUNNING, State.ABORTING)
+        if planned.expectation is None or busy or self.run is not None:
+            return
+        if session.source is None:
+            self._window.show_lanes()
+            preview = planned.expectation.preview
+            self._window.centre.view.set_now(0.0, preview.length)
+            self._window.centre.stack.show_source(PlanSource(preview))
+            self._window.centre.view.show_span(0.0, preview.length)
+
+    def follow_run(self, source: LiveSource) -> None:
+        """Show the run that begins."""
+        self.leave_run()
+        window = self._window
+        window.show_lanes()
+        window.centre.stack.show_source(source)
+        view = window.centre.view
+        view.clear_cursors()
+        window.centre.tools.cursors.setChecked(False)
+        view.follow = True
+        view.set_width(5.0)
+        view.set_follow(True)
+        window.centre.tools.follow.setChecked(True)
+        window.centre.tools.widths.choose(1)
+        if not window.session.monitor.alive:
+            self.findings, self.ending = [], ""
+            window.review.results.show_facts("", report=False)
+            self._show_findings(running=True)
+        window.render_state()
+
+    def _show_loop(self, loop: FloatArray) -> None:
+        self._window.review.results.show_loop(loop)
+
+    def trial_ended(self, outcome: Outcome) -> None:
+        """Add a step to the results."""
+        found = of_outcome(outcome)
+        if found is not None:
+            self.findings.append(found)
+        self._show_findings(running=True)
+        if self._window.session.source is not None:
+            self._show_loop(self._window.session.source.loop)
+
+    def run_ended(self, done: Executed) -> None:
+        """The run is on disk now."""
+        self.ending = f"{done.ending.state} · {done.folder.name} · {done.spikes} spikes"
+        self._folder = done.folder
+        source = self._window.session.source
+        if source is not None:
+            self._window.centre.view.set_now(source.reach, source.length)
+        self._show_findings(running=False)
+        lost = done.loss.get("samples")
+        said = done.ending.off.text.partition(" | ")[0]
+        facts = [f"<b>{done.folder.name}</b>", said]
+        if lost is not None:
+            facts.append(
+                f"Loss: {lost} samples, {done.loss.get('spikes') or 0} spikes."
+            )
+        self._window.review.results.show_facts("<br>".join(facts), report=False)
+        self.list_runs()
+
+    def reported(self, folder: Path) -> None:
+        """A report exists."""
+        if folder == self._folder:
+            self._window.review.results.report.setVisible(
+                (folder / "report.html").exists()
+            )
+
+    def take_fetched(self) -> None:
+        """Repaint where samples of a run on disk have been read."""
+        if self.run is not None and self.run.take_fetched():
+            self._window.show_lanes()
+            self._window.centre.stack.refresh()
+            self._window.centre.stack.show_values()
+
+    def close_run(self) -> None:
+        """Go back from a run on disk to the plan."""
+        self.leave_run()
+        self._window.setup.plan_now()
+
+    # --- inside
+
+    def leave_run(self) -> None:
+        """Let go of the run from disk on screen."""
+        if self.run is not None:
+            self.run.close()
+            self.run = None
+            self._window.centre.compare_bar.show_comparison(None)
+            self._window.session.run_name = ""
+        self._window.centre.notice.hide()
+
+    def _show_run(self, source: RunSource) -> None:
+        window = self._window
+        if window.session.state in (State.RUNNING, State.ABORTING):
+            source.close()
+            self.say("A run is in progress; old runs open when it has ended.")
+            return
+        self.leave_run()
+        self.run, self._folder = source, source.path
+        window.session.run_name = f"Looking at {source.path.name}"
+        view = window.centre.view
+        view.set_now(source.reach, source.length)
+        view.clear_cursors()
+        window.centre.tools.cursors.setChecked(False)
+        window.show_lanes()
+        window.centre.stack.show_source(source)
+        view.show_all()
+        window.centre.tools.widths.choose(3)
+        window.centre.stack.show_values()
+        status = str(source.info.get("status"))
+        self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
+        self._results_of(source)
+        window.review.runs.show_current(source.path)
+        window.centre.progress.show_run(
+            window.session.snapshot(), source.holds, source.length, source.reach,
+            None, self.ending,
+        )  # fmt: skip
+        window.render_state()
+
+    def _results_of(self, source: RunSource) -> None:
+        self.findings = of_run(source)
+        self._show_findings(running=False)
+        self._show_loop(source.loop)
+        report = (source.path / "report.html").exists()
+        self._window.review.results.show_facts(facts_of(source), report=report)
+
+    def _show_findings(self, *, running: bool) -> None:
+        expectation = self._window.session.expectation
+        total = expectation.estimate.trials if expectation else 0
+        self._window.review.results.show_findings(
+            self.findings,
+            total=total,
+            running=running,
+            whole=self.ending.startswith("complete"),
+        )
+
+    def _queue_scene(self, path: Path) -> None:
+        from gui.session.session import Queued
+
+        session = self._window.session
+        request = Request(str(path), (), session.bench_choice)
+        try:
+            request.load()
+        except (TactileLabError, OSError) as error:
+            self.say(str(error))
+            return
+        session.enqueue(Queued(path.stem, request, 0.0))
+
+    def _again(self, entry: Entry) -> None:
+        self.close_run()
+        self.open_scene(str(entry.folder / "scene.toml"))
+
+    def _list(self, found: list[Entry]) -> None:
+        self._window.review.runs.show_entries(found)
+        self._window.centre.empty.show_recent(
+            [(f"{e.title} · {e.started} · {e.status}", e.folder) for e in found[:4]]
+        )
+
+    def say(self, problem: str) -> None:
+        """Tell why something could not be opened, above the lanes and in the log."""
+        self._window.session.log(Level.ERROR, "open", problem)
+        self._window.centre.notice.setText(problem)
+        self._window.centre.notice.setStyleSheet("")
+        self._window.centre.notice.show()
+
+    def _open_report(self) -> None:
+        if self._folder is not None:
+            file = self._folder / "report.html"
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(file.resolve())))
+
+    def _open_folder(self) -> None:
+        folder = self._folder or self._window.session.out
+        QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder.resolve())))

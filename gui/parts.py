@@ -1,0 +1,202 @@
+"""Small parts every panel uses: labels, buttons, panels, lines."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gui.look.icons import icon
+from gui.look.theme import Theme
+
+
+def label(text: str, role: str = "", *, wrap: bool = False) -> QLabel:
+    """A label in one of the style sheet's roles."""
+    made = QLabel(text)
+    if role:
+        made.setProperty("role", role)
+    made.setWordWrap(wrap)
+    made.setTextFormat(Qt.TextFormat.AutoText)
+    return made
+
+
+def set_role(widget: QWidget, role: str) -> None:
+    """Give the widget another role and have it restyled."""
+    if widget.property("role") != role:
+        widget.setProperty("role", role)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)
+
+
+def line() -> QFrame:
+    """A hairline across."""
+    made = QFrame()
+    made.setProperty("role", "line")
+    return made
+
+
+def panel(role: str = "panel") -> QFrame:
+    """A framed surface."""
+    made = QFrame()
+    made.setProperty("role", role)
+    return made
+
+
+def push(text: str, role: str = "", *, name: str = "") -> QPushButton:
+    """A push button with an accessible name."""
+    made = QPushButton(text)
+    if role:
+        made.setProperty("role", role)
+    made.setAccessibleName(name or text)
+    made.setMinimumHeight(32)
+    return made
+
+
+class IconButton(QToolButton):
+    """A tool button whose icon follows the theme.
+
+    Args:
+        theme: where colours come from.
+        name: of the icon.
+        words: accessible name and tool tip; the text beside the icon where `text`.
+        role: of the style sheet.
+        text: shown beside the icon, "" for none.
+        checkable: whether it stays down.
+    """
+
+    def __init__(
+        self,
+        theme: Theme,
+        name: str,
+        words: str,
+        *,
+        role: str = "flat",
+        text: str = "",
+        checkable: bool = False,
+        on_header: bool = False,
+    ) -> None:
+        super().__init__()
+        self._theme, self._icon, self._on_header = theme, name, on_header
+        self.setProperty("role", role)
+        self.setCheckable(checkable)
+        self.setAccessibleName(words)
+        self.setToolTip(words)
+        self.setIconSize(QSize(18, 18))
+        self.setMinimumSize(QSize(30, 30))
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self._text = text
+        self.set_wide(bool(text))
+        theme.changed.connect(self._tint)
+        self._tint()
+
+    def set_wide(self, wide: bool) -> None:
+        """Show the text beside the icon, or the icon alone."""
+        if wide and self._text:
+            self.setText(self._text)
+            self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        else:
+            self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
+
+    def set_icon(self, name: str) -> None:
+        """Show another icon."""
+        self._icon = name
+        self._tint()
+
+    def _tint(self) -> None:
+        tokens = self._theme.tokens
+        colour = tokens.header_muted if self._on_header else tokens.muted
+        self.setIcon(icon(self._icon, colour, tokens.selected_text))
+
+
+class Segments(QFrame):
+    """A row of exclusive choices; `group.idClicked` tells which."""
+
+    def __init__(
+        self, choices: list[str], name: str, *, role: str = "segments"
+    ) -> None:
+        super().__init__()
+        self.setProperty("role", role)
+        self.setAccessibleName(name)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(2, 2, 2, 2)
+        row.setSpacing(1)
+        self.group = QButtonGroup(self)
+        for number, choice in enumerate(choices):
+            button = QToolButton()
+            button.setText(choice)
+            button.setCheckable(True)
+            button.setProperty("role", "segment")
+            button.setAccessibleName(f"{name}: {choice}")
+            button.setMinimumHeight(28)
+            self.group.addButton(button, number)
+            row.addWidget(button)
+
+    def choose(self, number: int) -> None:
+        """Check one choice (-1: none) without telling anybody."""
+        if number < 0:
+            checked = self.group.checkedButton()
+            if checked is not None:
+                self.group.setExclusive(False)
+                checked.setChecked(False)
+                self.group.setExclusive(True)
+            return
+        self.group.button(number).setChecked(True)
+
+    @property
+    def chosen(self) -> int:
+        """Number of the checked choice, -1 for none."""
+        return self.group.checkedId()
+
+
+def scrolling(inner: QWidget) -> QScrollArea:
+    """`inner` in a frameless area that scrolls up and down."""
+    area = QScrollArea()
+    area.setWidget(inner)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    return area
+
+
+def column(parent: QWidget, margin: int = 0, spacing: int = 6) -> QVBoxLayout:
+    """A vertical layout on `parent`."""
+    layout = QVBoxLayout(parent)
+    layout.setContentsMargins(margin, margin, margin, margin)
+    layout.setSpacing(spacing)
+    return layout
+
+
+def row(spacing: int = 6) -> QHBoxLayout:
+    """A horizontal layout without margins."""
+    layout = QHBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(spacing)
+    return layout
+
+
+def elided(widget: QLabel, text: str) -> None:
+    """Set text, shortened with an ellipsis to the label's width; whole in the tip."""
+    metrics = widget.fontMetrics()
+    width = max(widget.width(), 40)
+    widget.setText(metrics.elidedText(text, Qt.TextElideMode.ElideRight, width))
+    widget.setToolTip(text)
+
+
+def empty(layout: QVBoxLayout | QHBoxLayout) -> None:
+    """Take everything out of a layout and delete it."""
+    while (item := layout.takeAt(0)) is not None:
+        widget = item.widget()
+        if widget is not None:
+            widget.setParent(None)
+            widget.deleteLater()

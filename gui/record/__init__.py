@@ -1,0 +1,1 @@
+"""Below the traces: progress, log and notes."""

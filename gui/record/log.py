@@ -1,0 +1,185 @@
+"""The log: time, sign, source, text; filters; time-stamped notes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSortFilterProxyModel,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QLineEdit,
+    QTableView,
+    QWidget,
+)
+
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import Segments, column, label
+from gui.session.messages import Level, Line
+
+Index = QModelIndex | QPersistentModelIndex
+ROOT = QModelIndex()
+MOST = 5000
+
+
+class LogModel(QAbstractTableModel):
+    """Lines of the log, newest last."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.lines: list[Line] = []
+        self._theme = theme
+
+    def add(self, line: Line) -> None:
+        """Append a line; the oldest go past `MOST`."""
+        if len(self.lines) >= MOST:
+            self.beginRemoveRows(ROOT, 0, 499)
+            del self.lines[:500]
+            self.endRemoveRows()
+        at = len(self.lines)
+        self.beginInsertRows(ROOT, at, at)
+        self.lines.append(line)
+        self.endInsertRows()
+
+    def rowCount(self, parent: Index = ROOT) -> int:
+        """Lines."""
+        return 0 if parent.isValid() else len(self.lines)
+
+    def columnCount(self, parent: Index = ROOT) -> int:
+        """Time, sign, source, text."""
+        return 4
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """What a cell shows."""
+        line, where = self.lines[index.row()], index.column()
+        if role == Qt.ItemDataRole.DisplayRole:
+            at = f"{line.at:%H:%M:%S}.{line.at.microsecond // 1000:03d}"
+            return (at, None, line.source, line.text)[where]
+        if role == Qt.ItemDataRole.DecorationRole and where == 1:
+            return pixmap(line.level.value, self._colour(line), 16)
+        if role == Qt.ItemDataRole.ForegroundRole:
+            if line.level is Level.ERROR:
+                return QColor(self._theme.tokens.red)
+            if where in (0, 2):
+                return QColor(self._theme.tokens.muted)
+        if role == Qt.ItemDataRole.ToolTipRole and where == 3:
+            return line.text
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            return f"{line.level.name.lower()}: {line.source}: {line.text}"
+        return None
+
+    def _colour(self, line: Line) -> str:
+        tokens = self._theme.tokens
+        return {
+            Level.INFO: tokens.muted,
+            Level.GOOD: tokens.green,
+            Level.WARNING: tokens.amber,
+            Level.ERROR: tokens.red,
+            Level.NOTE: tokens.accent,
+        }[line.level]
+
+
+class LogFilter(QSortFilterProxyModel):
+    """All, warnings, safety or notes."""
+
+    choice = 0
+
+    def choose(self, choice: int) -> None:
+        """0 all, 1 warnings and errors, 2 safety, 3 notes."""
+        self.choice = choice
+        self.invalidate()
+
+    def filterAcceptsRow(self, row: int, parent: Index) -> bool:
+        """Whether a line is shown."""
+        model = self.sourceModel()
+        assert isinstance(model, LogModel)
+        line = model.lines[row]
+        return (
+            True,
+            line.level in (Level.WARNING, Level.ERROR),
+            line.safety,
+            line.level is Level.NOTE,
+        )[self.choice]
+
+
+class LogView(QWidget):
+    """The log with its filters and the field for notes."""
+
+    noted = Signal(str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.model = LogModel(theme)
+        self.filter = LogFilter()
+        self.filter.setSourceModel(self.model)
+        self.choices = Segments(["All", "Warnings", "Safety", "Notes"], "Log filter")
+        self.choices.choose(0)
+        self.note = QLineEdit()
+        self.note.setPlaceholderText("Add a time-stamped note …  (N)")
+        self.note.setAccessibleName("Note")
+        self.note.setMinimumWidth(120)
+        self.note.setMaximumWidth(280)
+        self.table = QTableView()
+        self._lay_out()
+        self.choices.group.idClicked.connect(self._chosen)
+        self.note.returnPressed.connect(self._noted)
+        theme.changed.connect(self.table.viewport().update)
+
+    def add(self, line: Line) -> None:
+        """Append a line and scroll to it, unless the user looks further up."""
+        bar = self.table.verticalScrollBar()
+        low = bar.value() >= bar.maximum() - 2
+        self.model.add(line)
+        if low:
+            self.table.scrollToBottom()
+
+    def show_safety(self) -> None:
+        """Show the last lines about the coil."""
+        self.choices.choose(2)
+        self._chosen(2)
+
+    def _chosen(self, number: int) -> None:
+        self.filter.choose(number)
+        self.table.scrollToBottom()
+
+    def _noted(self) -> None:
+        text = self.note.text().strip()
+        if text:
+            self.noted.emit(text)
+            self.note.clear()
+
+    def _lay_out(self) -> None:
+        table = self.table
+        table.setModel(self.filter)
+        table.setAccessibleName("Log")
+        table.setShowGrid(False)
+        table.setWordWrap(False)
+        table.horizontalHeader().hide()
+        table.verticalHeader().hide()
+        table.verticalHeader().setDefaultSectionSize(22)
+        table.verticalHeader().setMinimumSectionSize(18)
+        for where, width in enumerate((112, 28, 78)):
+            table.setColumnWidth(where, width)
+        table.horizontalHeader().setStretchLastSection(True)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        table.setTabKeyNavigation(False)
+        table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        top = QHBoxLayout()
+        top.setSpacing(10)
+        top.addWidget(label("Run log", "title"))
+        top.addWidget(self.choices)
+        top.addStretch(1)
+        top.addWidget(self.note, 1)
+        whole = column(self, spacing=6)
+        whole.addLayout(top)
+        whole.addWidget(table, 1)

@@ -1,0 +1,135 @@
+"""Steps of the run as a bar of blocks, with time left in words."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from gui.lanes.expected import Hold
+from gui.look.theme import Theme
+from gui.parts import column, label
+from gui.state import Snapshot, State, minutes
+
+
+class Blocks(QWidget):
+    """One block per step; done ones are filled."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._holds: list[Hold] = []
+        self._length = 1.0
+        self._at = 0.0
+        self._colour = "accent"
+        self.setFixedHeight(12)
+        theme.changed.connect(self.update)
+
+    def show_steps(
+        self, holds: list[Hold], length: float, at: float, colour: str
+    ) -> None:
+        """Show where the run is; `colour` is the name of a token."""
+        shown = (holds, length, at, colour)
+        if shown != (self._holds, self._length, self._at, self._colour):
+            self._holds, self._length, self._at, self._colour = shown
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the blocks and the head."""
+        painter = QPainter(self)
+        tokens = self._theme.tokens
+        width, height = self.width(), self.height()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(tokens.sunken))
+        painter.drawRoundedRect(QRectF(0, 0, width, height), 3, 3)
+        done = QColor(getattr(tokens, self._colour))
+        per = width / max(self._length, 1e-9)
+        for number, hold in enumerate(self._holds):
+            left, right = hold.start * per, hold.end * per
+            box = QRectF(left + 1, 0, max(right - left - 1, 1), height)
+            rest = QColor(tokens.border)
+            painter.fillRect(box, rest)
+            reached = min(self._at * per, right)
+            if reached > left:
+                part = QColor(done)
+                part.setAlpha(130 if hold.pause or number % 2 else 255)
+                painter.fillRect(
+                    QRectF(left + 1, 0, max(reached - left - 1, 0), height), part
+                )
+        if self._at > 0:
+            painter.fillRect(
+                QRectF(min(self._at * per, width - 2), 0, 2, height),
+                QColor(tokens.text),
+            )
+
+
+class Progress(QWidget):
+    """Step, label and time left above the blocks."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        whole = column(self, spacing=6)
+        self._left = label("No run", "")
+        self._right = label("", "muted")
+        self.blocks = Blocks(theme)
+        top = QHBoxLayout()
+        top.addWidget(self._left)
+        top.addStretch(1)
+        top.addWidget(self._right)
+        whole.addLayout(top)
+        whole.addWidget(self.blocks)
+
+    @property
+    def text(self) -> str:
+        """Both texts, for tests and screen readers."""
+        return f"{self._left.text()} | {self._right.text()}"
+
+    def show_run(
+        self,
+        snapshot: Snapshot,
+        holds: list[Hold],
+        length: float,
+        reach: float,
+        trial: tuple[int, str] | None,
+        ending: str,
+    ) -> None:
+        """Show where the run is, or how the last one ended."""
+        state = snapshot.state
+        colour = {State.FAULT: "red", State.ABORTING: "amber"}.get(state, "accent")
+        if state in (State.RUNNING, State.ABORTING):
+            self._running(snapshot, holds, length, reach, trial)
+        else:
+            if ending.startswith("complete"):
+                colour = "green"
+            elif ending.startswith("aborted"):
+                colour = "amber"
+            self._left.setText(ending or "No run yet")
+            self._right.setText("" if not ending else f"{reach:.1f} s kept")
+        self.blocks.show_steps(list(holds), length, reach, colour)
+        self.setAccessibleName(self.text)
+
+    def _running(
+        self,
+        snapshot: Snapshot,
+        holds: list[Hold],
+        length: float,
+        reach: float,
+        trial: tuple[int, str] | None,
+    ) -> None:
+        if snapshot.state is State.ABORTING:
+            self._left.setText("Stopping: the coil goes to 0 A and is read back")
+        elif trial is None:
+            self._left.setText("Opening instruments")
+        else:
+            total = f" of {len(holds)}" if holds else ""
+            self._left.setText(f"Step <b>{trial[0] + 1}</b>{total} · <b>{trial[1]}</b>")
+        left = max(0.0, length - reach)
+        share = 100 * reach / max(length, 1e-9)
+        at = datetime.now() + timedelta(seconds=left)
+        self._right.setText(
+            f"{min(share, 100):.0f} % · elapsed <b>{minutes(reach)}</b> · remaining "
+            f"<b>{minutes(left)}</b> · done at <b>{at:%H:%M:%S}</b>"
+        )

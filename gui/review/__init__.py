@@ -1,0 +1,1 @@
+"""The right panel: results, runs, manual control."""

@@ -1,0 +1,112 @@
+"""One step's numbers as the results show them; the analysis room computes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gui.lanes.axis import number
+from tactile_lab.analysis.spike_train import respond
+from tactile_lab.quantity import show
+from tactile_lab.trial import Outcome
+
+if TYPE_CHECKING:
+    from gui.lanes.stored import RunSource
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one step gave.
+
+    Attributes:
+        label: of the step.
+        level: force it is filed under, N.
+        spikes: count.
+        latency: from onset to the first spike, s.
+        peak_rate, final_rate: Hz.
+        fall: part by which the rate fell during the hold.
+    """
+
+    label: str
+    level: float | None
+    spikes: int
+    latency: float | None
+    peak_rate: float | None
+    final_rate: float | None
+    fall: float | None
+
+    def cells(self) -> tuple[str, ...]:
+        """One row of the table."""
+        return (
+            self.label,
+            str(self.spikes),
+            "—" if self.latency is None else number(self.latency * 1e3, 0),
+            "—" if self.peak_rate is None else number(self.peak_rate, 1),
+            "—" if self.final_rate is None else number(self.final_rate, 1),
+            "—" if self.fall is None else number(100 * self.fall, 0),
+        )
+
+
+def of_outcome(outcome: Outcome) -> Finding | None:
+    """What a trial that has just ended gave; None for a pause."""
+    trial = outcome.trial
+    if trial.pause:
+        return None
+    return finding(trial.label, trial.level, outcome.spike_times, trial.hold)
+
+
+def finding(
+    label: str,
+    level: float | None,
+    spikes: NDArray[np.float64],
+    hold: tuple[float, float] | None,
+) -> Finding:
+    """What spikes (s from the step's start) say."""
+    response = respond(spikes, hold=hold)
+    return Finding(
+        label,
+        level,
+        response.spikes,
+        response.latency,
+        response.peak_rate,
+        response.final_rate,
+        response.fall,
+    )
+
+
+def of_run(source: RunSource) -> list[Finding]:
+    """What each step of a run on disk gave."""
+    found = []
+    for row, hold in zip(source.trials, source.holds, strict=True):
+        if hold.pause:
+            continue
+        inside = (source.spikes >= hold.start) & (source.spikes < hold.end)
+        level = float(row["level"])
+        span = (float(row["hold_start"]), float(row["hold_end"]))
+        found.append(
+            finding(
+                hold.label,
+                level if level == level else None,
+                source.spikes[inside] - hold.start,
+                span if span[0] == span[0] else None,
+            )
+        )
+    return found
+
+
+def facts_of(source: RunSource) -> str:
+    """Statements on a run as a whole, as rich text."""
+    info = source.info
+    loss = info.get("loss") or {}
+    sim = "simulated" if source.simulated else "measured"
+    facts = [
+        f"<b>{source.path.name}</b> · {sim}",
+        str(info.get("coil") or "").partition(" | ")[0],
+        f"{show(float(info.get('sample_rate_Hz') or 0), 'S/s')} per channel.",
+    ]
+    if loss.get("samples") is not None:
+        facts.append(f"Loss: {loss['samples']} samples, {loss.get('spikes')} spikes.")
+    return "<br>".join(fact for fact in facts if fact)

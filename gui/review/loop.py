@@ -1,0 +1,90 @@
+"""The field against the current: the loop of a calibration."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QWidget
+
+from gui.lanes import paint
+from gui.lanes.axis import decimals, nice_range, number, step_of, ticks
+from gui.lanes.decimate import FloatArray
+from gui.lanes.paint import Frame
+from gui.look.fonts import sized
+from gui.look.theme import Theme
+from gui.look.tokens import Tokens
+
+
+class LoopPlot(QWidget):
+    """Both branches of B2(I), in mT against mA."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._loop: FloatArray = np.empty((0, 2))
+        self.setMinimumHeight(190)
+        self.setMaximumHeight(300)
+        self.setAccessibleName("Field against current")
+        theme.changed.connect(self.update)
+
+    def show_loop(self, loop: FloatArray) -> None:
+        """Show readings, shape (n, 2): A and T."""
+        self._loop = loop * 1e3
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw axes, the loop and its newest point."""
+        painter = QPainter(self)
+        tokens = self._theme.tokens
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(sized(11))
+        if self._loop.shape[0] < 2:
+            return
+        current, field = self._loop[:, 0], self._loop[:, 1]
+        left, right = nice_range(float(current.min()), float(current.max()), 10.0)
+        low, high = nice_range(float(field.min()), float(field.max()), 0.1)
+        frame = Frame(
+            48, self.width() - 12, 24, self.height() - 36, left, right, low, high
+        )
+        axes(painter, frame, tokens, "coil current / mA", "field / mT")
+        x, y = frame.x(current), frame.y(field)
+        paint.polyline(painter, x, y, paint.pen(tokens.force))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(tokens.V_C1))
+        painter.drawEllipse(QPointF(float(x[-1]), float(y[-1])), 4, 4)
+
+
+def axes(
+    painter: QPainter, frame: Frame, tokens: Tokens, x_name: str, y_name: str
+) -> None:
+    """Grid, numbers and names of a plot of one quantity against another."""
+    places = decimals(step_of(frame.high - frame.low, 5))
+    for value in ticks(frame.low, frame.high, 5):
+        y = round(frame.y1(value)) + 0.5
+        painter.setPen(paint.pen(tokens.grid))
+        painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
+        painter.setPen(QColor(tokens.muted))
+        painter.drawText(
+            QRectF(0, y - 8, frame.left - 6, 16),
+            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+            number(value, places),
+        )
+    for value in ticks(frame.start, frame.end, 5):
+        x = round(frame.x1(value)) + 0.5
+        painter.setPen(paint.pen(tokens.grid))
+        painter.drawLine(QPointF(x, frame.top), QPointF(x, frame.bottom))
+        painter.setPen(QColor(tokens.muted))
+        painter.drawText(
+            QRectF(x - 30, frame.bottom + 3, 60, 15),
+            Qt.AlignmentFlag.AlignHCenter,
+            number(value, 0),
+        )
+    painter.drawText(
+        QRectF(frame.left, frame.bottom + 18, frame.right - frame.left, 16),
+        Qt.AlignmentFlag.AlignHCenter,
+        x_name,
+    )
+    painter.drawText(
+        QRectF(frame.right - 120, 2, 120, 16), Qt.AlignmentFlag.AlignRight, y_name
+    )

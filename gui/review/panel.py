@@ -1,0 +1,69 @@
+"""The right panel: Results, Runs, Manual."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QHBoxLayout,
+    QStackedWidget,
+    QToolButton,
+)
+
+from gui.look.theme import Theme
+from gui.parts import IconButton, column, scrolling
+from gui.review.manual import ManualView
+from gui.review.results import ResultsView
+from gui.review.runs import RunsView
+
+
+class ReviewPanel(QFrame):
+    """Three tabs."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setProperty("role", "panel")
+        self.setAccessibleName("Results, runs and manual control")
+        self.setMinimumWidth(336)
+        self.results = ResultsView(theme)
+        self.runs = RunsView(theme)
+        self.manual = ManualView(theme)
+        self.export = IconButton(theme, "export", "Open the run's folder")
+        self._pages = QStackedWidget()
+        self._tabs = QButtonGroup(self)
+        head = QHBoxLayout()
+        head.setSpacing(2)
+        for number, (name, page) in enumerate(
+            (
+                ("Results", self.results),
+                ("Runs", self.runs),
+                ("Manual", scrolling(self.manual)),
+            )
+        ):
+            tab = QToolButton()
+            tab.setText(name)
+            tab.setCheckable(True)
+            tab.setProperty("role", "tab")
+            tab.setToolTip(f"{name} (Ctrl+{number + 1})")
+            tab.setAccessibleName(f"Tab {name}")
+            self._tabs.addButton(tab, number)
+            self._pages.addWidget(page)
+            head.addWidget(tab)
+        head.addStretch(1)
+        head.addWidget(self.export)
+        whole = column(self, margin=14, spacing=10)
+        whole.setContentsMargins(14, 6, 14, 12)
+        whole.addLayout(head)
+        whole.addWidget(self._pages, 1)
+        self._tabs.idClicked.connect(self.show_tab)
+        self.show_tab(0)
+
+    @property
+    def tab(self) -> int:
+        """Number of the tab shown."""
+        return self._pages.currentIndex()
+
+    def show_tab(self, number: int) -> None:
+        """0 Results, 1 Runs, 2 Manual."""
+        self._tabs.button(number).setChecked(True)
+        self._pages.setCurrentIndex(number)

@@ -1,0 +1,267 @@
+"""The run browser: what lies in the runs folder, newest first."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFrame,
+    QHBoxLayout,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gui.look.theme import Theme
+from gui.parts import Segments, column, empty, label, push, scrolling, set_role
+from gui.state import minutes
+
+SHOWN = 60
+"""Most runs listed at once."""
+
+PILLS = {
+    "complete": ("ok", "pill-ok"),
+    "running": ("running", "pill"),
+    "aborted": ("aborted", "pill-warn"),
+    "recovered": ("recovered", "pill-warn"),
+    "faulted": ("fault", "pill-bad"),
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A run folder as its `run.json` describes it."""
+
+    folder: Path
+    title: str
+    scene: str
+    status: str
+    started: str
+    duration: float
+    simulated: bool
+
+    @property
+    def text(self) -> str:
+        """What the search looks at."""
+        return f"{self.folder.name} {self.title} {self.scene} {self.status}".lower()
+
+    def shown_under(self, choice: int) -> bool:
+        """Whether the filter shows it: 0 all, 1 complete, 2 simulated, 3 faults."""
+        return (
+            True,
+            self.status == "complete",
+            self.simulated,
+            self.status not in ("complete", "running"),
+        )[choice]
+
+
+def entries(out: Path) -> list[Entry]:
+    """The runs in `out`, newest first; folders that are no runs are passed over."""
+    found = []
+    if not out.is_dir():
+        return []
+    for file in sorted(out.glob("*/run.json"), reverse=True)[: 4 * SHOWN]:
+        try:
+            info = json.loads(file.read_text(encoding="utf-8"))
+            found.append(
+                Entry(
+                    file.parent,
+                    str(info.get("title") or info.get("protocol") or "run"),
+                    str(info.get("scene") or ""),
+                    str(info["status"]),
+                    _when(str(info.get("started") or "")),
+                    float(info.get("duration_s") or info.get("planned_s") or 0.0),
+                    bool(info.get("simulated")),
+                )
+            )
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+    return found
+
+
+def _when(text: str) -> str:
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError:
+        return ""
+    today = datetime.now(at.tzinfo).date()
+    days = (today - at.date()).days
+    day = {0: "today", 1: "yesterday"}.get(days, f"{at:%d %b}")
+    return f"{day} {at:%H:%M}"
+
+
+class RunCard(QFrame):
+    """One run: name, status, when, how long; a tick to compare."""
+
+    opened = Signal(object)
+    chosen = Signal(object)
+    ticked = Signal()
+
+    def __init__(self, entry: Entry) -> None:
+        super().__init__()
+        self.entry = entry
+        self.setProperty("role", "card")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setAccessibleName(f"{entry.title}, {entry.status}, {entry.started}")
+        self.setToolTip(f"{entry.folder.name}\nEnter or double click opens it")
+        self.tick = QCheckBox()
+        self.tick.setAccessibleName(f"Compare {entry.folder.name}")
+        self.tick.toggled.connect(self.ticked)
+        word, role = PILLS.get(entry.status, (entry.status, "pill"))
+        first = QHBoxLayout()
+        first.addWidget(label(entry.title, "strong"))
+        first.addStretch(1)
+        first.addWidget(label(word, role))
+        kind = "sim" if entry.simulated else "bench"
+        when = f"{entry.started} · {minutes(entry.duration)} · {kind}"
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        words.addLayout(first)
+        words.addWidget(label(when, "muted"))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 8, 10, 8)
+        row.addLayout(words, 1)
+        row.addWidget(self.tick)
+
+    def mark(self, current: bool) -> None:
+        """Show whether this run is the one on screen."""
+        self.setStyleSheet(
+            'QFrame[role="card"] { border: 2px solid palette(highlight); }'
+            if current
+            else ""
+        )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Choose the run."""
+        self.chosen.emit(self.entry)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Open the run."""
+        self.opened.emit(self.entry)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Open with Enter, tick with Space."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.opened.emit(self.entry)
+        elif event.key() == Qt.Key.Key_Space:
+            self.tick.toggle()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: object) -> None:
+        """Choose the run with the keyboard."""
+        self.chosen.emit(self.entry)
+
+
+class RunsView(QWidget):
+    """Search, filter, cards, and what to do with the chosen one."""
+
+    opened = Signal(object)
+    again = Signal(object)
+    compared = Signal(object)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.cards: list[RunCard] = []
+        self._entries: list[Entry] = []
+        self._chosen: Entry | None = None
+        self._current: Path | None = None
+        self.search = QLineEdit()
+        self.search.setPlaceholderText("Search runs …  (Ctrl+F)")
+        self.search.setAccessibleName("Search runs")
+        self.filter = Segments(["All", "Complete", "Sim", "Faults"], "Runs shown")
+        self.filter.choose(0)
+        self._count = label("", "muted")
+        inner = QWidget()
+        self._rows = column(inner, spacing=6)
+        self.open = push("Open run", "primary")
+        self.rerun = push("Re-run with these settings")
+        self.compare = push("Compare")
+        top = QHBoxLayout()
+        top.addWidget(self.filter)
+        top.addStretch(1)
+        top.addWidget(self._count)
+        whole = column(self, spacing=8)
+        whole.addWidget(self.search)
+        whole.addLayout(top)
+        whole.addWidget(scrolling(inner), 1)
+        whole.addWidget(self.open)
+        whole.addWidget(self.rerun)
+        whole.addWidget(self.compare)
+        self.search.textChanged.connect(self._show)
+        self.filter.group.idClicked.connect(self._show)
+        self.open.clicked.connect(
+            lambda: self._chosen and self.opened.emit(self._chosen)
+        )
+        self.rerun.clicked.connect(
+            lambda: self._chosen and self.again.emit(self._chosen)
+        )
+        self.compare.clicked.connect(lambda: self.compared.emit(self.ticked()))
+        self._show()
+
+    def show_entries(self, found: list[Entry]) -> None:
+        """List these runs."""
+        if found != self._entries:
+            self._entries = found
+            self._show()
+
+    def show_current(self, folder: Path | None) -> None:
+        """Mark the run on screen."""
+        self._current = folder
+        for card in self.cards:
+            card.mark(card.entry.folder == folder)
+
+    def ticked(self) -> list[Entry]:
+        """Runs ticked for comparison."""
+        return [card.entry for card in self.cards if card.tick.isChecked()]
+
+    def _show(self, *_: object) -> None:
+        words = self.search.text().lower().split()
+        chosen = max(self.filter.chosen, 0)
+        ticked = {card.entry.folder for card in self.cards if card.tick.isChecked()}
+        empty(self._rows)
+        self.cards = []
+        fitting = [
+            e
+            for e in self._entries
+            if e.shown_under(chosen) and all(w in e.text for w in words)
+        ]
+        for entry in fitting[:SHOWN]:
+            card = RunCard(entry)
+            card.tick.setChecked(entry.folder in ticked)
+            card.opened.connect(self.opened)
+            card.chosen.connect(self._choose)
+            card.ticked.connect(self._buttons)
+            self.cards.append(card)
+            self._rows.addWidget(card)
+        if not fitting:
+            text = "No run fits." if self._entries else "No runs yet."
+            self._rows.addWidget(label(text, "muted"))
+        self._rows.addStretch(1)
+        many = len(fitting)
+        self._count.setText(f"{many} run{'' if many == 1 else 's'}")
+        self.show_current(self._current)
+        self._buttons()
+
+    def _choose(self, entry: Entry) -> None:
+        self._chosen = entry
+        for card in self.cards:
+            set_role(card, "card")
+            card.mark(card.entry.folder == entry.folder)
+        self._buttons()
+
+    def _buttons(self) -> None:
+        self.open.setEnabled(self._chosen is not None)
+        self.rerun.setEnabled(self._chosen is not None)
+        many = len(self.ticked())
+        self.compare.setEnabled(many in (2, 3))
+        self.compare.setText(
+            f"Compare {many} runs" if many >= 2 else "Compare: tick 2 or 3"
+        )

@@ -1,0 +1,1 @@
+"""What runs behind the window: runs, plans, checks, the coil by hand."""

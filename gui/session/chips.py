@@ -1,0 +1,118 @@
+"""The header's chips: one per instrument the scene uses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gui.state import (
+    CoilView,
+    InstrumentView,
+    Lamp,
+    State,
+    Truth,
+    limit_text,
+    milliamperes,
+    truth,
+)
+from tactile_lab.quantity import show
+
+if TYPE_CHECKING:
+    from gui.session.session import Session
+
+NAMES = {"coil": "Coil source", "scope": "Oscilloscope", "meter": "Teslameter"}
+
+
+def instruments(session: Session, coil: CoilView | None) -> tuple[InstrumentView, ...]:
+    """Chips of the instruments the planned scene needs, the model last."""
+    roles = _roles(session)
+    views = []
+    for role in roles:
+        if role == "coil":
+            views.append(_coil(session, coil))
+        elif role == "scope":
+            views.append(_scope(session))
+        elif role == "meter":
+            views.append(_meter(session))
+    if session.expectation is not None and session.expectation.preview.traces:
+        lamp = Lamp.ACTIVE if session.state is State.RUNNING else Lamp.GOOD
+        views.append(InstrumentView("Model", lamp, "preview in lanes", _twin(session)))
+    return tuple(views)
+
+
+def _roles(session: Session) -> list[str]:
+    expectation = session.expectation
+    if expectation is None:
+        found = session.bench.found if session.bench is not None else ()
+        return [one.role for one in found] or ["coil", "scope"]
+    needs = expectation.needs
+    wanted = {
+        "coil": needs.coil,
+        "scope": bool(needs.channels),
+        "meter": needs.field_meter,
+    }
+    return [role for role, used in wanted.items() if used]
+
+
+def _found(session: Session, role: str) -> tuple[Lamp, str]:
+    """Lamp and words of an instrument that is not in use now."""
+    if session.state is State.CONNECTING:
+        return Lamp.WAITING, "asking …"
+    if session.bench is None:
+        return Lamp.ABSENT, "no device"
+    for one in session.bench.found:
+        if one.role == role:
+            return (Lamp.BAD, "no answer") if one.problem else (Lamp.GOOD, one.identity)
+    return Lamp.GOOD, "opens when a run starts"
+
+
+def _coil(session: Session, coil: CoilView | None) -> InstrumentView:
+    what = truth(session.state, coil)
+    if coil is None or what is Truth.NONE:
+        lamp, words = _found(session, "coil")
+        return InstrumentView(NAMES["coil"], lamp, words)
+    lamp = {
+        Truth.UNKNOWN: Lamp.BAD,
+        Truth.LIVE: Lamp.ACTIVE,
+        Truth.FALLING: Lamp.WAITING,
+        Truth.OFF: Lamp.BAD if session.state is State.FAULT else Lamp.GOOD,
+    }[what]
+    value = "—" if coil.current is None else milliamperes(coil.current)
+    if what is Truth.UNKNOWN:
+        return InstrumentView(NAMES["coil"], lamp, "state unknown", "?")
+    return InstrumentView(NAMES["coil"], lamp, limit_text(coil), value)
+
+
+def _scope(session: Session) -> InstrumentView:
+    lamp, words = _found(session, "scope")
+    expectation, value = session.expectation, "idle"
+    if lamp in (Lamp.ABSENT, Lamp.WAITING, Lamp.BAD):
+        return InstrumentView(NAMES["scope"], lamp, words)
+    if expectation is not None:
+        rate = expectation.scene.record.sample_rate
+        words = f"{len(expectation.needs.channels)} channels · 8 bit"
+        if session.monitor.alive:
+            lamp, value = Lamp.ACTIVE, "monitor"
+        elif session.state is State.RUNNING:
+            lamp, value = Lamp.ACTIVE, show(rate, "S/s", 3)
+    return InstrumentView(NAMES["scope"], lamp, words, value)
+
+
+def _meter(session: Session) -> InstrumentView:
+    lamp, words = _found(session, "meter")
+    field = session.readings.get("field")
+    value = "—" if field is None else show(round(field, 5), "T", 3)
+    if session.state is State.RUNNING and field is not None:
+        lamp = Lamp.ACTIVE
+    return InstrumentView(NAMES["meter"], lamp, _short(words), value)
+
+
+def _short(identity: str) -> str:
+    """Maker and model of an ``*IDN?`` answer."""
+    return " ".join(identity.split(",")[:2])
+
+
+def _twin(session: Session) -> str:
+    estimate = session.expectation
+    if estimate is None:
+        return "idle"
+    return f"{estimate.preview.spikes.size} spikes"

@@ -1,0 +1,72 @@
+"""Keeps what is known about the coil, from read-backs and their age."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from gui.state import CoilView
+from tactile_lab.bench import CoilLimits, OffReport
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.execution import CoilState
+
+
+class CoilWatch:
+    """Turns what the coil's thread shows into a `CoilView`.
+
+    Attributes:
+        limits: in force; None without a coil.
+    """
+
+    def __init__(self) -> None:
+        self.limits: CoilLimits | None = None
+        self._off: OffReport | None = None
+        self._seen: tuple[float | None, float | None] = (None, None)
+        self._since = time.monotonic()
+        self._sign = time.monotonic()
+        self._current: float | None = None
+
+    def use(self, limits: CoilLimits | None) -> None:
+        """Another bench, or none: nothing is known of its coil yet."""
+        self.limits = limits
+        self._off = None
+
+    def left(self, off: OffReport | None) -> None:
+        """The coil was switched off with this result."""
+        if off is not None:
+            self._off = off
+
+    def sign_of_life(self, *, read_back: bool) -> None:
+        """The source acknowledged a set-point or was read back just now."""
+        self._sign = time.monotonic()
+        if read_back:
+            self._since = self._sign
+
+    def view(self, state: CoilState | None) -> CoilView | None:
+        """What may be shown; `state` is None while nobody drives the coil."""
+        if self.limits is None:
+            return None
+        limit = self.limits.current
+        if state is None or (state.off is not None and not state.live):
+            off = self._off if state is None else state.off
+            if off is None:
+                return CoilView(None, limit=limit)
+            return CoilView(
+                False, off.current, 0.0, verified_off=off.verified, limit=limit
+            )
+        if not state.live:
+            off = self._off
+            current = None if off is None else off.current
+            return CoilView(False, current, 0.0, verified_off=True, limit=limit)
+        now = time.monotonic()
+        if state.measured != self._current:
+            self._current, self._since, self._sign = state.measured, now, now
+        return CoilView(
+            True,
+            state.measured,
+            state.setpoint,
+            age=now - self._sign,
+            read_age=now - self._since,
+            limit=limit,
+        )

@@ -1,0 +1,99 @@
+"""What the model expects of a scene, computed away from the window's thread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gui.lanes.expected import Hold, Preview
+from tactile_lab.acquisition.runner import BASELINE
+from tactile_lab.plan.estimate import Estimate
+from tactile_lab.plan.needs import Needs
+from tactile_lab.plan.plan import Plan, plan
+from tactile_lab.scene.scene import Scene
+
+MODELLED = ("V_C1", "V_C2", "V_K", "I_DS")
+SPACING = 1e-3
+MOST = 400_000
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """A scene that can be run, and what it will do.
+
+    Attributes:
+        scene: validated.
+        needs: what it opens and keeps.
+        estimate: its cost.
+        preview: what the model expects.
+        warnings: where the bench cannot deliver what is asked.
+        leaves_out: (what, why).
+        assumptions: what the numbers rest on.
+    """
+
+    scene: Scene
+    needs: Needs
+    estimate: Estimate
+    preview: Preview
+    warnings: tuple[str, ...]
+    leaves_out: tuple[tuple[str, str], ...]
+    assumptions: tuple[str, ...]
+
+
+def expect(scene: Scene) -> Expectation:
+    """Plan a scene and have the model run it.
+
+    Raises:
+        SceneError, LimitError: the scene cannot be run on its bench.
+    """
+    made = plan(scene)
+    return Expectation(
+        scene=scene,
+        needs=made.needs,
+        estimate=made.estimate,
+        preview=_preview(made),
+        warnings=made.warnings,
+        leaves_out=made.leaves_out,
+        assumptions=made.assumptions,
+    )
+
+
+def _preview(made: Plan) -> Preview:
+    """The plan's own prediction on the run's axis, which starts a baseline earlier."""
+    drive, result = made.timeline, made.preview
+    length = drive.duration + BASELINE
+    holds = [
+        Hold(
+            step.start + BASELINE,
+            step.start + BASELINE + step.trial.length,
+            step.trial.label,
+            step.trial.pause,
+        )
+        for step in drive.steps
+    ]
+    force, none = drive.force.shifted(BASELINE), np.empty(0)
+    if result is None:
+        return Preview(force, {}, none, holds, length)
+    count = int(np.clip(drive.duration / SPACING, 2000, MOST))
+    time = np.linspace(0.0, drive.duration, count)
+    traces = {}
+    for name in MODELLED:
+        if name not in made.scene.record.signals:
+            continue
+        at = time
+        if name == "V_K" and result.spike_times is not None:
+            at = np.union1d(time, _around(result.spike_times, drive.duration))
+        traces[name] = (at + BASELINE, result.sample(name, at))
+    spikes = none if result.spike_times is None else result.spike_times + BASELINE
+    return Preview(force, traces, spikes, holds, length)
+
+
+def _around(spikes: np.ndarray, length: float) -> np.ndarray:
+    """Times at which a pulse of V_K shows its height, around each of the spikes."""
+    if spikes.size > 20_000:
+        return np.empty(0)
+    offsets = np.array([-2e-6, 0.0, 1e-6, 3e-6, 1e-5, 4e-5])
+    times = (spikes[:, None] + offsets[None, :]).ravel()
+    clipped: np.ndarray = np.clip(times, 0.0, length)
+    return clipped

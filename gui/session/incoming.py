@@ -1,0 +1,266 @@
+"""What background threads tell the session, and how its state moves because of it."""
+
+from __future__ import annotations
+
+from queue import Empty
+from typing import TYPE_CHECKING
+
+from gui.lanes.expected import Hold
+from gui.lanes.source import LiveSource
+from gui.session import chips
+from gui.session.core import Core
+from gui.session.manual import ManualCoil
+from gui.session.messages import (
+    Begun,
+    Broken,
+    Checked,
+    Ended,
+    Level,
+    Line,
+    Planned,
+    Refused,
+    Reported,
+    Told,
+    Twinned,
+)
+from gui.session.threads import start
+from gui.state import Fault, State, milliamperes
+from tactile_lab.acquisition import events
+from tactile_lab.bench import OffReport
+from tactile_lab.trial import Outcome
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.execution import Executed, Execution
+
+LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
+
+
+class Incoming(Core):
+    """Takes everything from the one queue; nothing here blocks."""
+
+    def poll(self) -> bool:
+        """Take all that background threads told; whether samples came too."""
+        if self.manual is not None:
+            self._mind_manual(self.manual)
+        self._mind_monitor()
+        while True:
+            try:
+                told = self.inbox.get_nowait()
+            except Empty:
+                break
+            self._take(told)
+        return self.source is not None and self.source.running and self.source.poll()
+
+    def _take(self, told: Told) -> None:
+        match told:
+            case events.SpikesSeen(times=times):
+                if self.source is not None:
+                    self.source.add_spikes(times)
+            case events.CoilCurrent():
+                self._current(told)
+            case events.FieldRead(time=at, field=field):
+                self.readings["field"] = field
+                if self.source is not None:
+                    self.source.add_field(at, field)
+            case events.Progress(elapsed=elapsed, expected=expected):
+                self.elapsed, self.expected = elapsed, expected
+            case events.TrialStarted():
+                self._trial_started(told)
+            case events.TrialEnded(outcome=outcome):
+                self._trial_ended(outcome)
+            case events.Message(level=level, text=text):
+                self.log(LEVELS.get(level, Level.INFO), "runner", text)
+            case events.StateChanged():
+                self._run_state(told)
+            case events.FolderMade(folder=folder):
+                self.run_name = folder.name
+                self.log(Level.INFO, "store", f"Recording to {folder}")
+            case Begun(execution=execution):
+                self._begun(execution)
+            case Ended(done=done):
+                self._ended(done)
+            case Broken(fault=fault, off=off):
+                self.coil.left(off or OffReport(False, None, "not verified"))
+                self._stop_source()
+                self._set_fault(fault)
+            case Refused(fault=fault):
+                self._refused(fault)
+            case Checked():
+                self._checked(told)
+            case Planned():
+                self._planned(told)
+            case Reported(folder=folder, problem=problem):
+                if problem:
+                    self.log(Level.WARNING, "report", problem)
+                else:
+                    self.log(
+                        Level.GOOD, "report", f"Report in {folder / 'report.html'}"
+                    )
+                self.reported.emit(folder)
+            case Twinned(execution=execution, part=part):
+                if execution is self._twinned and self.source is not None:
+                    self.source.tracks.add(part)
+            case Line():
+                self.lines.append(told)
+                self.logged.emit(told)
+
+    def _current(self, told: events.CoilCurrent) -> None:
+        self.coil.sign_of_life(read_back=told.measured is not None)
+        value = told.setpoint if told.measured is None else told.measured
+        if self.source is not None:
+            self.source.add_current(told.time, value)
+        if self._twin is not None:
+            self._twin.add(told.time, value)
+
+    def _trial_started(self, told: events.TrialStarted) -> None:
+        trial = told.trial
+        self.trial = (told.index, trial.label)
+        hold = Hold(told.start, told.start + trial.length, trial.label, trial.pause)
+        if self.source is not None:
+            self.source.begin_trial(told.index, hold)
+        what = "recovery" if trial.pause else trial.label
+        self.log(Level.INFO, "runner", f"Step {told.index + 1} · {what} started")
+        self.changed.emit()
+
+    def _trial_ended(self, outcome: Outcome) -> None:
+        self.outcomes.append(outcome)
+        if outcome.skipped:
+            text = f"{outcome.skipped} coil set-points came too late and were skipped"
+            self.log(Level.WARNING, "coil", text)
+        self.trial_ended.emit(outcome)
+
+    def _run_state(self, told: events.StateChanged) -> None:
+        if told.state is events.RunState.STOPPING and self.state is State.RUNNING:
+            self._enter(State.ABORTING)
+        if told.state in (events.RunState.CONNECTING, events.RunState.RUNNING):
+            self.log(Level.INFO, "runner", told.text.capitalize())
+
+    def _begun(self, execution: Execution) -> None:
+        expectation = self._running
+        self.expected = expectation.estimate.duration if expectation else None
+        limits = execution.bench.coil.limits if execution.bench.coil else None
+        self.coil.limits = limits or self.coil.limits
+        self.coil.sign_of_life(read_back=True)
+        gain = execution.scene.bench.magnet.newtons_per_ampere
+        preview = expectation.preview if expectation else None
+        self.source = LiveSource(execution.live, preview, gain)
+        for warning in expectation.warnings if expectation else ():
+            self.log(Level.WARNING, "plan", warning)
+        self._start_twin(execution, self.source)
+        self.source_changed.emit(self.source)
+        self.changed.emit()
+
+    def _start_twin(self, execution: Execution, source: LiveSource) -> None:
+        """Let the twin follow the run, where the scene records what it predicts."""
+        from gui.session.twin import LiveTwin
+
+        self._twin, self._twinned = None, execution
+        if not {"V_C1", "V_C2", "V_K", "spikes"} & set(execution.scene.record.signals):
+            return
+        twin = self._twin = LiveTwin(execution.scene)
+        inbox = self.inbox
+
+        def reach() -> float | None:
+            return source.reach if source.running else None
+
+        def work() -> None:
+            twin.run(reach, lambda part: inbox.put(Twinned(execution, part)))
+
+        start(work, "twin")
+
+    def _ended(self, done: Executed) -> None:
+        ending = done.ending
+        self.coil.left(ending.off)
+        self._stop_source()
+        self.elapsed = done.duration
+        good = ending.off.verified
+        level = Level.GOOD if good else Level.ERROR
+        self.log(level, "safety", f"Coil: {ending.off.text}", safety=True)
+        words = f"{done.folder.name} {ending.state}: {done.spikes} spikes"
+        lost = done.loss.get("samples")
+        if lost is not None:
+            words += f", {lost} samples lost"
+        self.log(Level.INFO, "store", words)
+        self.run_ended.emit(done)
+        if not good:
+            self._set_fault(
+                Fault("The coil's state is unknown after the run.", ending.off.text)
+            )
+        elif ending.state is events.RunState.FAULTED:
+            kept = f"{done.duration:.1f} s of data kept in {done.folder.name}. "
+            self._set_fault(
+                Fault(ending.reason or "The run faulted.", kept + _left(ending.off))
+            )
+        else:
+            self._enter(State.READY)
+            if ending.state is events.RunState.COMPLETE:
+                self._next_in_queue()
+
+    def _refused(self, fault: Fault) -> None:
+        self._stop_source()
+        self.run_name = ""
+        self.log(Level.ERROR, "bench", f"{fault.title} {fault.consequence}")
+        if self.bench is None:
+            self.spec, self.bench_choice = None, None
+        self._set_fault(fault)
+
+    def _checked(self, told: Checked) -> None:
+        broken = [one for one in told.found if one.problem]
+        self.bench = None if broken else told
+        coil = self.spec.coil if self.spec is not None else None
+        has_coil = coil is not None and any(f.role == "coil" for f in told.found)
+        self.coil.use(coil.limits if has_coil and coil is not None else None)
+        self.coil.left(told.off)
+        for one in told.found:
+            if one.problem:
+                self.log(Level.ERROR, one.role, one.problem)
+            else:
+                self.log(Level.GOOD, one.role, one.identity)
+        if told.off is not None and not told.off.verified:
+            self._set_fault(Fault("The coil's state is unknown.", told.off.text))
+        elif broken:
+            text = "; ".join(one.problem for one in broken)
+            names = " and ".join(chips.NAMES[one.role].lower() for one in broken)
+            self._set_fault(Fault(f"No answer from the {names}.", text))
+        else:
+            self._enter(State.READY)
+            self._next_in_queue()
+
+    def _planned(self, told: Planned) -> None:
+        if told.serial == self._serial:
+            self.expectation, self.plan_problem = told.expectation, told.problem
+            self.planned.emit(told)
+            self.changed.emit()
+
+    def _mind_monitor(self) -> None:
+        begun = self.monitor.poll()
+        if begun is not None:
+            self.source = begun
+            self.source_changed.emit(begun)
+        if self.monitor.problem:
+            self.log(Level.ERROR, "monitor", self.monitor.problem)
+            self.monitor.problem = ""
+        if self._after_monitor is not None and not self.monitor.alive:
+            request, title = self._after_monitor
+            self._after_monitor = None
+            self.start(request, title)
+
+    def _mind_manual(self, manual: ManualCoil) -> None:
+        manual.alive()
+        for applied in manual.thread.take_applied():
+            self.coil.sign_of_life(read_back=applied.measured is not None)
+        if not manual.ended:
+            return
+        self.manual = None
+        self.coil.left(manual.off)
+        if manual.off is None or not manual.off.verified:
+            text = manual.failure or "The coil's thread ended without a word."
+            self._set_fault(Fault("The coil's state is unknown.", text))
+        elif manual.failure:
+            self._set_fault(Fault("Manual control ended.", manual.failure))
+        self.log(Level.GOOD, "safety", "Manual control off", safety=True)
+        self.changed.emit()
+
+
+def _left(off: OffReport) -> str:
+    return f"Coil off, {milliamperes(off.current)} read back."

@@ -1,0 +1,166 @@
+"""The one state machine behind the window. It decides nothing about instruments.
+
+Background threads put what they have to tell into one queue; the window's timer calls
+`poll`, which takes it all and moves the state. Nothing here blocks.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from gui.session import chips
+from gui.session.core import Core, Queued
+from gui.session.incoming import Incoming
+from gui.session.manual import ManualCoil
+from gui.session.messages import Level
+from gui.session.request import Request
+from gui.session.threads import check_in_background, plan_in_background
+from gui.state import Fault, Snapshot, State
+from tactile_lab.bench import OffReport
+from tactile_lab.errors import TactileLabError
+from tactile_lab.plugins import open_bench
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.execution import Execution
+
+__all__ = ["Core", "Queued", "Session"]
+
+
+class Session(Incoming):
+    """What the window asks for, and what it shows."""
+
+    # --- what the window asks for
+
+    def connect_bench(self, choice: str) -> None:
+        """Ask the instruments of a bench ("sim" or a bench file) who they are."""
+        if self.state not in (State.DISCONNECTED, State.READY) or self.manual:
+            return
+        self.bench_choice = choice
+        self._check_request = Request("demo", (), choice)
+        try:
+            self.spec = self._check_request.load().bench
+        except (TactileLabError, OSError) as error:
+            self._set_fault(Fault("The bench cannot be used.", str(error)))
+            return
+        self.coil.use(None)
+        self.bench = None
+        self._enter(State.CONNECTING)
+        self.log(Level.INFO, "bench", f"Asking the instruments of {self.spec.name}")
+        check_in_background(self._check_request, self.inbox)
+
+    def disconnect_bench(self) -> None:
+        """Let go of the bench."""
+        if self.state is State.READY and self.manual is None:
+            self.bench, self.bench_choice, self.spec = None, None, None
+            self.coil.use(None)
+            self._enter(State.DISCONNECTED)
+
+    def plan(self, request: Request) -> None:
+        """Have `request` planned; `planned` tells the result."""
+        self._serial += 1
+        plan_in_background(self._serial, request, self.inbox)
+
+    def stop(self, reason: str = "STOP in the window") -> None:
+        """Coil off, now. Reaches the coil's thread directly and never waits."""
+        if self._run is not None and self._run.alive:
+            self._run.stop(reason)
+            if self.state is State.RUNNING:
+                self._enter(State.ABORTING)
+                self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
+        elif self.manual is not None:
+            self.manual.stop(reason)
+            self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
+        elif self.monitor.alive:
+            self.monitor.stop()
+            self.log(Level.INFO, "safety", "Monitor off; the coil was not in use")
+        elif self.state is State.READY and self._check_request is not None:
+            self.log(Level.INFO, "safety", "Coil off sent again", safety=True)
+            self._enter(State.CONNECTING)
+            check_in_background(self._check_request, self.inbox)
+
+    def acknowledge(self) -> None:
+        """The user has read the fault."""
+        if self.state is State.FAULT:
+            self.fault = None
+            known = self.bench is not None
+            self._enter(State.READY if known else State.DISCONNECTED)
+
+    def begin_manual(self) -> None:
+        """Open the coil source to drive it by hand."""
+        if self.state is not State.READY or self.manual or not self._check_request:
+            return
+        self.monitor.stop()
+        try:
+            bench = open_bench(self._check_request.load(), realtime=True)
+            self.manual = ManualCoil(bench)
+        except (TactileLabError, OSError) as error:
+            self._set_fault(Fault("The coil cannot be driven by hand.", str(error)))
+            return
+        self.manual.start()
+        self.log(Level.WARNING, "coil", "Manual control on", safety=True)
+        self.changed.emit()
+
+    def watch(self, on: bool) -> None:
+        """Show the sensor live between runs, coil off; or stop that."""
+        if not on:
+            self.monitor.stop()
+        elif self.state is State.READY and self.manual is None and self.bench_choice:
+            if not self.monitor.alive:
+                self.monitor.start(self.bench_choice)
+
+    def note(self, text: str) -> None:
+        """A note of the user, stamped with wall-clock and run time."""
+        at = f" (at {self.elapsed:.1f} s)" if self.state is State.RUNNING else ""
+        self.log(Level.NOTE, "note", text + at)
+        if self._run is not None and self._run.alive and self._run.execution:
+            self._run.execution.folder.log("note", text, time_s=self.elapsed)
+
+    # --- what the window shows
+
+    @property
+    def busy(self) -> bool:
+        """Whether closing needs a question first."""
+        live = self._run is not None and self._run.alive
+        return live or self.manual is not None
+
+    @property
+    def execution(self) -> Execution | None:
+        """The run in progress."""
+        return None if self._run is None else self._run.execution
+
+    @property
+    def off_report(self) -> OffReport | None:
+        """How the coil was left when the last run or manual control ended."""
+        if self.manual is not None:
+            return self.manual.off
+        return self.execution.coil_state.off if self.execution else None
+
+    def snapshot(self) -> Snapshot:
+        """Everything the header, banner and buttons are rendered from."""
+        coil = self.coil_view()
+        name = "No bench connected" if self.spec is None else self.spec.name
+        if self.run_name and self.state is not State.DISCONNECTED:
+            name = self.run_name
+        return Snapshot(
+            state=self.state,
+            bench="" if self.spec is None else self.spec.name,
+            simulated=self.spec is not None and self.spec.simulated,
+            title=name,
+            coil=coil,
+            instruments=chips.instruments(self, coil),
+            elapsed=self.elapsed,
+            expected=self.expected,
+            manual=self.manual is not None,
+            fault=self.fault,
+            problem=self.plan_problem,
+        )
+
+    def wait_for_end(self, timeout: float) -> bool:
+        """Block until nothing drives the coil any more, at most `timeout` s."""
+        until = time.monotonic() + timeout
+        if self._run is not None:
+            self._run.join(timeout)
+        if self.manual is not None:
+            self.manual.thread.join(max(0.0, until - time.monotonic()))
+        return not self.busy

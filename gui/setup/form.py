@@ -1,0 +1,125 @@
+"""The form: generated from a protocol's typed parameters, never written by hand."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QUndoCommand, QUndoStack
+from PySide6.QtWidgets import QWidget
+
+from gui.parts import column, empty
+from gui.setup.fields import Field
+from gui.setup.kinds import parameter
+from gui.setup.texts import FieldError
+from tactile_lab.trial import Protocol
+
+
+class Form(QWidget):
+    """Fields of one protocol; undo and redo reach back to the last protocol chosen."""
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fields: list[Field] = []
+        self.undo = QUndoStack(self)
+        self.protocol: type[Protocol] | None = None
+        self._shown: dict[str, str] = {}
+        self._locked = False
+        self._rows = column(self, spacing=6)
+
+    def show_protocol(self, kind: type[Protocol], values: dict[str, object]) -> None:
+        """Make the fields of a protocol; `values` are SI, by key."""
+        empty(self._rows)
+        self.protocol = kind
+        self.fields = []
+        for key, info in kind.model_fields.items():
+            wanted = parameter(key, info)
+            field = Field(wanted, values.get(key, wanted.default))
+            field.lock(self._locked)
+            field.changed.connect(self._edited)
+            self.fields.append(field)
+            self._rows.addWidget(field)
+        self.undo.clear()
+        self._shown = self.texts()
+        self.changed.emit()
+
+    def field(self, key: str) -> Field:
+        """The field of a parameter."""
+        return next(field for field in self.fields if field.parameter.key == key)
+
+    def texts(self) -> dict[str, str]:
+        """What stands in the fields."""
+        return {field.parameter.key: field.text for field in self.fields}
+
+    def set_texts(self, texts: dict[str, str]) -> None:
+        """Put texts into fields, without a trace in undo."""
+        for field in self.fields:
+            if field.parameter.key in texts:
+                field.set_text(texts[field.parameter.key])
+        self._shown = self.texts()
+        self.changed.emit()
+
+    def reset(self) -> None:
+        """Put every parameter back to its default; can be undone."""
+        for field in self.fields:
+            field.set_text(field.default)
+        self._edited()
+
+    @property
+    def problem(self) -> str:
+        """Why the form cannot be used, "" if it can."""
+        for field in self.fields:
+            if field.problem:
+                return f"{field.parameter.title}: {field.problem}"
+        return ""
+
+    def overrides(self) -> list[str]:
+        """The form as ``--set`` options: ``protocol.key=value``.
+
+        Raises:
+            FieldError: a field cannot be used.
+        """
+        made = []
+        for field in self.fields:
+            entry = field.entry()
+            if entry is not None:
+                made.append(f"protocol.{field.parameter.key}={entry}")
+        return made
+
+    def lock(self, locked: bool) -> None:
+        """Forbid or allow editing."""
+        self._locked = locked
+        for field in self.fields:
+            field.lock(locked)
+
+    def _edited(self) -> None:
+        now = self.texts()
+        if now != self._shown:
+            self.undo.push(_Edit(self, self._shown, now))
+            self._shown = now
+        self.changed.emit()
+
+
+class _Edit(QUndoCommand):
+    """One change of the form."""
+
+    def __init__(
+        self, form: Form, before: dict[str, str], after: dict[str, str]
+    ) -> None:
+        super().__init__("edit")
+        self._form, self._before, self._after = form, before, after
+        self._done = True
+
+    def undo(self) -> None:
+        """Put the former texts back."""
+        self._done = False
+        self._form.set_texts(self._before)
+
+    def redo(self) -> None:
+        """Put the later texts back; the first time they stand there already."""
+        if not self._done:
+            self._form.set_texts(self._after)
+        self._done = True
+
+
+__all__ = ["FieldError", "Form"]

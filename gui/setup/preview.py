@@ -1,0 +1,130 @@
+"""The waveform of the next run at a glance, with a play-head while it runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from gui.lanes import paint
+from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.decimate import Drawn
+from gui.lanes.expected import Preview
+from gui.lanes.paint import Frame
+from gui.look.fonts import sized
+from gui.look.theme import Theme
+
+HEIGHT = 118
+
+
+class WaveformPreview(QWidget):
+    """Force against time as it will be played, in mN and s."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._preview: Preview | None = None
+        self._problem = ""
+        self._head: float | None = None
+        self.setFixedHeight(HEIGHT)
+        self.setAccessibleName("Force of the next run against time")
+        theme.changed.connect(self.update)
+
+    def show_preview(self, preview: Preview | None, problem: str = "") -> None:
+        """Show a plan, or why there is none."""
+        self._preview, self._problem = preview, problem
+        self.setAccessibleDescription(problem)
+        self.update()
+
+    def show_head(self, time: float | None) -> None:
+        """Put the play-head at run time `time` s; None takes it away."""
+        if time != self._head:
+            self._head = time
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the plan."""
+        painter = QPainter(self)
+        tokens = self._theme.tokens
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(tokens.sunken))
+        painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
+        painter.setFont(sized(11))
+        if self._preview is None or self._preview.length <= 0:
+            painter.setPen(QColor(tokens.muted))
+            painter.drawText(
+                self.rect().adjusted(12, 6, -12, -6),
+                Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap,
+                "" if self._problem else "computing the plan …",
+            )
+            return
+        self._draw(painter, self._preview)
+
+    def _draw(self, painter: QPainter, preview: Preview) -> None:
+        tokens = self._theme.tokens
+        force = preview.force.value * 1e3
+        low, high = min(0.0, float(force.min())), max(float(force.max()), 0.0)
+        if high - low < 1e-9:
+            high = low + 1.0
+        span = high - low
+        low -= 0.12 * span if low < 0 else 0.0
+        frame = Frame(
+            38, self.width() - 8, 18, HEIGHT - 20, 0.0, preview.length, low, high
+        )
+        step = step_of(high - low, 3)
+        for value in ticks(low, high, 3):
+            y = round(frame.y1(value)) + 0.5
+            painter.setPen(paint.pen(tokens.grid))
+            painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
+            painter.setPen(QColor(tokens.muted))
+            painter.drawText(
+                QRectF(0, y - 8, 32, 16),
+                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+                number(value, decimals(step)),
+            )
+        for value in ticks(0.0, preview.length, 6):
+            painter.drawText(
+                QRectF(frame.x1(value) - 30, frame.bottom + 3, 60, 14),
+                Qt.AlignmentFlag.AlignHCenter,
+                number(value, decimals(step_of(preview.length, 6))),
+            )
+        drawn = Drawn.line(preview.force.time, force)
+        soft = QColor(tokens.force)
+        soft.setAlpha(50)
+        paint.fill(painter, frame, drawn, soft)
+        paint.trace(painter, frame, drawn, paint.pen(tokens.force))
+        self._names(painter, frame, preview, force)
+        if self._head is not None and 0 <= self._head <= preview.length:
+            x = round(frame.x1(self._head)) + 0.5
+            painter.setPen(QPen(QColor(tokens.text), 1.5))
+            painter.drawLine(QPointF(x, 6), QPointF(x, frame.bottom))
+
+    def _names(
+        self, painter: QPainter, frame: Frame, preview: Preview, force: np.ndarray
+    ) -> None:
+        """The level above each hold, where there is room."""
+        painter.setPen(QColor(self._theme.tokens.text))
+        taken = -1e9
+        for hold in preview.holds:
+            if hold.pause:
+                continue
+            inside = (preview.force.time >= hold.start) & (
+                preview.force.time < hold.end
+            )
+            if not inside.any():
+                continue
+            peak = float(np.max(np.abs(force[inside])))
+            at = preview.force.time[inside][np.abs(force[inside]) >= peak - 1e-9]
+            x = frame.x1(float(at.mean()))
+            if x - taken < 30 or peak == 0:
+                continue
+            taken = x
+            text = hold.label.replace(" mN", "")
+            if len(text) > 6:
+                continue
+            y = frame.y1(peak) - 15
+            painter.drawText(
+                QRectF(x - 24, y, 48, 14), Qt.AlignmentFlag.AlignHCenter, text
+            )

@@ -1,0 +1,251 @@
+"""What the window shows: one state, one snapshot, and the words on STOP. No Qt here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from tactile_lab.quantity import show
+
+STALE = 1.5
+"""Seconds without a word from a live coil's source after which its state is unknown."""
+
+OFF_BELOW = 2e-3
+"""Read-back current magnitude, A, below which a coil counts as at zero."""
+
+
+class State(Enum):
+    """The one state of the window."""
+
+    DISCONNECTED = "no bench"
+    CONNECTING = "connecting"
+    READY = "ready"
+    RUNNING = "running"
+    ABORTING = "stopping"
+    FAULT = "fault"
+
+
+class Truth(Enum):
+    """What is known about the coil, from read-back, never from commands."""
+
+    NONE = "none"
+    OFF = "off"
+    LIVE = "live"
+    FALLING = "falling"
+    UNKNOWN = "unknown"
+
+
+class Lamp(Enum):
+    """Lamps differ in shape as well as in colour."""
+
+    ABSENT = "absent"
+    WAITING = "waiting"
+    GOOD = "good"
+    ACTIVE = "active"
+    WARNING = "warning"
+    BAD = "bad"
+
+
+@dataclass(frozen=True)
+class CoilView:
+    """The coil as last read back.
+
+    Attributes:
+        output: whether the output is on; None if nobody knows.
+        current: read back, A; None if never read.
+        setpoint: last sent, A.
+        age: of the source's last acknowledgement, s.
+        read_age: of the read-back, s.
+        verified_off: result of the last switching off; None before any.
+        limit: largest current allowed, A.
+    """
+
+    output: bool | None
+    current: float | None = None
+    setpoint: float | None = None
+    age: float = 0.0
+    read_age: float = 0.0
+    verified_off: bool | None = None
+    limit: float | None = None
+
+
+@dataclass(frozen=True)
+class InstrumentView:
+    """One instrument chip.
+
+    Attributes:
+        name: for people.
+        lamp: its state.
+        detail: identity, limit or what is wrong.
+        value: live value as text; "—" where there is none.
+    """
+
+    name: str
+    lamp: Lamp
+    detail: str = ""
+    value: str = "—"
+
+    @property
+    def short(self) -> str:
+        """The name where there is little room."""
+        known = {"Coil source": "Coil", "Oscilloscope": "Scope", "Teslameter": "Field"}
+        return known.get(self.name, self.name)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What went wrong, and what to do now."""
+
+    title: str
+    consequence: str
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything the header, banner and buttons are rendered from.
+
+    Attributes:
+        state: the window's state.
+        bench: name of the bench, "" without one.
+        simulated: whether the bench is simulated.
+        title: second line of the identity.
+        coil: what is known about the coil; None without a coil source.
+        instruments: chips, in order; only those the scene uses.
+        elapsed: run time reached, s.
+        expected: run time expected, s; None if unknown.
+        manual: the coil is driven by hand.
+        fault: unacknowledged fault.
+        problem: why Run is off, "" if it is on.
+    """
+
+    state: State = State.DISCONNECTED
+    bench: str = ""
+    simulated: bool = False
+    title: str = "No bench connected"
+    coil: CoilView | None = None
+    instruments: tuple[InstrumentView, ...] = field(default=())
+    elapsed: float = 0.0
+    expected: float | None = None
+    manual: bool = False
+    fault: Fault | None = None
+    problem: str = ""
+
+
+def truth(state: State, coil: CoilView | None) -> Truth:
+    """What may be claimed about the coil.
+
+    A live coil whose source has been silent for longer than `STALE` is unknown, and so
+    is one whose switching off could not be verified.
+    """
+    if coil is None:
+        return Truth.NONE
+    if coil.output is None or (not coil.output and coil.verified_off is False):
+        return Truth.UNKNOWN
+    if not coil.output:
+        return Truth.OFF
+    if coil.age > STALE:
+        return Truth.UNKNOWN
+    return Truth.FALLING if state is State.ABORTING else Truth.LIVE
+
+
+@dataclass(frozen=True)
+class StopText:
+    """The two lines on STOP, and the whole as one sentence for screen readers."""
+
+    title: str
+    detail: str
+
+    @property
+    def spoken(self) -> str:
+        """One line for assistive technology."""
+        return f"{self.title}: {self.detail}"
+
+
+def milliamperes(current: float | None) -> str:
+    """A current as "374 mA", with a true minus; never "−0 mA"."""
+    if current is None:
+        return "not read"
+    number = round(current * 1e3)
+    return f"{number} mA".replace("-", "−")
+
+
+def stop_text(state: State, coil: CoilView | None) -> StopText:
+    """What STOP says, from the read-back."""
+    what = truth(state, coil)
+    if what is Truth.NONE or coil is None:
+        return StopText("STOP", "no coil source")
+    now = milliamperes(coil.current)
+    if what is Truth.UNKNOWN:
+        return StopText("COIL STATE UNKNOWN", "switch off at the source")
+    if what is Truth.FALLING:
+        return StopText("STOPPING", f"{now} → 0")
+    if what is Truth.LIVE:
+        if coil.current is None or coil.read_age > STALE:
+            sent = milliamperes(coil.setpoint)
+            return StopText("STOP · COIL OFF", f"{sent} sent, not read back")
+        return StopText("STOP · COIL OFF", f"{now} live")
+    if state is State.FAULT:
+        return StopText("COIL IS OFF", f"{now} verified")
+    return StopText("STOP", f"coil is off · {now}")
+
+
+def run_problem(snapshot: Snapshot, *, form_problem: str) -> str:
+    """Why a run cannot start now, "" if it can."""
+    if snapshot.state is State.DISCONNECTED:
+        return "No bench is connected."
+    if snapshot.state is State.CONNECTING:
+        return "The bench is still connecting."
+    if snapshot.state is State.RUNNING:
+        return "A run is in progress; use Queue to have this one follow."
+    if snapshot.state is State.ABORTING:
+        return "The run is being stopped."
+    if snapshot.state is State.FAULT:
+        return "Acknowledge the fault first."
+    if snapshot.manual:
+        return "The coil is driven by hand; switch it off first."
+    return form_problem
+
+
+def clock_text(snapshot: Snapshot) -> tuple[str, str]:
+    """The state in capitals and the clock below it."""
+    word = {
+        State.DISCONNECTED: "NO BENCH",
+        State.CONNECTING: "CONNECTING",
+        State.READY: "READY",
+        State.RUNNING: "RUNNING",
+        State.ABORTING: "STOPPING",
+        State.FAULT: "FAULT",
+    }[snapshot.state]
+    if snapshot.state is State.DISCONNECTED:
+        return word, "connect to start"
+    if snapshot.state is State.CONNECTING:
+        return word, "asking the instruments"
+    elapsed = minutes(snapshot.elapsed, tenths=True)
+    if snapshot.state in (State.RUNNING, State.ABORTING):
+        if snapshot.expected is None:
+            return word, elapsed
+        return word, f"{elapsed} / {minutes(snapshot.expected)}"
+    if snapshot.state is State.FAULT:
+        return word, f"stopped at {elapsed}"
+    if snapshot.manual:
+        return word, "coil by hand"
+    return word, f"last run {elapsed}" if snapshot.elapsed else "coil off"
+
+
+def minutes(seconds: float, *, tenths: bool = False) -> str:
+    """A duration as mm:ss, mm:ss.t or h:mm:ss."""
+    parts = round(max(0.0, seconds) * (10 if tenths else 1))
+    whole, tenth = divmod(parts, 10) if tenths else (parts, 0)
+    hours, rest = divmod(whole, 3600)
+    text = f"{rest // 60:02d}:{rest % 60:02d}"
+    if hours:
+        return f"{hours}:{text}"
+    return f"{text}.{tenth}" if tenths else text
+
+
+def limit_text(coil: CoilView | None) -> str:
+    """The coil chip's second line."""
+    if coil is None:
+        return "no device"
+    on = {True: "output on", False: "output off", None: "state unknown"}[coil.output]
+    return on if coil.limit is None else f"{on} · ≤ {show(coil.limit, 'A', 3)}"

@@ -1,0 +1,287 @@
+"""The bench window: puts the parts together and renders the one state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSettings, Qt, QTimer
+from PySide6.QtGui import (
+    QCloseEvent,
+    QDragEnterEvent,
+    QDropEvent,
+    QKeyEvent,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QWidget
+
+from gui.actions import Actions
+from gui.banner import Banner
+from gui.centre import Centre
+from gui.dialogs.choosing import ask_scene
+from gui.dialogs.closing import Closing
+from gui.frames import Frames
+from gui.header.header import Header
+from gui.lanes.lane import lanes_for
+from gui.look.theme import Theme
+from gui.opening import Opening
+from gui.parts import column
+from gui.review.panel import ReviewPanel
+from gui.session.session import Session
+from gui.setup.panel import SetupPanel
+from gui.state import Snapshot, State
+
+WIDE, NARROW = 1640, 1280
+"""Window widths, px, below which chips and then side panels are folded."""
+
+OFF_TIMEOUT = 3000
+"""Milliseconds a closing window waits for the coil to be verified off."""
+
+
+class Window(QMainWindow):
+    """Header, three columns, banner; one `render_state` for everything.
+
+    Args:
+        session: what runs behind the window.
+        theme: colours.
+        settings: where geometry is kept; None keeps nothing.
+    """
+
+    def __init__(
+        self, session: Session, theme: Theme, settings: QSettings | None = None
+    ) -> None:
+        super().__init__()
+        self.setWindowTitle("Tactile Lab")
+        self.setMinimumSize(1180, 720)
+        self.setAcceptDrops(True)
+        self.session, self.theme, self._settings = session, theme, settings
+        self.page = QWidget()
+        self.header = Header(theme)
+        self.banner = Banner(theme)
+        self.setup = SetupPanel(session, theme)
+        self.centre = Centre(theme)
+        self.review = ReviewPanel(theme)
+        self._folds: dict[QWidget, bool | None] = {self.setup: None, self.review: None}
+        self.columns = QSplitter(Qt.Orientation.Horizontal)
+        self._lay_out()
+        self.closing = Closing(self, theme)
+        self.opening = Opening(self)
+        self.frames = Frames(self)
+        self.actions_ = Actions(self)
+        self._leaving = False
+        self._connect()
+        self.render_state()
+
+    # --- rendering
+
+    def render_state(self) -> None:
+        """Render everything from the session's snapshot."""
+        snapshot = self.session.snapshot()
+        self.header.render_snapshot(snapshot)
+        self.banner.show_fault(snapshot.fault)
+        self.setup.render_snapshot(snapshot)
+        self.review.manual.render_snapshot(snapshot, self.session.readings.get("field"))
+        if self._bench_changed():
+            self.review.manual.show_bench(self.session.spec)
+        self.centre.show_empty(
+            snapshot.state in (State.DISCONNECTED, State.CONNECTING)
+            and self.opening.run is None
+        )
+        tools = self.centre.tools
+        watching = self.session.monitor.alive
+        tools.monitor.setEnabled(watching or snapshot.state is State.READY)
+        if QApplication.focusWidget() in self.header.minor_buttons:
+            # Qt moves the focus there when what had it is locked
+            self.page.setFocus()
+        self._close_when_off()
+
+    def render_clock(self, snapshot: Snapshot) -> None:
+        """Render what changes all the time: header, STOP, manual."""
+        self.header.render_snapshot(snapshot)
+        self.review.manual.render_snapshot(snapshot, self.session.readings.get("field"))
+        self._close_when_off()
+
+    def show_lanes(self) -> None:
+        """Show the lanes of what is on screen; what is left out has none."""
+        run = self.opening.run
+        if self.session.monitor.alive:
+            signals, twin = {"V_C1", "V_C2", "V_K", "spikes"}, False
+        elif run is not None:
+            signals = set(run.signals)
+            twin = run.tracks is not None
+        else:
+            expectation = self.session.expectation
+            if expectation is None:
+                return
+            needs, record = expectation.needs, expectation.scene.record
+            signals = {"force", *needs.stored} | (
+                set(record.signals) & {"spikes", "field"}
+            )
+            if needs.detect_on is not None:
+                signals.add("spikes")
+            signals -= (
+                {"coil_current"} if "coil_current" not in record.signals else set()
+            )
+            twin = bool(expectation.preview.traces)
+        self.centre.stack.show_lanes(lanes_for(signals, twin=twin))
+
+    def fold(self, side: QWidget, folded: bool) -> None:
+        """Fold a side panel by hand; the window's width no longer decides."""
+        self._folds[side] = folded
+        side.setVisible(not folded)
+
+    # --- closing
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Close at once where nothing drives the coil; else ask."""
+        if self.session.busy and not self._leaving:
+            event.ignore()
+            self.closing.ask(self.session.snapshot())
+            return
+        if self.session.busy or self.session.monitor.alive:
+            self.session.watch(False)
+            self._leaving = True
+            event.ignore()
+            return
+        self.frames.stop()
+        if self._settings is not None:
+            self._settings.setValue("geometry", self.saveGeometry())
+            self._settings.setValue("columns", self.columns.saveState())
+            self._settings.setValue("centre", self.centre.splitter.saveState())
+        event.accept()
+        app = QApplication.instance()
+        if app is not None:
+            app.quit()
+
+    def leave(self) -> None:
+        """Stop, then close once the coil is verified off, or its failure was shown."""
+        self._leaving = True
+        self.session.stop("the window is closed")
+        self.closing.say("Stopping", "The coil goes to 0 mA and is read back.")
+        QTimer.singleShot(OFF_TIMEOUT, self._off_late)
+
+    def _close_when_off(self) -> None:
+        if not self._leaving or self.session.busy or self.session.monitor.alive:
+            return
+        self._leaving = False
+        if self.session.state is not State.FAULT:
+            self.close()
+        else:
+            self.closing.say(
+                "COIL STATE UNKNOWN"
+                if self._unknown()
+                else "The run ended with a fault",
+                "Read the banner above, look at the source, then close the window.",
+            )
+            self.closing.stop.setEnabled(True)
+            self.closing.hide()
+
+    def _unknown(self) -> bool:
+        coil = self.session.coil_view()
+        return coil is not None and coil.verified_off is not True
+
+    def _off_late(self) -> None:
+        if self._leaving and self.session.busy:
+            self.closing.say(
+                "COIL STATE UNKNOWN",
+                "The source did not confirm within 3 s that it is off. Switch it off "
+                "at its front panel. The window closes when the run has ended.",
+            )
+
+    # --- events
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fold what does not fit."""
+        super().resizeEvent(event)
+        width = self.width()
+        self.header.set_compact(width < WIDE, width < NARROW)
+        for side, limit in ((self.review, NARROW + 40), (self.setup, 0)):
+            if self._folds[side] is None:
+                side.setVisible(width >= limit)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Take the single-key shortcuts."""
+        if not self.actions_.take_key(event):
+            super().keyPressEvent(event)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take scenes and runs."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped."""
+        for url in event.mimeData().urls()[:1]:
+            self.opening.open_path(Path(url.toLocalFile()))
+        event.acceptProposedAction()
+
+    # --- assembly
+
+    def _bench_changed(self) -> bool:
+        spec = self.session.spec
+        changed = spec is not getattr(self, "_shown_spec", 0)
+        self._shown_spec = spec
+        return changed
+
+    def _connect(self) -> None:
+        session = self.session
+        session.changed.connect(self.render_state)
+        session.logged.connect(self.centre.log.add)
+        session.planned.connect(self.opening.plan_arrived)
+        session.source_changed.connect(self.opening.follow_run)
+        session.trial_ended.connect(self.opening.trial_ended)
+        session.run_ended.connect(self.opening.run_ended)
+        session.reported.connect(self.opening.reported)
+        self.header.stop.clicked.connect(lambda: session.stop())
+        self.banner.acknowledged.connect(session.acknowledge)
+        self.banner.log_asked.connect(self.centre.log.show_safety)
+        self.centre.log.noted.connect(session.note)
+        self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
+        self.centre.empty.open_asked.connect(lambda: ask_scene(self))
+        self.centre.empty.connect_asked.connect(self.actions_.connect_dialog)
+        self.centre.empty.recent_asked.connect(self.opening.open_run)
+        self.closing.stopped.connect(self.leave)
+        self.centre.tools.export_asked.connect(self.actions_.export_view)
+        self.centre.tools.monitor.clicked.connect(session.watch)
+        self.setup.scene_wanted.connect(lambda: ask_scene(self))
+        manual = self.review.manual
+        manual.begun.connect(session.begin_manual)
+        manual.set_asked.connect(self._set_current)
+        manual.off_asked.connect(lambda: session.stop("manual off"))
+        manual.checked.connect(
+            lambda: session.connect_bench(session.bench_choice or "sim")
+        )
+
+    def _set_current(self, current: float) -> None:
+        if self.session.manual is not None:
+            self.session.manual.hold(current)
+
+    def _lay_out(self) -> None:
+        page = self.page
+        page.setObjectName("page")
+        page.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        whole = column(page, spacing=0)
+        whole.addWidget(self.header)
+        below = QWidget()
+        inner = column(below, margin=8, spacing=8)
+        inner.addWidget(self.banner)
+        for part in (self.setup, self.centre, self.review):
+            self.columns.addWidget(part)
+        self.columns.setStretchFactor(0, 0)
+        self.columns.setStretchFactor(1, 1)
+        self.columns.setStretchFactor(2, 0)
+        self.columns.setSizes([316, 1100, 362])
+        self.columns.setHandleWidth(8)
+        self.columns.setChildrenCollapsible(False)
+        inner.addWidget(self.columns, 1)
+        whole.addWidget(below, 1)
+        self.setCentralWidget(page)
+        self.resize(1720, 1080)
+        if self._settings is not None:
+            for name, restore in (
+                ("geometry", self.restoreGeometry),
+                ("columns", self.columns.restoreState),
+                ("centre", self.centre.splitter.restoreState),
+            ):
+                kept = self._settings.value(name)
+                if kept is not None:
+                    restore(kept)

@@ -1,0 +1,201 @@
+"""What a frame of the window costs, with the figures the window's issue asks for.
+
+    python tests/benchmarks/window_frames.py [SECONDS]
+
+Idle, a run in real time on the simulated bench, an emulated input of 4 x 7.8125 MS/s,
+and an hour-long record at 1 MS/s scrolled and zoomed. A frame is the poll plus the
+painting it causes, in the window's own thread; "processor" is its own time, which
+other programs on the machine do not change. Gaps are those of a 10 ms heartbeat.
+"""
+
+import os
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+import numpy as np
+from PySide6.QtCore import QEvent, QTimer
+from PySide6.QtWidgets import QApplication
+
+from gui.app import application, begin
+from gui.lanes.expected import Hold
+from gui.lanes.source import LiveSource
+from gui.look.theme import Theme
+from gui.session.session import Session
+from gui.state import State
+from gui.window import Window
+from tactile_lab.acquisition.live import Live
+from tactile_lab.bench import Block, Channel, Stream
+
+SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
+
+
+class Bench:
+    """The window with stop-watches."""
+
+    def __init__(self, out: Path) -> None:
+        sys.setswitchinterval(1e-3)
+        self.app = application([])
+        theme = Theme("light")
+        theme.apply()
+        self.session = Session(out)
+        self.session.reports = False
+        self.window = Window(self.session, theme)
+        self.window.resize(1720, 1080)
+        self.window.show()
+        self.frames: list[float] = []
+        self.used: list[float] = []
+        self.gaps: list[float] = []
+        self._last = time.perf_counter()
+        self._beat = QTimer()
+        self._beat.timeout.connect(self._note)
+        self._beat.start(10)
+        self.window.frames.stop()
+        self._timer = QTimer()
+        self._timer.timeout.connect(self._frame)
+        self._timer.start(33)
+
+    def _note(self) -> None:
+        now = time.perf_counter()
+        self.gaps.append(now - self._last)
+        self._last = now
+
+    def _frame(self) -> None:
+        begun, used = time.perf_counter(), time.thread_time()
+        self.window.frames.tick()
+        self.window.centre.stack.refresh()
+        QApplication.sendPostedEvents(None, QEvent.Type.UpdateRequest)
+        self.frames.append(time.perf_counter() - begun)
+        self.used.append(time.thread_time() - used)
+
+    def until(self, done, longest: float) -> None:
+        end = time.monotonic() + longest
+        while not done() and time.monotonic() < end:
+            self.app.processEvents()
+            time.sleep(0.001)
+
+    def measure(self, name: str, seconds: float) -> None:
+        self.frames.clear()
+        self.used.clear()
+        self.gaps.clear()
+        self._last = time.perf_counter()
+        end = time.monotonic() + seconds
+        self.until(lambda: time.monotonic() > end, seconds + 1)
+        self.report(name)
+
+    def report(self, name: str) -> None:
+        cost = 1e3 * np.array(self.frames or [np.nan])
+        used = 1e3 * np.array(self.used or [np.nan])
+        gap = 1e3 * np.array(self.gaps or [np.nan])
+        print(
+            f"{name:34s} frames {cost.size:5d}  median {np.median(cost):6.2f} ms  "
+            f"p99 {np.percentile(cost, 99):6.2f} ms  "
+            f"processor {np.median(used):5.2f} ms  longest gap {gap.max():6.1f} ms"
+        )
+
+
+def emulated(live: Live, seconds: float, rate: float = 7.8125e6) -> threading.Thread:
+    """Feed `live` with four channels at `rate`, as the runner's loop would."""
+    channels = tuple(Channel(signal=s, input=s, range=5.0) for s in SIGNALS)
+    stream = Stream(
+        channels=channels, interval=1 / rate, full_scale=32512, shift=8,
+        started=0.0, uncertainty=0.0,
+    )  # fmt: skip
+    count = int(rate * 0.05)
+    rng = np.random.default_rng(1)
+    codes = (rng.integers(-2, 3, (4, count)) * 256).astype(np.int16)
+    codes[2, ::50_000] = 20_000
+
+    def work() -> None:
+        live.begin(stream, 0.0)
+        begun = time.monotonic()
+        for number in range(int(seconds / 0.05)):
+            live.add(Block(number * count, codes, (False,) * 4, 0.0))
+            ahead = begun + (number + 1) * 0.05 - time.monotonic()
+            if ahead > 0:
+                time.sleep(ahead)
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    return thread
+
+
+def hour(source: LiveSource) -> None:
+    """Fill a source with an hour at 1 MS/s, as its 1 ms bins."""
+    from tactile_lab.acquisition.live import Bins
+
+    rng = np.random.default_rng(2)
+    for first in range(0, 3_600_000, 100_000):
+        time_ = 1e-3 * np.arange(first, first + 100_000)
+        for signal in SIGNALS:
+            mean = (np.sin(time_) + rng.normal(0, 0.05, time_.size)).astype(np.float32)
+            bins = Bins(time_, 1e-3, mean - 0.05, mean + 0.05, mean)
+            source._tracks.setdefault(signal, _track()).add(bins)
+    source.add_spikes(tuple(np.sort(rng.uniform(0, 3600, 36_000)).tolist()))
+
+
+def _track():
+    from gui.lanes.history import Track
+
+    return Track()
+
+
+def memory() -> float:
+    """Resident memory, MB."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS"):
+            return int(line.split()[1]) / 1024
+    return float("nan")
+
+
+def main(seconds: float) -> None:
+    begun = time.perf_counter()
+    with tempfile.TemporaryDirectory() as out:
+        bench = Bench(Path(out))
+        session, window = bench.session, bench.window
+        begin(window, None, "sim")
+        bench.app.processEvents()
+        print(f"start to a usable window           {time.perf_counter() - begun:.2f} s")
+        bench.until(lambda: session.state is State.READY and session.expectation, 120)
+        bench.report("connect and plan")
+        bench.measure("idle", seconds)
+        window.setup.start()
+        bench.until(lambda: session.source is not None, 30)
+        bench.measure("run in real time, simulated bench", seconds)
+        session.stop("benchmark")
+        bench.frames.clear()
+        bench.gaps.clear()
+        bench.until(lambda: not session.busy, 20)
+        bench.report("abort")
+        bench.until(lambda: session.state is not State.ABORTING, 20)
+        live = Live()
+        session.source = source = LiveSource(live, None, 0.2)
+        source.holds.append(Hold(0.0, 1e9, "emulated"))
+        window.centre.stack.show_source(source)
+        window.centre.view.set_follow(True)
+        emulated(live, seconds + 0.5)
+        bench.until(lambda: source.reach > 0.2, 5)
+        bench.measure("4 x 7.8125 MS/s emulated", seconds)
+        session.source = source = LiveSource(Live(), None, 0.2)
+        before = memory()
+        hour(source)
+        print(f"memory of an hour at 4 x 1 MS/s    {memory() - before:.0f} MB")
+        window.centre.stack.show_source(source)
+        window.centre.view.set_now(3600.0, 3600.0)
+        window.centre.view.show_all()
+        bench.measure("an hour, whole", seconds / 2)
+        scroll = QTimer()
+        scroll.timeout.connect(lambda: window.centre.view.pan(0.05))
+        window.centre.view.show_span(3500.0, 5.0)
+        scroll.start(33)
+        bench.measure("an hour, 5 s scrolled", seconds / 2)
+        scroll.stop()
+        window.close()
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 6.0)

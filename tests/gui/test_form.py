@@ -1,0 +1,114 @@
+import inspect
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit
+
+from gui.setup.form import Form
+from gui.setup.kinds import Kind, parameter
+from gui.setup.texts import FieldError, entry_of, exact, listed
+from tactile_lab.plugins import protocol_class, protocol_names, scene_names
+from tactile_lab.quantity import parse
+from tactile_lab.scene.load import load
+
+NAMES = [name for name in protocol_names() if name != "waveform"]
+
+
+@pytest.mark.parametrize("name", [n for n in scene_names() if n in NAMES])
+def test_every_ready_scene_survives_the_form(app: QApplication, name: str) -> None:
+    """Scene -> form -> overrides -> scene: the same protocol."""
+    scene = load(name)
+    kind = type(scene.protocol)
+    form = Form()
+    form.show_protocol(kind, {k: getattr(scene.protocol, k) for k in kind.model_fields})
+    assert form.problem == ""
+    assert load(name, form.overrides()).protocol == scene.protocol
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_protocol_has_a_form_of_its_defaults(
+    app: QApplication, name: str
+) -> None:
+    kind = protocol_class(name)
+    form = Form()
+    form.show_protocol(kind, {})
+    assert form.problem == ""
+    again = load(inspect.getfile(kind), form.overrides())
+    assert again.protocol.model_dump() == kind().model_dump()
+
+
+def test_lengths_and_units_are_shown_and_checked(app: QApplication) -> None:
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    assert form.field("levels").text == "80, 120, 160, 200 mN"
+    assert form.field("hold").text == "2 s"
+    hold = form.field("hold")
+    hold.set_text("0 s")
+    assert "above 0 s" in hold.problem
+    hold.set_text("50 mN")
+    assert "mN" in form.problem
+    with pytest.raises(FieldError):
+        form.overrides()
+    hold.set_text("1500 ms")
+    assert not form.problem and hold.is_changed
+
+
+def test_typing_marks_undoes_and_redoes(app: QApplication) -> None:
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    hold = form.field("hold")
+    edit = hold.findChild(QLineEdit)
+    assert isinstance(edit, QLineEdit)
+    edit.selectAll()
+    QTest.keyClicks(edit, "3 s")
+    assert hold.is_changed and hold.text == "3 s"
+    while form.undo.canUndo():
+        form.undo.undo()
+    assert hold.text == "2 s" and not hold.is_changed
+    form.undo.redo()
+    assert hold.text != "2 s"
+
+
+def test_arrow_keys_step(app: QApplication) -> None:
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    edit = form.field("hold").findChild(QLineEdit)
+    assert isinstance(edit, QLineEdit)
+    QTest.keyClick(edit, Qt.Key.Key_Up)
+    assert form.field("hold").text == "3 s"
+    QTest.keyClick(edit, Qt.Key.Key_Down)
+    assert form.field("hold").text == "2 s"
+
+
+def test_form_is_locked(app: QApplication) -> None:
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    form.lock(True)
+    edits = form.findChildren(QLineEdit)
+    assert edits and not any(edit.isEnabled() for edit in edits)
+
+
+@given(st.floats(1e-15, 1e9))
+def test_shown_quantity_reads_back_exactly(value: float) -> None:
+    assert parse(exact(value, "N"), "N") == value
+
+
+@given(st.lists(st.floats(1e-6, 1e3), min_size=1, max_size=6))
+def test_shown_list_reads_back_exactly(values: list[float]) -> None:
+    levels = parameter("levels", protocol_class("pulses").model_fields["levels"])
+    entry = entry_of(levels, listed(values, "N"))
+    assert entry is not None
+    texts = [part.strip().strip('"') for part in entry.strip("[]").split(",")]
+    assert [parse(text, "N") for text in texts] == values
+
+
+def test_kinds_are_found_from_types() -> None:
+    fields = protocol_class("pulses").model_fields
+    assert parameter("levels", fields["levels"]).kind is Kind.QUANTITIES
+    assert parameter("hold", fields["hold"]).kind is Kind.QUANTITY
+    file = protocol_class("waveform").model_fields
+    assert parameter("file", file["file"]).kind is Kind.FILE
+    assert parameter("duration", file["duration"]).optional

@@ -1,0 +1,122 @@
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gui.lanes.axis import decimals, nice_range, number, ticks
+from gui.lanes.decimate import columns, zigzag
+from gui.lanes.derive import rate_of
+from gui.lanes.expected import Aligned, Hold, Preview
+from gui.lanes.history import COARSE, FINE, SlowTrack, Track
+from tactile_lab.acquisition.live import Bins
+from tactile_lab.waveform import Waveform
+
+
+def bins(first: int, values: np.ndarray, width: float = 1e-3) -> Bins:
+    low = values.astype(np.float32)
+    return Bins(width * np.arange(first, first + values.size), width, low, low + 1, low)
+
+
+@given(st.integers(1, 5000), st.integers(1, 300), st.integers(0, 1000))
+def test_columns_keep_every_extreme(n: int, count: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    value = rng.normal(size=n)
+    time = np.arange(n) * 1e-3
+    drawn = columns(np.array([time, value, value, value]), count, 1e-3)
+    assert drawn.low.min() == value.min()
+    assert drawn.high.max() == value.max()
+    assert drawn.time.size <= max(count, n if n <= count else 0) + 2
+
+
+def test_columns_do_not_wander_when_the_view_scrolls() -> None:
+    time = np.arange(10_000) * 1e-3
+    value = np.sin(time * 40)
+    rows = np.array([time, value, value, value])
+    one = columns(rows[:, 100:5100], 500, 1e-3)
+    two = columns(rows[:, 103:5103], 500, 1e-3)
+    both = np.intersect1d(one.time[1:-1], two.time[1:-1])
+    assert both.size > 0.95 * one.time.size
+
+
+def test_gap_breaks_the_line() -> None:
+    time = np.concatenate([np.arange(100), np.arange(150, 250)]) * 1e-3
+    value = np.ones(200)
+    drawn = columns(np.array([time, value, value, value]), 1000, 1e-3)
+    assert np.flatnonzero(drawn.gap).tolist() == [0, 100]
+
+
+def test_zigzag_passes_through_both_extremes() -> None:
+    rows = np.array([np.arange(4.0), [0, 1, 0, 1], [2, 3, 2, 3], [1, 2, 1, 2]])
+    x, y = zigzag(columns(rows, 10, 1.0))
+    assert x.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    for k in range(4):
+        assert sorted(y[2 * k : 2 * k + 2]) == [rows[1, k], rows[2, k]]
+
+
+@settings(max_examples=30)
+@given(st.lists(st.integers(1, 4000), min_size=1, max_size=40))
+def test_track_shows_what_was_added(pieces: list[int]) -> None:
+    track, first = Track(), 0
+    for size in pieces:
+        track.add(bins(first, np.arange(first, first + size, dtype=float)))
+        first += size
+    drawn = track.between(0.0, 1e9, 100)
+    assert drawn.low[0] == 0
+    assert drawn.high[-1] >= first - 4096  # the coarse picture may lag by open bins
+    assert track.end == np.float64((first - 1) * 1e-3) + 1e-3
+
+
+def test_history_is_bounded_and_keeps_a_single_spike() -> None:
+    track = Track()
+    total = 3_600_000
+    step = 20_000
+    for first in range(0, total, step):
+        values = np.zeros(step)
+        if first == 100 * step:
+            values[7] = 500.0
+        track.add(bins(first, values))
+    drawn = track.between(0.0, 3600.0, 1000)
+    assert drawn.high.max() >= 500.0
+    held = sum(v.nbytes for v in vars(track).values() if isinstance(v, np.ndarray))
+    assert held <= 8 * 4 * (2 * FINE + COARSE)
+    newest = track.between(3595.0, 3600.0, 10_000)
+    assert newest.time.size == 5000 or newest.time.size == 5001
+
+
+def test_rate_is_one_over_the_last_interval() -> None:
+    drawn = rate_of(np.array([1.0, 1.5, 1.75]), 0.0, 3.0)
+    assert drawn.mean.tolist() == [0.0, 2.0, 4.0]
+
+
+def test_model_moves_to_where_each_trial_really_started() -> None:
+    holds = [Hold(0.1, 1.0, "a"), Hold(1.0, 2.0, "b")]
+    force = Waveform.through([(0.1, 0.0), (0.5, 1.0), (1.5, 1.0)])
+    preview = Preview(force, {}, np.array([0.5, 1.5]), holds, 2.0)
+    aligned = Aligned(preview)
+    aligned.begin(0, 0.2)
+    assert np.allclose(aligned.spikes, [0.6, 1.6])
+    aligned.begin(1, 1.5)
+    assert np.allclose(aligned.spikes, [0.6, 2.0])
+    assert aligned.length == 2.5
+
+
+def test_slow_track_is_bounded() -> None:
+    track = SlowTrack()
+    for k in range(450_000):
+        track.add(k * 0.01, float(k))
+    assert track.between(0.0, 1e9).time.size <= 1 << 16
+    assert track.last == 449_999.0
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
+def test_nice_range_contains_the_data(low: float, span: float) -> None:
+    a, b = nice_range(low, low + span, 1e-3)
+    assert a <= low and b >= low + span
+    assert b - a <= 3 * span + 1e-3
+
+
+def test_ticks_are_round() -> None:
+    assert ticks(0.0, 1.0, 5) == [0.0, 0.2, 0.4, 0.6000000000000001, 0.8, 1.0]
+    assert decimals(0.2) == 1
+    assert decimals(50) == 0
+    assert number(-0.04, 1) == "0.0"
+    assert number(-1.5, 1) == "−1.5"

@@ -1,0 +1,114 @@
+import pytest
+
+from gui.look.tokens import DARK, LIGHT, Tokens, contrast
+from gui.state import (
+    STALE,
+    CoilView,
+    Snapshot,
+    State,
+    Truth,
+    clock_text,
+    milliamperes,
+    minutes,
+    run_problem,
+    stop_text,
+    truth,
+)
+
+LIVE = CoilView(True, 0.374, 0.374, limit=2.0)
+
+
+def test_stop_tells_the_read_back_not_the_command() -> None:
+    coil = CoilView(True, current=0.112, setpoint=0.9)
+    assert stop_text(State.RUNNING, coil).detail == "112 mA live"
+
+
+def test_silent_source_is_unknown() -> None:
+    silent = CoilView(True, 0.374, 0.374, age=STALE + 0.1)
+    assert truth(State.RUNNING, silent) is Truth.UNKNOWN
+    assert stop_text(State.RUNNING, silent).title == "COIL STATE UNKNOWN"
+
+
+def test_old_read_back_is_said_to_be_old() -> None:
+    coil = CoilView(True, 0.1, 0.5, age=0.1, read_age=STALE + 1)
+    assert stop_text(State.RUNNING, coil).detail == "500 mA sent, not read back"
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_unverified_off_is_unknown_in_every_state(state: State) -> None:
+    coil = CoilView(False, None, verified_off=False)
+    assert truth(state, coil) is Truth.UNKNOWN
+
+
+def test_without_coil_stop_says_so() -> None:
+    assert stop_text(State.DISCONNECTED, None).detail == "no coil source"
+
+
+def test_live_coil_is_live_also_when_ready() -> None:
+    # by hand: the state is ready, the coil is not off
+    assert truth(State.READY, LIVE) is Truth.LIVE
+
+
+def test_aborting_shows_the_fall() -> None:
+    assert stop_text(State.ABORTING, LIVE).detail == "374 mA → 0"
+
+
+@pytest.mark.parametrize("state", [s for s in State if s is not State.READY])
+def test_run_is_off_with_a_reason_unless_ready(state: State) -> None:
+    assert run_problem(Snapshot(state=state), form_problem="")
+
+
+def test_run_is_on_when_ready_and_the_form_is_good() -> None:
+    ready = Snapshot(state=State.READY)
+    assert run_problem(ready, form_problem="") == ""
+    assert run_problem(ready, form_problem="Hold: wrong") == "Hold: wrong"
+    assert "by hand" in run_problem(
+        Snapshot(state=State.READY, manual=True), form_problem=""
+    )
+
+
+def test_numbers_have_a_true_minus_and_no_negative_zero() -> None:
+    assert milliamperes(-0.25) == "−250 mA"
+    assert milliamperes(-0.0001) == "0 mA"
+    assert milliamperes(None) == "not read"
+
+
+def test_durations() -> None:
+    assert minutes(41) == "00:41"
+    assert minutes(59.6) == "01:00"
+    assert minutes(3725) == "1:02:05"
+    assert minutes(23.44, tenths=True) == "00:23.4"
+
+
+def test_clock_shows_elapsed_and_expected() -> None:
+    running = Snapshot(state=State.RUNNING, elapsed=23.4, expected=41.0)
+    assert clock_text(running) == ("RUNNING", "00:23.4 / 00:41")
+
+
+TEXTS = ("text", "muted", "red", "green", "amber", "selected_text")
+TRACES = ("force", "V_C1", "V_C2", "V_K", "rate", "twin", "residual", "current")
+
+
+@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
+def test_text_and_traces_have_contrast(tokens: Tokens) -> None:
+    for name in TEXTS:
+        for ground in ("panel", "sunken"):
+            ratio = contrast(getattr(tokens, name), getattr(tokens, ground))
+            assert ratio >= 4.5, (name, ground, ratio)
+    for name in TRACES:
+        ratio = contrast(getattr(tokens, name), tokens.plot)
+        assert ratio >= 4.5, (name, ratio)
+
+
+@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
+def test_buttons_and_pills_have_contrast(tokens: Tokens) -> None:
+    for ink, ground in (
+        ("on_accent", "accent"),
+        ("red", "red_soft"),
+        ("amber", "amber_soft"),
+        ("green", "green_soft"),
+        ("selected_text", "selected"),
+        ("header_muted", "header_chip"),
+    ):
+        ratio = contrast(getattr(tokens, ink), getattr(tokens, ground))
+        assert ratio >= 4.5, (ink, ground, ratio)

@@ -1,0 +1,369 @@
+"""The window on the simulated bench, driven as a person would."""
+
+import sys
+import time
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QMimeData, QPointF, Qt, QTimer, QUrl
+from PySide6.QtGui import QDropEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPushButton, QToolButton
+
+from gui.session.session import Queued
+from gui.state import State, Truth
+from sim_backend import serial_wires
+from sim_backend.faults import SerialFault
+
+
+def newest_coil() -> serial_wires.FarEnd:
+    """Far end of the coil wire plugged in last."""
+    return [far for name, far in serial_wires._far_ends.items() if "coil" in name][-1]
+
+
+def red_share(button: QAbstractButton) -> float:
+    image = button.grab().toImage()
+    red = 0
+    for x in range(0, image.width(), 4):
+        for y in range(0, image.height(), 4):
+            colour = image.pixelColor(x, y)
+            red += colour.red() > 150 and colour.green() < 90 and colour.blue() < 110
+    return red / ((image.width() // 4) * (image.height() // 4))
+
+
+def test_ready_offers_run_and_shows_the_plan(lab) -> None:
+    window = lab.window
+    assert window.setup.run.isEnabled()
+    assert window.header.stop.truth is Truth.OFF
+    assert window.header.badge.isVisible()
+    keys = [row.lane.key for row in window.centre.stack.visible_rows()]
+    assert keys == ["force", "V_C1", "residual", "V_C2", "V_K", "spikes", "rate"]
+    assert window.centre.stack.source.twin_spikes.size > 0
+
+
+def test_run_moves_lanes_and_gives_results(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    assert not window.setup.run.isEnabled()
+    assert not any(e.isEnabled() for e in window.setup.form.findChildren(QLineEdit))
+    lab.until(lambda: window.header.stop.truth is Truth.LIVE)
+    assert red_share(window.header.stop) > 0.5
+    lab.until(lambda: session.state is not State.RUNNING)
+    lab.ready()
+    lab.complete_run()
+    source = session.source
+    assert source is not None and source.reach > 1.0
+    assert not source.trace("V_C1", 0.0, 2.0, 500).empty
+    assert [f.label for f in window.opening.findings] == ["80 mN", "120 mN"]
+    assert window.review.results.mark.startswith("final")
+    assert window.header.stop.truth is Truth.OFF
+
+
+@pytest.mark.parametrize("how", ["click", "Esc", "F12"])
+def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    assert window.header.stop.isEnabled()
+    if how == "click":
+        QTest.mouseClick(window.header.stop, Qt.MouseButton.LeftButton)
+    else:
+        window.activateWindow()
+        key = {"Esc": Qt.Key.Key_Escape, "F12": Qt.Key.Key_F12}[how]
+        QTest.keyClick(window, key)
+    assert session.state is State.ABORTING
+    lab.until(lambda: session.state is State.READY)
+    coil = session.coil_view()
+    assert coil is not None and coil.output is False and coil.verified_off
+    assert window.opening.ending.startswith("aborted")
+
+
+def test_stop_is_enabled_in_every_state(lab) -> None:
+    for state in State:
+        lab.session.state = state
+        lab.window.render_state()
+        assert lab.window.header.stop.isEnabled()
+        assert lab.window.header.stop.isVisible()
+    lab.session.state = State.READY
+    lab.window.render_state()
+
+
+def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    assert not window.close()
+    assert window.closing.isVisible() and window.closing.keep.isDefault()
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert not window.closing.isVisible()
+    assert session.state is State.RUNNING, "Esc in the question is not STOP"
+    assert window.isVisible()
+
+
+def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    newest_coil().faults.add(SerialFault(kind="unplug", times=None))
+    lab.until(lambda: session.state is State.FAULT)
+    assert window.banner.isVisible()
+    assert window.header.stop.truth is Truth.UNKNOWN
+    assert window.header.stop.words.title == "COIL STATE UNKNOWN"
+    assert not window.setup.run.isEnabled()
+    window.banner.acknowledge.click()
+    assert session.state is not State.FAULT
+    assert window.header.stop.truth is Truth.UNKNOWN, "reading a fault verifies nothing"
+
+
+def test_reconnecting_makes_the_coil_known_again(lab) -> None:
+    session = lab.session
+    session.connect_bench("sim")
+    assert session.state is State.CONNECTING
+    lab.until(lambda: session.state is State.READY)
+    assert lab.window.header.stop.truth is Truth.OFF
+
+
+def test_queue_can_be_edited_while_running(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    for name in ("one", "two", "three"):
+        session.enqueue(Queued(name, window.setup.request(), 1.0))
+    session.move_queued(2, -1)
+    session.unqueue(0)
+    assert [item.title for item in session.queue] == ["three", "two"]
+    assert window.setup.queue.isVisible()
+    session.unqueue(1)
+    first = session.execution
+    lab.until(lambda: session.execution is not first and session.source is not None)
+    assert session.queue == []
+
+
+def test_invalid_value_forbids_run_and_says_why(lab) -> None:
+    window = lab.window
+    window.setup.form.field("hold").set_text("−1 s")
+    window.setup.form.changed.emit()
+    assert not window.setup.run.isEnabled()
+    assert "Hold" in window.setup.run.toolTip()
+
+
+def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
+    window, session = lab.window, lab.session
+    window.setup.form.field("levels").set_text("900 mN")
+    window.setup.plan_now()
+    lab.until(lambda: session.plan_problem)
+    assert "reachable" in session.plan_problem
+    assert not window.setup.run.isEnabled()
+    window.setup.form.reset()
+
+
+def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
+    window, session = lab.window, lab.session
+    session.begin_manual()
+    lab.until(lambda: session.manual is not None and session.manual.thread.opened)
+    window.review.manual.current.setText("5 A")
+    window.review.manual.set.click()
+    assert session.coil_view().output is not True, "beyond the limit nothing is sent"
+    window.review.manual.current.setText("100 mA")
+    window.review.manual.set.click()
+    lab.until(lambda: abs((session.coil_view().current or 0) - 0.1) < 2e-3)
+    lab.until(lambda: window.header.stop.truth is Truth.LIVE)
+    assert not window.setup.run.isEnabled()
+    assert not window.close(), "the coil is live: closing asks"
+    window.closing.keep.click()
+    window.header.stop.click()
+    lab.until(lambda: session.manual is None)
+    assert session.coil_view().verified_off
+
+
+def test_old_run_opens_in_the_same_lanes(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.complete_run()
+    folder = session.execution.folder.path
+    live_spikes = session.source.spikes.copy()
+    window.opening.open_run(folder)
+    lab.until(lambda: window.opening.run is not None)
+    run = window.opening.run
+    assert np.allclose(run.spikes, live_spikes, atol=1e-3)
+    lab.until(lambda: run.tracks is not None)
+    lab.live(0.1)
+    window.centre.view.show_span(0.2, 0.001)
+    run.trace("V_C2", 0.2, 0.201, 1000)
+    lab.until(lambda: run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+
+
+def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
+    window = lab.window
+    file = lab.folder / "dropped.toml"
+    file.write_text('[protocol]\nname = "pulses"\nlevels = ["70 mN"]\n')
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(file))])
+    event = QDropEvent(
+        QPointF(50, 200), Qt.DropAction.CopyAction, data,
+        Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+    )  # fmt: skip
+    window.dropEvent(event)
+    assert window.setup.form.field("levels").text == "70 mN"
+    bad = lab.folder / "bad.toml"
+    bad.write_text('[protocol]\nname = "pulses"\nlevel = ["70 mN"]\n')
+    window.opening.open_path(bad)
+    assert window.centre.notice.isVisible()
+    assert "levels" in window.centre.notice.text()
+    assert window.setup.form.field("levels").text == "70 mN"
+
+
+def test_letters_are_shortcuts_only_outside_text_fields(lab) -> None:
+    window = lab.window
+    before = window.centre.tools.twin.isChecked()
+    window.centre.log.note.setFocus()
+    QTest.keyClicks(window.centre.log.note, "mmm")
+    assert window.centre.tools.twin.isChecked() is before
+    assert window.centre.log.note.text() == "mmm"
+    window.centre.log.note.clear()
+    window.centralWidget().setFocus()
+    QTest.keyClick(window, Qt.Key.Key_M)
+    assert window.centre.tools.twin.isChecked() is not before
+    QTest.keyClick(window, Qt.Key.Key_M)
+
+
+def test_notes_are_stamped_and_filtered(lab) -> None:
+    window = lab.window
+    window.centre.log.note.setText("moved the magnet")
+    QTest.keyClick(window.centre.log.note, Qt.Key.Key_Return)
+    window.centre.log.choices.group.button(3).click()
+    shown = window.centre.log.filter
+    last = shown.index(shown.rowCount() - 1, 3).data()
+    assert last == "moved the magnet"
+    window.centre.log.choices.group.button(0).click()
+
+
+def test_cursors_are_readable_as_text(lab) -> None:
+    window = lab.window
+    window.centre.tools.toggle_cursors(True)
+    window.centre.view.place_cursors(0.2, 0.7)
+    assert "500 ms" in window.centre.tools.readout
+    window.centre.tools.toggle_cursors(False)
+    assert window.centre.tools.readout == ""
+
+
+def test_view_is_exported(lab) -> None:
+    from gui.dialogs.saving import write_scene, write_view
+
+    window, folder = lab.window, lab.folder
+    for name in ("view.png", "view.svg", "view.csv"):
+        write_view(window, folder / name)
+        assert (folder / name).stat().st_size > 100
+    header = (folder / "view.csv").read_text().splitlines()[1]
+    assert "V_C1_time_s" in header and "force_mean_N" in header
+    write_scene(window, folder / "saved.toml")
+    assert 'name = "pulses"' in (folder / "saved.toml").read_text()
+
+
+def test_every_control_has_an_accessible_name(lab) -> None:
+    for kind in (QPushButton, QToolButton, QLineEdit):
+        for widget in lab.window.findChildren(kind):
+            if widget.isVisibleTo(lab.window) and widget.objectName() != "qt_edit":
+                named = widget.accessibleName() or widget.text() or widget.toolTip()
+                assert named, widget
+
+
+def test_fits_the_smallest_screen_and_elides_no_button(lab) -> None:
+    window = lab.window
+    window.resize(1180, 720)
+    lab.live(0.1)
+    hint = window.page.minimumSizeHint()
+    parts = {
+        name: (part.minimumSizeHint().width(), part.width())
+        for name, part in (
+            ("header", window.header), ("columns", window.columns),
+            ("centre", window.centre), ("tools", window.centre.tools),
+            ("setup", window.setup), ("log", window.centre.log),
+        )
+    }  # fmt: skip
+    assert hint.width() <= 1180 and hint.height() <= 720, (hint, parts)
+    for button in window.findChildren(QPushButton):
+        if button.isVisible():
+            assert button.width() >= button.sizeHint().width() - 1, button.text()
+    assert window.header.stop.width() == 228
+    window.resize(1720, 1080)
+
+
+def test_themes_repaint_everything(lab) -> None:
+    theme = lab.window.theme
+    for choice in ("dark", "light"):
+        theme.choose(choice)
+        lab.live(0.05)
+        image = lab.window.centre.stack.rows[0].plot.grab().toImage()
+        dark = image.pixelColor(image.width() - 3, 3).lightness() < 80
+        assert dark is (choice == "dark")
+
+
+def test_run_never_blocks_the_window(lab) -> None:
+    gaps, last = [], time.perf_counter()
+    beat = QTimer()
+
+    def note() -> None:
+        nonlocal last
+        now = time.perf_counter()
+        gaps.append(now - last)
+        last = now
+
+    def worst() -> float:
+        gaps.sort()
+        found = gaps[int(0.99 * len(gaps))]
+        gaps.clear()
+        return found
+
+    beat.timeout.connect(note)
+    beat.start(10)
+    lab.live(0.7)
+    idle = worst()
+    lab.complete_run()
+    beat.stop()
+    # 0.1 s is the goal (benchmark); a loaded machine has gaps when idle, too
+    assert worst() < max(0.15, 4 * idle)
+
+
+def test_frames_lose_no_references(lab) -> None:
+    before = sys.getrefcount(None)
+    for _ in range(80):
+        lab.window.frames.tick()
+        lab.window.centre.stack.refresh()
+        lab.app.processEvents()
+    assert sys.getrefcount(None) > before - 500
+
+
+def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
+    window = lab.window
+    for _ in range(2):
+        lab.complete_run()
+    window.opening.list_runs()
+    lab.until(lambda: len(window.review.runs.cards) >= 2)
+    complete = [c for c in window.review.runs.cards if c.entry.status == "complete"]
+    for card in complete[:2]:
+        card.tick.setChecked(True)
+    assert window.review.runs.compare.isEnabled()
+    window.review.runs.compare.click()
+    lab.until(lambda: window.centre.compare_bar.isVisible())
+    comparison = window.opening.run
+    keys = [row.lane.key for row in window.centre.stack.visible_rows()]
+    assert "residual" not in keys, "the model is not compared"
+    window.centre.compare_bar.align.group.button(1).click()
+    starts = [m.source.holds[0].start + m.shift for m in comparison.members]
+    assert abs(starts[0] - starts[1]) < 1e-9
+    lab.live(0.1)
+    window.opening.close_run()
+    assert not window.centre.compare_bar.isVisible()
+
+
+def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
+    window, session = lab.window, lab.session
+    window.centre.tools.monitor.click()
+    lab.until(lambda: "fires under" in window.centre.notice.text())
+    keys = [row.lane.key for row in window.centre.stack.visible_rows()]
+    assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
+    assert session.state is State.READY
+    assert window.header.stop.truth is Truth.OFF
+    before = set((lab.folder / "runs").iterdir())
+    window.setup.run.click()
+    lab.until(lambda: session.state is State.RUNNING)
+    assert not session.monitor.alive, "the scope is handed over before the run"
+    lab.until(lambda: session.state in (State.READY, State.FAULT))
+    new = set((lab.folder / "runs").iterdir()) - before
+    assert len(new) == 1, "watching keeps nothing"
