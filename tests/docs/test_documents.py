@@ -1,0 +1,82 @@
+"""What the documents tell a reader to do is done here, as it stands."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def blocks(document, language):
+    text = (DOCS / document).read_text(encoding="utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.S)
+
+
+def python(*arguments, folder):
+    done = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def tactile_lab(*arguments, folder):
+    start = "import sys; from tactile_lab.cli import main; sys.exit(main())"
+    return python("-c", start, *arguments, folder=folder)
+
+
+def test_the_tutorial_ends_with_a_fitted_time_constant(tmp_path):
+    said = python(DOCS / "tutorial" / "adaptation.py", tmp_path / "runs", folder=DOCS)
+    match = re.search(r"time constant ([\d.]+) s", said)
+    assert match is not None
+    assert 1 < float(match[1]) < 8
+    (folder,) = (tmp_path / "runs").iterdir()
+    found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    fit = found["trials"][0]["adaptation"]["time_constant_s"]
+    assert fit["value"] == pytest.approx(float(match[1]), abs=0.01)
+    assert (folder / "report.html").exists()
+
+
+def test_a_protocol_of_ones_own_runs_as_the_how_to_says(tmp_path):
+    (source,) = blocks("how-to/write-a-protocol.md", "python")
+    (tmp_path / "tap.py").write_text(source, encoding="utf-8")
+    assert "tap" in tactile_lab("plan", "tap.py", folder=tmp_path)
+    said = tactile_lab(
+        "run", "tap.py", "--set", 'protocol.step="10 mN"', "--json", "--out", "runs",
+        folder=tmp_path,
+    )  # fmt: skip
+    result = json.loads(said)
+    assert result["status"] == "complete"
+    trials = json.loads((tmp_path / result["run"] / "results.json").read_text())[
+        "trials"
+    ]
+    assert [t["spikes"] > 0 for t in trials] == [False] * (len(trials) - 1) + [True]
+    levels = [t["level_N"] for t in trials]
+    assert levels[1] - levels[0] == pytest.approx(0.01)
+
+
+def test_the_scene_of_the_how_to_is_one(tmp_path):
+    (source,) = blocks("how-to/write-a-protocol.md", "python")
+    (tmp_path / "tap.py").write_text(source, encoding="utf-8")
+    (scene,) = blocks("how-to/write-a-protocol.md", "toml")
+    (tmp_path / "taps.toml").write_text(scene, encoding="utf-8")
+    assert "tap" in tactile_lab("plan", "taps.toml", folder=tmp_path)
+
+
+def test_the_python_of_the_scripting_how_to_runs(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "\n".join(blocks("how-to/script-in-python.md", "python")), encoding="utf-8"
+    )
+    said = python(script, folder=tmp_path)
+    assert re.search(r"120 mN \d+ spikes", said)
+    tau = float(re.search(r"^tau ([\d.]+)", said, flags=re.M)[1])
+    assert tau == pytest.approx(8.69, rel=0.1)
