@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from drivers.coil_wire import CoilWire
 from tactile_lab.bench import OffReport
 from tactile_lab.clock import Clock
@@ -12,7 +14,10 @@ OFF_CURRENT = 0.005
 """Largest current that counts as none, A."""
 
 LONGEST_RAMP = 0.5
-"""Longest time the ramp to zero may take, s; a larger current ramps faster."""
+"""Longest time the steps of a ramp may add up to, s; a larger current ramps faster."""
+
+SHORTEST_REST, LONGEST_REST = 0.005, 0.2
+"""Time between an answer and the next step of a ramp, s; the guard wants a heartbeat."""
 
 VERIFICATIONS = 3
 """Times the safe state is commanded and read back before giving up."""
@@ -27,7 +32,13 @@ UNKNOWN = "OUTPUT STATE UNKNOWN - switch the coil source off at the instrument. 
 
 
 def switch_off(
-    wire: CoilWire, clock: Clock, *, setpoint: float | None, slew: float, ramp: bool
+    wire: CoilWire,
+    clock: Clock,
+    *,
+    setpoint: float | None,
+    slew: float,
+    exchange: float,
+    ramp: bool,
 ) -> OffReport:
     """Bring the source to 0 A and output off, and say whether that was verified.
 
@@ -36,13 +47,14 @@ def switch_off(
         clock: time the ramp is played in.
         setpoint: last known, A; None when unknown.
         slew: of the ramp, A/s.
+        exchange: typical time of a verified set-point, s.
         ramp: False goes to 0 A at once.
     """
     trouble: list[str] = []
     if not wire.talk.reconnected(trouble, RECONNECT):
         return OffReport(False, None, UNKNOWN + " | ".join(trouble))
     if ramp and setpoint != 0.0:
-        _ramp_down(wire, clock, setpoint, slew, trouble)
+        _ramp_down(wire, clock, setpoint, slew, exchange, trouble)
     steps = (*wire.row.stop_lines, wire.row.set_line(0.0), *wire.row.off)
     current: float | None = None
     for _ in range(VERIFICATIONS):
@@ -81,14 +93,30 @@ def _ramp_down(
     clock: Clock,
     setpoint: float | None,
     slew: float,
+    exchange: float,
     trouble: list[str],
 ) -> None:
-    """Steps to zero at the slew limit; given up at the first failure."""
+    """Steps until 0 A is one step away, at the slew limit; ended by a failure.
+
+    A step is as large as the time since the last one was answered allows. The source
+    took that one before it answered, so no delay on the way can bring two steps closer
+    together at the source than the limit allows. Resting for two exchanges makes the
+    whole ramp take one and a half times its nominal time.
+    """
     try:
-        start = _taken_over(wire) if setpoint is None else setpoint
-        duration = min(abs(start) / slew, LONGEST_RAMP)
-        begun = clock.now()
-        while (passed := clock.now() - begun) < duration:
-            wire.set_current(start * (1 - passed / duration))
+        current = _taken_over(wire) if setpoint is None else setpoint
+        slew = max(slew, abs(current) / LONGEST_RAMP)
+        answered = clock.now()
+        while True:
+            rest = min(max(2 * exchange, SHORTEST_REST), LONGEST_REST)
+            clock.sleep_until(answered + min(rest, abs(current) / slew))
+            sent = clock.now()
+            left = abs(current) - slew * (sent - answered)
+            if left < 10.0**-wire.row.digits:
+                return  # 0 A is what comes next anyway
+            current = math.copysign(left, current)
+            wire.set_current(current)
+            answered = clock.now()
+            exchange = answered - sent
     except TactileLabError as reason:
         trouble.append(f"ramp: {reason}")

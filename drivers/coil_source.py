@@ -15,7 +15,7 @@ from drivers.coil_list import check_list, upload
 from drivers.coil_off import switch_off
 from drivers.coil_wire import CoilWire
 from drivers.conversation import Conversation
-from drivers.dialect_row import CoilDialect
+from drivers.dialect_row import MARGIN, CoilDialect
 from drivers.guard import Guard, Watch, in_process
 from drivers.serial_link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading
@@ -198,6 +198,8 @@ class CoilSource:
         self._commanded = now
         try:
             self._wire.set_current(wanted)
+            # a late answer may mean that the step was taken late
+            self._commanded = max(now, self._clock.now() - self._interval)
         except InstrumentError:
             self._setpoint = None  # it may or may not have been taken
             raise
@@ -300,6 +302,7 @@ class CoilSource:
             self._clock,
             setpoint=self._setpoint,
             slew=self._limits.slew,
+            exchange=self._interval / MARGIN,
             ramp=ramp,
         )
         self._commanded = self._clock.now()
