@@ -43,6 +43,7 @@ fast: $(DEV_STAMP)
 
 # hours on two cores, alone on the machine; every table states commit and date
 reports: $(DEV_STAMP)
+	$(BIN)/tactile-lab accuracy --out docs
 	$(BIN)/tactile-lab accuracy --campaign 1000 --out docs
 	$(BIN)/tactile-lab stability --out docs
 	$(BIN)/python docs/make_fit_recovery.py

@@ -85,6 +85,34 @@ def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
 
 
 @inner
+def unresolved(
+    s: float,
+    h: float,
+    y: float,
+    V0: float,
+    p: float,
+    left: float,
+    a: FloatArray,
+    par: FloatArray,
+) -> float:
+    """Error of a change that is over before the first node, which no node sees, V.
+
+    The residual at u = 0 sees it: what it exceeds a smooth series' own one by, times
+    the time to the first node or, if shorter, the time in which V_C1 forgets.
+    """
+    slope = 0.0
+    sign = 2.0
+    for n in range(1, ORDER + 1):
+        slope += sign * n * n * a[n]
+        sign = -sign
+    B = B_at(V_P_at(s, V0, p, par[TAU]), par)
+    residual = abs(h * slope_at(B, y, par) - slope)
+    rate = h * (par[LAMBDA] + B * math.exp(-y / par[V_T]) / par[V_T])
+    excess: float = max(residual - 100.0 * left, 0.0) * min(NODES[0], 1.0 / rate)
+    return excess
+
+
+@inner
 def above_threshold(
     a: FloatArray,
     s: float,
@@ -231,7 +259,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                 for i in range(ORDER):
                     part[i + 1] = W[i]
                 to_series(part, a)
-                tail = max(abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]))
+                # one coefficient may vanish by chance: three do not
+                left = max(
+                    abs(a[ORDER]), 0.3 * abs(a[ORDER - 1]), 0.1 * abs(a[ORDER - 2])
+                )
+                layer = unresolved(s, h, y, V0, p, left, a, par)
+                tail = max(abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]), layer)
                 biggest = max(abs(y), abs(values[ORDER]))
                 wanted = max(1e-3 * tolerance, 6e-16 * biggest)
                 if tail > wanted:
@@ -245,12 +278,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, values[ORDER]))
                 floor = 2.5e-16 * (biggest + 12.0 * depth)
-                # one coefficient may vanish by chance: three do not
-                left = max(tail, 0.3 * abs(a[ORDER - 1]), 0.1 * abs(a[ORDER - 2]))
-                error = error_in + left + floor
+                error = error_in + left + layer + floor
                 node[Y_LARGEST_ERROR] = max(node[Y_LARGEST_ERROR], error)
                 node[Y_ERROR] = (
-                    error_in * math.exp(-par[LAMBDA] * h) + 0.01 * left + floor
+                    error_in * math.exp(-par[LAMBDA] * h) + 0.01 * left + layer + floor
                 )
                 if keep_1:
                     step_rows = more_rows(step_rows, counts[ROWS_1])
@@ -264,7 +295,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if integrate:
                     above_threshold(a, s, h, V0, p, par, fires)
                     u, width = 0.0, 1.0
-                    Q_error_y = error_in + 0.05 * left + floor
+                    Q_error_y = error_in + 0.05 * left + layer + floor
                     while u < 1.0:
                         if width < 1.0:
                             x = 2.0 * u - 1.0

@@ -5,7 +5,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from tactile_lab.model.campaign import compare, random_case
+from tactile_lab.model.campaign import Case, compare, random_case
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.compare.extremes import grazing
 from tactile_lab.model.reference import constant_firing, reference
@@ -66,6 +66,17 @@ def test_errors_are_near_machine_precision(circuit, force, until, start):
     assert spike_time < 2e-14
     assert V_C1 < 1e-12
     assert V_C2 < 1e-10
+
+
+@pytest.mark.parametrize("V_C1", [0.0, 0.1, 0.3, 0.4])
+def test_a_change_over_before_the_first_node_is_in_the_estimate(V_C1):
+    # exp(-V_C1/V_T) vanishes within 0.2 ms, a two-hundredth of the first step
+    case = Case(
+        0, Circuit(C1=4e-9), Waveform.constant(0), 0.03,
+        Start(V_P=-0.15, V_C1=V_C1, V_C2=0.3), 1e-9,
+    )  # fmt: skip
+    comparison = compare(case)
+    assert comparison.honest, comparison
 
 
 @pytest.mark.parametrize(
