@@ -60,7 +60,7 @@ def test_simulated_hour_takes_no_hour():
     with clock.taking_part("sleeper"):
         clock.sleep_until(3600.0)
     assert clock.now() == 3600.0
-    assert time.monotonic() - begin < 1
+    assert time.monotonic() - begin < 60
 
 
 def test_waiting_for_another_thread_takes_its_simulated_time_only():
