@@ -94,6 +94,7 @@ class Progress:
         self._stream = sys.stderr if stream is None else stream
         self._now = now
         self._began = now()
+        self._first: tuple[float, float] | None = None
         self._drawn = -REDRAW_EVERY
         self._next_line = 0.0
         self._width = 0
@@ -102,6 +103,8 @@ class Progress:
     def update(self, done: float, text: str = "") -> None:
         """`done` of the total is done; `text` says what is happening now."""
         part = min(max(done / self._total, 0.0), 1.0) if self._total > 0 else 1.0
+        if self._first is None:
+            self._first = part, self._now()
         if self._live:
             if self._now() - self._drawn >= REDRAW_EVERY or part == 1.0:
                 self._drawn = self._now()
@@ -127,9 +130,18 @@ class Progress:
 
     def _line(self, part: float, text: str) -> str:
         spent = self._now() - self._began
-        left = f", {_clock(spent * (1 - part) / part)} left" if 0 < part < 1 else ""
+        left = self._time_left(part)
         more = f"  {text}" if text else ""
         return f"{self._label} {part:4.0%}  {_clock(spent)}{left}{more}"
+
+    def _time_left(self, part: float) -> str:
+        # at the pace since the first update: what comes before it (connecting,
+        # compiling) happens once
+        first, when = self._first or (0.0, self._began)
+        if not first < part < 1:
+            return ""
+        pace = (self._now() - when) / (part - first)
+        return f", {_clock(pace * (1 - part))} left"
 
     def _draw(self, part: float, text: str) -> None:
         filled = round(24 * part)

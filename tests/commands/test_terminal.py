@@ -38,6 +38,7 @@ def test_piped_progress_is_a_plain_line_per_tenth():
 def test_progress_on_a_terminal_redraws_one_line_with_the_time_left():
     stream, watch = Terminal(), Watch()
     with Progress(10.0, "demo", stream, watch) as progress:
+        progress.update(0.0)
         watch.time = 30.0
         progress.update(5.0, "120 mN")
         shown = stream.getvalue()
@@ -45,6 +46,18 @@ def test_progress_on_a_terminal_redraws_one_line_with_the_time_left():
         assert "120 mN" in shown
         assert "\n" not in shown
     assert stream.getvalue().endswith("\r")
+
+
+def test_what_happens_once_before_the_first_update_is_not_taken_for_the_pace():
+    stream, watch = io.StringIO(), Watch()
+    progress = Progress(10.0, "demo", stream, watch)
+    watch.time = 13.0
+    progress.update(0.1)
+    watch.time = 14.0
+    progress.update(5.05)
+    first, second = stream.getvalue().splitlines()
+    assert "left" not in first
+    assert "1 s left" in second
 
 
 def test_redraws_are_few():
