@@ -17,7 +17,7 @@ LONGEST_RAMP = 0.5
 """Longest time the steps of a ramp may add up to, s; a larger current ramps faster."""
 
 SHORTEST_REST, LONGEST_REST = 0.005, 0.2
-"""Time between an answer and the next step of a ramp, s; the guard wants a heartbeat."""
+"""Time from an answer to the next step of a ramp, s; the guard wants a heartbeat."""
 
 VERIFICATIONS = 3
 """Times the safe state is commanded and read back before giving up."""

@@ -7,11 +7,12 @@ from typing import ClassVar
 from pydantic import Field
 
 from tactile_lab.quantity import Duration, Force, Pause
-from tactile_lab.trial import Protocol, Trial, Trials
-from tactile_lab.waveform import Waveform
+from tactile_lab.stimulus.force import step
+from tactile_lab.stimulus.levels import Levels
+from tactile_lab.trial import Trials
 
 
-class Bipolar(Protocol):
+class Bipolar(Levels):
     """Forces of both signs: I_DS rises with one and falls with the other (Fig. 2c)."""
 
     name: ClassVar[str] = "bipolar"
@@ -25,14 +26,7 @@ class Bipolar(Protocol):
     hold: Duration = Field(default=5.0, description="Time at each level")
     rest: Pause = Field(default=5.0, description="Time at no force after each")
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial per level."""
-        for level in self.levels:
-            yield Trial(
-                force=Waveform.pulse(
-                    level, ramp=self.ramp, hold=self.hold, rest=self.rest
-                ),
-                label=f"{level * 1e3:g} mN".replace("-", "−"),
-                level=level,
-                hold=(self.ramp, self.ramp + self.hold),
-            )
+        for level in self.ordered():
+            yield step(level, ramp=self.ramp, hold=self.hold, rest=self.rest)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from protocols._demagnetise import demagnetising_current
-from tactile_lab.quantity import Duration, Pause, Unit
+from tactile_lab.quantity import Duration, Pause
+from tactile_lab.stimulus.demagnetise import demagnetising
+from tactile_lab.stimulus.force import PushCurrent
 from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
-PushCurrent = Annotated[float, Unit("A", above=0.0)]
 BEYOND = 1.2
 """The current turns so far outside the range that both branches are settled in it."""
 RAMP = 0.5
@@ -42,7 +42,7 @@ class CalibrateField(Protocol):
     def trials(self) -> Trials:
         """Pauses for preparation, then one trial per step."""
         turn = BEYOND * self.most
-        yield self._move("demagnetise", demagnetising_current(turn))
+        yield demagnetising(turn)
         quarter = 2.0
         loop = Waveform(
             np.array([0.0, 1.0, 3.0, 4.0]) * quarter, np.array([0.0, turn, -turn, 0.0])

@@ -6,13 +6,12 @@ from typing import ClassVar
 
 from pydantic import Field, model_validator
 
-from protocols._recovery import Recovering, pause
-from tactile_lab.quantity import Duration, Force, Pause, show
-from tactile_lab.trial import Trial, Trials
-from tactile_lab.waveform import Waveform
+from tactile_lab.quantity import Duration, Force, Pause
+from tactile_lab.stimulus.force import ForceProtocol, pause, step
+from tactile_lab.trial import Trials
 
 
-class ForceCheck(Recovering):
+class ForceCheck(ForceProtocol):
     """Some forces by Eq. (2), held long enough to read a balance or a deflection.
 
     Enter what was read in `readings`, one per level, to have them compared; the force
@@ -43,14 +42,9 @@ class ForceCheck(Recovering):
             )
         return self
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial per level."""
         for level in self.levels:
-            yield Trial(
-                force=Waveform.pulse(level, ramp=self.ramp, hold=self.hold),
-                label=show(level, "N"),
-                level=level,
-                hold=(self.ramp, self.ramp + self.hold),
-            )
+            yield step(level, ramp=self.ramp, hold=self.hold)
             if self.gap > 0:
                 yield pause(self.gap)

@@ -6,12 +6,13 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from tactile_lab.quantity import Duration, Force, Pause
-from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
 
-class Hold(Protocol):
+class Hold(ForceProtocol):
     """A force ramped up and held for long (Fig. 4e, 5b, 5c)."""
 
     name: ClassVar[str] = "hold"
@@ -23,7 +24,7 @@ class Hold(Protocol):
     before: Pause = Field(default=0.0, description="Time at no force before the ramp")
     rest: Pause = Field(default=2.0, description="Time at no force afterwards")
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial."""
         pulse = Waveform.pulse(
             self.level, ramp=self.ramp, hold=self.hold, rest=self.rest
@@ -34,7 +35,7 @@ class Hold(Protocol):
             pulse = quiet.then(pulse)
         yield Trial(
             force=pulse,
-            label=f"{self.level * 1e3:g} mN",
+            label=show(self.level, "N"),
             level=self.level,
             hold=(begin, begin + self.hold),
         )

@@ -7,11 +7,12 @@ from typing import ClassVar
 from pydantic import Field
 
 from tactile_lab.quantity import Duration, Force, Pause
-from tactile_lab.trial import Protocol, Trial, Trials
-from tactile_lab.waveform import Waveform
+from tactile_lab.stimulus.force import step
+from tactile_lab.stimulus.levels import Levels
+from tactile_lab.trial import Trials
 
 
-class Pulses(Protocol):
+class Pulses(Levels):
     """One pulse per level, each followed by a rest at no force (Fig. 4a-c)."""
 
     name: ClassVar[str] = "pulses"
@@ -24,14 +25,7 @@ class Pulses(Protocol):
     hold: Duration = Field(default=2.0, description="Time at each level")
     rest: Pause = Field(default=2.0, description="Time at no force after each pulse")
 
-    def trials(self) -> Trials:
-        """One trial per level, in the order given."""
-        for level in self.levels:
-            yield Trial(
-                force=Waveform.pulse(
-                    level, ramp=self.ramp, hold=self.hold, rest=self.rest
-                ),
-                label=f"{level * 1e3:g} mN",
-                level=level,
-                hold=(self.ramp, self.ramp + self.hold),
-            )
+    def presentations(self) -> Trials:
+        """One trial per level."""
+        for level in self.ordered():
+            yield step(level, ramp=self.ramp, hold=self.hold, rest=self.rest)

@@ -6,12 +6,14 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from protocols._levels import Levels
-from tactile_lab.quantity import Duration, Force
+from tactile_lab.quantity import Duration, Force, Pause
+from tactile_lab.stimulus.force import step
+from tactile_lab.stimulus.levels import Levels
+from tactile_lab.stimulus.recovery import Recovering, first_rest
 from tactile_lab.trial import Trials
 
 
-class RateForce(Levels):
+class RateForce(Recovering, Levels):
     """The highest rate of a step from rest, per force (Fig. 4d), and its onset.
 
     A staircase would not do: V_P is a high-pass of force, so each step of a staircase
@@ -26,8 +28,15 @@ class RateForce(Levels):
         min_length=1,
         description="Force of each step",
     )
+    ramp: Pause = Field(default=0.25, description="Ramp up and ramp down, each")
     hold: Duration = Field(default=1.0, description="Time at each level")
 
-    def trials(self) -> Trials:
-        """One step per level."""
-        yield from self.steps()
+    def presentations(self) -> Trials:
+        """One step per level, recovery after each but the last."""
+        first, levels = None, self.ordered()
+        for number, level in enumerate(levels):
+            outcome = yield step(level, ramp=self.ramp, hold=self.hold)
+            if number == 0:
+                first = first_rest(outcome)
+            if number + 1 < len(levels):
+                yield from self.recover(level, first)

@@ -7,11 +7,11 @@ from typing import ClassVar
 from pydantic import Field
 
 from tactile_lab.quantity import Duration, Force, Pause
-from tactile_lab.trial import Protocol, Trial, Trials
-from tactile_lab.waveform import Waveform
+from tactile_lab.stimulus.force import ForceProtocol, step
+from tactile_lab.trial import Trials
 
 
-class Repeat(Protocol):
+class Repeat(ForceProtocol):
     """Successive equal presentations (Fig. 1d, 5d right)."""
 
     name: ClassVar[str] = "repeat"
@@ -23,14 +23,13 @@ class Repeat(Protocol):
     hold: Duration = Field(default=1.0, description="Time at the level")
     gap: Pause = Field(default=1.0, description="Time at no force after each")
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial per presentation."""
         for number in range(self.count):
-            yield Trial(
-                force=Waveform.pulse(
-                    self.level, ramp=self.ramp, hold=self.hold, rest=self.gap
-                ),
+            yield step(
+                self.level,
+                ramp=self.ramp,
+                hold=self.hold,
+                rest=self.gap,
                 label=f"no. {number + 1}",
-                level=self.level,
-                hold=(self.ramp, self.ramp + self.hold),
             )

@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tactile_lab.quantity import Force, Pause, Unit
-from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
 Frequency = Annotated[float, Unit("Hz", above=0.0)]
@@ -18,7 +19,7 @@ POINTS = 24
 """Straight pieces a cycle is drawn with: within 0.9 % of a sine."""
 
 
-class SineSweep(Protocol):
+class SineSweep(ForceProtocol):
     """A sine force at each of some frequencies, with whole cycles of each.
 
     A source that is set over a serial line follows about 1/20 of its update rate; the
@@ -50,7 +51,7 @@ class SineSweep(Protocol):
         """The frequencies, evenly spaced on a logarithmic scale, Hz."""
         return [float(f) for f in np.geomspace(self.lowest, self.highest, self.count)]
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial per frequency."""
         last = 0.0
         for frequency in self.frequencies():

@@ -6,12 +6,16 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from tactile_lab.quantity import Duration, Force, Pause
-from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.stimulus.levels import Levels
+from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
+RETURN = 0.25
+"""Shortest ramp back to no force, s."""
 
-class Staircase(Protocol):
+
+class Staircase(Levels):
     """Forces one after another without a return to rest.
 
     This is not the rate-force curve of Fig. 4d: V_P is a high-pass of force (tau is
@@ -30,16 +34,21 @@ class Staircase(Protocol):
     ramp: Pause = Field(default=0.25, description="Ramp from step to step")
     hold: Duration = Field(default=2.0, description="Time on each step")
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial per step; the coil holds between trials."""
         last = 0.0
-        for level in self.levels:
+        for level in self.ordered():
             end = self.ramp + self.hold
             points = [(0.0, last), (self.ramp, level), (end, level)]
             yield Trial(
                 force=Waveform.through(points),
-                label=f"{level * 1e3:g} mN",
+                label=show(level, "N"),
                 level=level,
                 hold=(self.ramp, end),
             )
             last = level
+        if last != 0:
+            yield Trial(
+                force=Waveform.through([(0.0, last), (max(self.ramp, RETURN), 0.0)]),
+                label="back to rest",
+            )

@@ -6,11 +6,11 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
-from protocols._recovery import Recovering, first_rest
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import Duration, Pause, Unit, show
+from tactile_lab.stimulus.force import step
+from tactile_lab.stimulus.recovery import Recovering, first_rest
 from tactile_lab.trial import Outcome, Trial, Trials
-from tactile_lab.waveform import Waveform
 
 PushForce = Annotated[float, Unit("N", least=0.0)]
 Resolution = Annotated[float, Unit("N", above=0.0)]
@@ -40,11 +40,11 @@ class ThresholdSearch(Recovering):
             )
         return self
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """First `high`, then `low`, then halves of what is left.
 
         Raises:
-            LimitError: `high` stays silent, `low` fires, or V_C1 drifted.
+            LimitError: `high` stays silent, or `low` fires.
         """
         outcome = yield self._step(self.high)
         first = first_rest(outcome)
@@ -68,12 +68,7 @@ class ThresholdSearch(Recovering):
             low, high = (low, last) if fired(outcome) else (last, high)
 
     def _step(self, level: float) -> Trial:
-        return Trial(
-            force=Waveform.pulse(level, ramp=self.ramp, hold=self.hold),
-            label=show(level, "N"),
-            level=level,
-            hold=(self.ramp, self.ramp + self.hold),
-        )
+        return step(level, ramp=self.ramp, hold=self.hold)
 
 
 def fired(outcome: Outcome) -> bool:

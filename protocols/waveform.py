@@ -11,11 +11,12 @@ from pydantic import Field
 from tactile_lab.errors import SceneError
 from tactile_lab.quantity import Duration
 from tactile_lab.scene.columns import read_columns
-from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
 
-class ForceTable(Protocol):
+class ForceTable(ForceProtocol):
     """The force of a CSV file, ``time_s,force_N``: linear between rows.
 
     The same time twice is a jump. The force is held before the first row and after the
@@ -30,7 +31,7 @@ class ForceTable(Protocol):
         default=None, description="Length; the last row's time unless given"
     )
 
-    def trials(self) -> Trials:
+    def presentations(self) -> Trials:
         """One trial: the whole table."""
         force = read_force(Path(self.file))
         length = force.end if self.duration is None else self.duration
@@ -50,7 +51,7 @@ class ForceTable(Protocol):
         placed = self.model_copy(
             update={"file": str((Path(folder) / self.file).resolve())}
         )
-        next(placed.trials())
+        next(placed.presentations())
         return placed
 
 

@@ -57,6 +57,9 @@ class Outcome:
         rest: mean of each measured signal just before the trial, by name.
         traces: decimated measured signals by name: shape (n, 2), s and SI unit.
         skipped: coil set-points that were skipped because they came too late.
+        drift: change of the rest V_C1 since the first trial that looked at it, V, less
+            what the film still remembers of the forces; None where V_C1 is not
+            measured. It is stored with the trial, as is the rest V_C1 itself.
     """
 
     trial: Trial
@@ -67,6 +70,7 @@ class Outcome:
     rest: dict[str, float] = field(default_factory=dict)
     traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     skipped: int = 0
+    drift: float | None = None
 
 
 Trials = Generator[Trial, Outcome, None]
@@ -94,6 +98,10 @@ class Protocol(BaseModel):
     def trials(self) -> Trials:
         """Yield trials; each ``yield`` returns that trial's outcome."""
         raise NotImplementedError
+
+    def wishes(self) -> tuple[str, ...]:
+        """Signals acquired where the bench has them, and missed without complaint."""
+        return ()
 
     def located(self, folder: Any) -> Protocol:
         """The same protocol with file parameters resolved against `folder` (a Path)."""

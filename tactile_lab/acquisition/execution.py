@@ -19,6 +19,7 @@ from typing import Any
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.detection import Detection
+from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.environment import environment
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.runner import Runner
@@ -31,6 +32,7 @@ from tactile_lab.plan.limited import limited
 from tactile_lab.plan.plan import plan
 from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
+from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate
 from tactile_lab.store.folder import RunFolder, Status
 from tactile_lab.store.layout import Layout
@@ -231,7 +233,15 @@ class Execution:
             detector=lambda stream: detector_of(_found(self._detection(stream))),
             current_for=self._current_for,
             expected=self.plan.estimate.duration,
+            drift=self._drift(),
         )
+
+    def _drift(self) -> Drift | None:
+        scene = self.scene
+        if not isinstance(scene.protocol, ForceProtocol):
+            return None
+        force_for = scene.bench.magnet.force_for
+        return Drift(scene.circuit, force_for, scene.protocol.drift_limit)
 
     def _detection(self, stream: Stream | None) -> Detection | None:
         """The scene's detection in codes of the stream."""

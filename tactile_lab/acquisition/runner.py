@@ -126,6 +126,7 @@ class Runner:
     def _play(self, index: int, trial: Trial) -> Outcome:
         """Play one trial while everything streams."""
         rest = self._live.levels(self.intake.reached - BASELINE, self.intake.reached)
+        drift = self._drifted(rest)
         begin, start = self._begin(index, trial)
         end = begin + trial.length
         skipped = self._play_current(trial, begin, end)
@@ -154,7 +155,19 @@ class Runner:
             rest=rest,
             traces=self._live.traces(start, start + trial.length),
             skipped=0 if coil is None else coil.skipped - skipped,
+            drift=drift,
         )
+
+    def _drifted(self, rest: dict[str, float]) -> float | None:
+        """Drift of V_C1 at rest, V; None where it is not measured or does not matter.
+
+        Raises:
+            LimitError: beyond the protocol's limit.
+        """
+        watch = self._task.drift
+        if watch is None or "V_C1" not in rest:
+            return None
+        return watch.before(rest["V_C1"], self._account.now)
 
     def _pause(self, index: int, trial: Trial) -> Outcome:
         """A planned recovery: the coil holds, nothing is streamed or stored."""
@@ -188,6 +201,8 @@ class Runner:
         before = coil.last.setpoint if coil.last is not None else 0.0
         interval = coil.coil.update_interval
         current = self._task.current_for(trial, interval, before)
+        if self._task.drift is not None:
+            self._task.drift.plays(current, self._account.axis(begin))
         coil.play(current.shifted(begin), end)
         return coil.skipped
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.intake import OnlineDetector
 from tactile_lab.bench import Channel, OffReport, Stream
@@ -24,6 +25,7 @@ class Task:
         detector: makes a detector for a running stream.
         current_for: coil current, A(t), that gives a trial's force within all limits,
             told the time between two set-points, s, and the last set-point, A.
+        drift: judges V_C1 at rest before each trial; None where no trial pushes.
         expected: run time expected, s; None if it depends on outcomes.
     """
 
@@ -34,6 +36,7 @@ class Task:
     detector: Callable[[Stream], OnlineDetector]
     current_for: Callable[[Trial, float, float], Waveform]
     expected: float | None
+    drift: Drift | None = None
 
 
 @dataclass(frozen=True)

@@ -7,4 +7,14 @@ from tactile_lab.scene.scene import Scene
 
 def asked_signals(scene: Scene) -> frozenset[str]:
     """What the scene records and what its protocol looks at."""
-    return frozenset(scene.record.signals) | frozenset(scene.protocol.needs)
+    wished = {name for name in scene.protocol.wishes() if _at_hand(scene, name)}
+    return frozenset(scene.record.signals) | frozenset(scene.protocol.needs) | wished
+
+
+def _at_hand(scene: Scene, signal: str) -> bool:
+    """Whether the bench measures that signal."""
+    bench = scene.bench
+    wired = bench.scope is not None and signal in {
+        channel.signal for channel in bench.scope.channels
+    }
+    return wired or (signal == "field" and bench.field_meter is not None)

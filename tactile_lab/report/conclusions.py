@@ -21,6 +21,7 @@ from tactile_lab.report.bench_conclusions import (
     wiring_check,
 )
 from tactile_lab.report.conclusion import Conclusion
+from tactile_lab.report.preparation import force_at_zero
 from tactile_lab.report.run_data import RunData, Trace
 from tactile_lab.report.sweep import sine_sweep
 from tactile_lab.report.trial_finding import TrialFinding
@@ -37,9 +38,11 @@ NO_UNCERTAINTY = (
 def conclude(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """The conclusion of the run's protocol; an empty one where it has none."""
     how = _BY_PROTOCOL.get(run.protocol)
-    if how is None or not trials:
-        return Conclusion()
-    return how(run, trials)
+    own = Conclusion() if how is None or not trials else how(run, trials)
+    before = force_at_zero(run)
+    return Conclusion(
+        (*own.sentences, *before.sentences), {**own.values, **before.values}
+    )
 
 
 def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:

@@ -27,7 +27,6 @@ class Findings:
         trials: one finding per trial that is no pause.
         notes: statements on derived quantities, one sentence each.
         conclusion: what the protocol was run for.
-        rest: mean V_C1 in the 0.1 s before each of `trials`, V, or None.
         twin: the model beside the run, or None.
     """
 
@@ -35,12 +34,7 @@ class Findings:
     trials: tuple[TrialFinding, ...]
     notes: tuple[str, ...]
     conclusion: Conclusion
-    rest: tuple[float | None, ...]
     twin: Twin | None
-
-
-BEFORE = 0.1
-"""Time before a trial that counts as rest, s."""
 
 
 def find(run: RunData) -> Findings:
@@ -69,22 +63,8 @@ def find(run: RunData) -> Findings:
         trials=trials,
         notes=notes,
         conclusion=conclusion,
-        rest=_rest(run, trials),
         twin=beside,
     )
-
-
-def _rest(run: RunData, trials: Sequence[TrialFinding]) -> tuple[float | None, ...]:
-    trace = run.trace("V_C1")
-    found: list[float | None] = []
-    for finding in trials:
-        start = finding.trial.start
-        value = None
-        if trace is not None:
-            before = (trace.time >= start - BEFORE) & (trace.time <= start)
-            value = float(trace.mean[before].mean()) if before.any() else None
-        found.append(value)
-    return tuple(found)
 
 
 def _shown(trials: Sequence[TrialData]) -> list[TrialData]:

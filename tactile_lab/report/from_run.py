@@ -56,6 +56,7 @@ def read(folder: Path) -> RunData:
             field=_field(run),
             force_uncertainty=uncertainty,
             field_per_ampere=_field_per_ampere(scene),
+            newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
             traces=tuple(_trace(run, name) for name in run.signals),
             circuit=scene.circuit,
             searched=bool({"V_K", "spikes", "rate"} & set(scene.record.signals)),
@@ -84,7 +85,16 @@ def _trial(row: Any, spikes: NDArray[np.float64], onset: float) -> TrialData:
         onset=onset,
         hold=None if np.isnan(held[0]) else held,
         pause=bool(row["pause"]),
+        rest=_number(row, "rest_V_C1"),
+        drift=_number(row, "drift_V_C1"),
     )
+
+
+def _number(row: Any, name: str) -> float | None:
+    """A column of a trial that older runs lack and that may be empty."""
+    if name not in (row.dtype.names or ()) or np.isnan(row[name]):
+        return None
+    return float(row[name])
 
 
 def _trace(run: Run, name: str) -> Trace:

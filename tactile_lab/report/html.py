@@ -167,7 +167,7 @@ def _cropped(match: re.Match[str]) -> str:
 
 def _drift(findings: Findings) -> str:
     """Rest V_C1 before every trial, where each starts from rest."""
-    rest = [r for r in findings.rest if r is not None]
+    rest = [t.trial.rest for t in findings.trials if t.trial.rest is not None]
     if len(rest) < 2 or not any(t.pause for t in findings.run.trials):
         return ""
     shown = ", ".join(show(r, "V") for r in rest)

@@ -32,10 +32,7 @@ def results(findings: Findings) -> dict[str, Any]:
         "took_s": run.took,
         "force_uncertainty_N_95": run.force_uncertainty,
         "spikes": sum(t.response.spikes for t in findings.trials),
-        "trials": [
-            _trial(t, rest)
-            for t, rest in zip(findings.trials, findings.rest, strict=True)
-        ],
+        "trials": [_trial(t) for t in findings.trials],
         "loss": None
         if loss is None
         else {
@@ -62,7 +59,7 @@ def as_json(findings: Findings) -> str:
     return text + "\n"
 
 
-def _trial(finding: TrialFinding, rest: float | None) -> dict[str, Any]:
+def _trial(finding: TrialFinding) -> dict[str, Any]:
     trial, response = finding.trial, finding.response
     return {
         "label": trial.label,
@@ -70,7 +67,8 @@ def _trial(finding: TrialFinding, rest: float | None) -> dict[str, Any]:
         "start_s": trial.start,
         "duration_s": trial.duration,
         "hold_s": None if trial.hold is None else list(trial.hold),
-        "rest_V_C1_V": rest,
+        "rest_V_C1_V": trial.rest,
+        "drift_V": trial.drift,
         "spikes": response.spikes,
         "spike_times_s": [float(t) for t in trial.spike_times],
         "latency_s": response.latency,

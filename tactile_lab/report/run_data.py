@@ -33,6 +33,9 @@ class TrialData:
         onset: when the stimulus begins, s from the trial's start.
         hold: (start, end) of the constant part, s from the trial's start, or None.
         pause: a planned recovery; listed nowhere but in the time axis.
+        rest: V_C1 just before the trial, V, or None.
+        drift: change of that since the first trial, V, less what the film still
+            remembers of the forces; None where it was not judged.
     """
 
     label: str
@@ -43,6 +46,8 @@ class TrialData:
     onset: float = 0.0
     hold: tuple[float, float] | None = None
     pause: bool = False
+    rest: float | None = None
+    drift: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,6 +119,7 @@ class RunData:
         force_uncertainty: half of the 95 % band of a force by the calibration, N; None
             where none is stated.
         field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
+        newtons_per_tesla: force over B2 by Eq. (2), N/T, or None.
         field: teslameter readings, shape (m, 2), s and T, or None.
         traces: decimated signals; I_DS is derived from V_C1 where it is missing.
         circuit: the sensor as it is believed to be, to compare with, or None.
@@ -145,6 +151,7 @@ class RunData:
     current: FloatArray | None = None
     force_uncertainty: float | None = None
     field_per_ampere: float | None = None
+    newtons_per_tesla: float | None = None
     field: FloatArray | None = None
     traces: tuple[Trace, ...] = ()
     circuit: Circuit | None = None
@@ -159,6 +166,18 @@ class RunData:
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
     calibration: Mapping[str, str] = dataclasses.field(default_factory=dict)
     environment: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def field_between(self, start: float, end: float) -> FloatArray:
+        """Field read in [start, end] s of run time, T; empty where none was."""
+        trace = self.trace("field")
+        if self.field is not None and len(self.field):
+            time, value = self.field.T
+        elif trace is not None:
+            time, value = trace.time, trace.mean
+        else:
+            return np.empty(0)
+        found: FloatArray = value[(time >= start) & (time <= end)]
+        return found
 
     def trace(self, signal: str, *, model: bool = False) -> Trace | None:
         """The measured or derived trace of `signal`, or the model's; None if none."""

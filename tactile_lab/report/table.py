@@ -66,14 +66,14 @@ def table(findings: Findings) -> Table:
 def _without_spikes(findings: Findings) -> Table:
     """Trials of a run whose V_K nobody asked for."""
     rows = []
-    for finding, rest in zip(findings.trials, findings.rest, strict=True):
+    for finding in findings.trials:
         trial = finding.trial
         rows.append(
             (
                 trial.label,
                 show(trial.start, "s"),
                 show(trial.duration, "s"),
-                _shown(rest, "V", 4),
+                _shown(trial.rest, "V", 4),
             )
         )
     return Table(("Trial", "Start", "Length", "V_C1 before"), tuple(rows))

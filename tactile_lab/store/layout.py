@@ -56,6 +56,7 @@ RECORDS = {
             ("index", "u4"), ("start", "f8"), ("end", "f8"), ("level", "f8"),
             ("hold_start", "f8"), ("hold_end", "f8"), ("spikes", "u4"),
             ("skipped", "u4"), ("pause", "u1"), ("label", "S48"),
+            ("rest_V_C1", "f8"), ("drift_V_C1", "f8"),
         ]
     ),
     "pauses": np.dtype([("start", "f8"), ("end", "f8")]),
@@ -69,7 +70,8 @@ UNITS = {
     "spikes": "sample: sample, time: s, amplitude: code, width: sample",
     "current": "time: s, setpoint: A, measured: A",
     "field": "time: s, field: T",
-    "trials": "start: s, end: s, level: N, hold_start: s, hold_end: s",
+    "trials": "start: s, end: s, level: N, hold_start: s, hold_end: s, "
+    "rest_V_C1: V, drift_V_C1: V",
     "pauses": "start: s, end: s",
     "events": "time: s",
 }

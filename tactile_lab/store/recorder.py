@@ -148,13 +148,19 @@ class Recorder:
         spikes: int = 0,
         skipped: int = 0,
         pause: bool = False,
+        rest: float = math.nan,
+        drift: float | None = None,
     ) -> None:
-        """Store a trial's place in the run, s, and level, N; see `trial.Trial`."""
+        """Store a trial's place in the run, s, and level, N; see `trial.Trial`.
+
+        `rest` is V_C1 just before it, V; for `drift` see `trial.Outcome`.
+        """
         held = hold or (math.nan, math.nan)
         force = math.nan if level is None else level
         self._records["trials"].append(
-            index, start, end, force, *held, spikes, skipped, pause, _fixed(label, 48)
-        )
+            index, start, end, force, *held, spikes, skipped, pause, _fixed(label, 48),
+            rest, math.nan if drift is None else drift,
+        )  # fmt: skip
         self.tick()
 
     def outcome(self, outcome: Outcome) -> None:
@@ -170,6 +176,8 @@ class Recorder:
             spikes=outcome.spike_times.size,
             skipped=outcome.skipped,
             pause=trial.pause,
+            rest=outcome.rest.get("V_C1", math.nan),
+            drift=outcome.drift,
         )
 
     def pause(self, start: float, end: float) -> None:

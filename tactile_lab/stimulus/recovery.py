@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
-from tactile_lab.errors import LimitError
-from tactile_lab.quantity import Duration, Unit, show
-from tactile_lab.trial import Outcome, Protocol, Trial
+from tactile_lab.quantity import Duration, Unit
+from tactile_lab.stimulus.force import ForceProtocol, SmallVoltage, Steps, pause
+from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 
-Steps = Generator[Trial, Outcome, None]
-SmallVoltage = Annotated[float, Unit("V", above=0.0)]
 PerForce = Annotated[float, Unit("V/N", above=0.0)]
 
 MOST_EXTENSIONS = 6
@@ -24,7 +20,7 @@ LOOK = 0.2
 """Time the bench streams to look at V_C1 before it goes on, s."""
 
 
-class Recovering(Protocol):
+class Recovering(ForceProtocol):
     """A protocol whose trials each start from rest.
 
     After a force F the recovery lasts tau ln(k_F |F| / residual): about 50 s after
@@ -40,10 +36,8 @@ class Recovering(Protocol):
         default=1e-3, description="V_P that may be left when the next trial starts"
     )
     settled: SmallVoltage = Field(
-        default=20e-3, description="How near V_C1 must be to its first rest value"
-    )
-    drift_limit: SmallVoltage = Field(
-        default=0.2, description="Drift of V_C1 at rest that ends the run"
+        default=20e-3,
+        description="How near V_C1 must be to its first rest value: about one code",
     )
 
     def recovery_time(self, force: float) -> float:
@@ -55,8 +49,7 @@ class Recovering(Protocol):
     def recover(self, force: float, first: float | None) -> Steps:
         """Pauses after `force` N until V_C1 is back at `first` V (None: not looked at).
 
-        Raises:
-            LimitError: V_C1 at rest has drifted beyond the limit.
+        A V_C1 that never comes back has drifted; the run judges that before each trial.
         """
         yield pause(self.recovery_time(force))
         if first is None:
@@ -65,23 +58,9 @@ class Recovering(Protocol):
             seen = yield Trial(
                 force=Waveform.constant(0.0), duration=LOOK, label="look at rest"
             )
-            off = resting(seen) - first
-            if abs(off) <= self.settled:
+            if not abs(resting(seen) - first) > self.settled:
                 return
             yield pause(self.tau)
-        if abs(off) > self.drift_limit:
-            raise LimitError(
-                f"V_C1 at rest has drifted by {show(off, 'V')} since the first trial; "
-                f"{show(self.drift_limit, 'V')} is the limit. Check V_GS, the supply "
-                "and the temperature, or raise protocol.drift_limit."
-            )
-
-
-def pause(seconds: float) -> Trial:
-    """A planned pause without force, neither streamed nor stored."""
-    return Trial(
-        force=Waveform.constant(0.0), duration=seconds, label="recovery", pause=True
-    )
 
 
 def resting(outcome: Outcome) -> float:
@@ -92,4 +71,4 @@ def resting(outcome: Outcome) -> float:
 def first_rest(outcome: Outcome) -> float | None:
     """V_C1 before the first trial, to compare the later ones with, or None."""
     value = resting(outcome)
-    return None if np.isnan(value) else value
+    return None if math.isnan(value) else value

@@ -1,0 +1,82 @@
+"""Has V_C1 at rest drifted? Asked before every trial that pushes the sensor.
+
+V_P is a high-pass of force: after a push the film remembers it for some time, and V_C1
+is off its rest by as much. That part is computed from the played current and taken out,
+so a protocol without recoveries is judged like one with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tactile_lab.errors import LimitError
+from tactile_lab.model.circuit import V_P, Circuit, rest_V_C1
+from tactile_lab.quantity import show
+from tactile_lab.waveform import Waveform
+
+NOTHING = 1e-6
+"""A force below this is none, N."""
+STILL = 0.25
+"""Time without force after which V_C1 counts as at rest, s: the coil may be late."""
+
+
+class Drift:
+    """Compares V_C1 at rest with the first value seen in a run.
+
+    Args:
+        circuit: the sensor, for what the film remembers.
+        force_for: force, N(t), of a coil current, A(t).
+        limit: largest drift, V, either sign.
+    """
+
+    def __init__(
+        self, circuit: Circuit, force_for: Callable[[Waveform], Waveform], limit: float
+    ) -> None:
+        self._circuit = circuit
+        self._force_for = force_for
+        self._limit = limit
+        self._V_P, self._at, self._force = 0.0, 0.0, 0.0
+        self._still = -STILL
+        self._first: float | None = None
+
+    def before(self, V_C1: float, time: float) -> float | None:
+        """The drift, V, of a rest value measured just before run time `time` s.
+
+        None where the sensor was not at rest: under force, or until a moment ago.
+
+        Raises:
+            LimitError: it is beyond the limit.
+        """
+        if abs(self._force) > NOTHING or time < self._still + STILL:
+            return None
+        remembered = V_P(self._circuit, self._V_P, 0.0, max(time - self._at, 0.0))
+        alone = V_C1 - rest_V_C1(self._circuit, remembered)
+        if self._first is None:
+            self._first = alone
+        drift = alone - self._first
+        if abs(drift) > self._limit:
+            raise LimitError(
+                f"V_C1 at rest has drifted by {show(drift, 'V')} since the first "
+                f"trial; {show(self._limit, 'V')} is the limit. Check V_GS, the supply "
+                "and the temperature, or raise protocol.drift_limit."
+            )
+        return drift
+
+    def plays(self, current: Waveform, begin: float) -> None:
+        """The coil plays `current`, A against s from run time `begin` s."""
+        force = self._force_for(current)
+        volts = V_P(self._circuit, self._V_P, 0.0, max(begin - self._at, 0.0))
+        volts += self._circuit.k_F * (float(force.value[0]) - self._force)
+        for start, end, low, high in force.segments():
+            if end > start:
+                slope = (high - low) / (end - start)
+                volts = V_P(self._circuit, volts, slope, end - start)
+            else:
+                volts += self._circuit.k_F * (high - low)
+        moved = np.flatnonzero(np.diff(force.value, prepend=self._force))
+        if moved.size:
+            self._still = begin + float(force.time[moved[-1]])
+        self._V_P, self._at = volts, begin + force.end
+        self._force = float(force.value[-1])

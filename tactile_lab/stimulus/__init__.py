@@ -1,0 +1,1 @@
+"""What force protocols are made of: preparation, levels in an order, recovery."""
