@@ -156,7 +156,7 @@ def table(stack: LaneStack, title: str) -> str:
             columns.append(("spikes_s", source.spikes[first:last]))
             continue
         if lane.kind is Kind.RATE:
-            drawn = rate_of(source.spikes, view.start, view.end)
+            drawn = rate_of(source.spikes, view.start, view.end, 1 << 20)
         else:
             drawn = source.trace(lane.signal, view.start, view.end, CSV_POINTS)
         unit = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}.get(

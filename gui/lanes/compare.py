@@ -139,7 +139,7 @@ class Comparison:
         """One run's trace of a lane, in shown units and on the common time."""
         a, b = start - member.shift, end - member.shift
         if lane.kind is Kind.RATE:
-            found = rate_of(member.source.spikes, a, b)
+            found = rate_of(member.source.spikes, a, b, count)
         else:
             found = member.source.trace(lane.signal, a, b, count)
         found = scaled(found, lane.scale)

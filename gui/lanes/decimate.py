@@ -75,7 +75,8 @@ def columns(rows: FloatArray, count: int, width: float) -> Drawn:
     first = round(float(time[0]) / width) if width > 0 else 0
     offset = (-first) % per
     edges = np.concatenate([[0], np.arange(offset or per, time.size, per)])
-    edges = np.union1d(edges, np.flatnonzero(gap))
+    if np.count_nonzero(gap) > 1:
+        edges = np.union1d(edges, np.flatnonzero(gap))
     counts = np.diff(np.append(edges, time.size))
     return Drawn(
         time[edges],

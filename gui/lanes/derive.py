@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray
+from gui.lanes.decimate import Drawn, FloatArray, line_between
 
 
 def scaled(drawn: Drawn, by: float) -> Drawn:
@@ -21,8 +21,11 @@ def averaged(drawn: Drawn) -> Drawn:
     return Drawn(drawn.time, drawn.mean, drawn.mean, drawn.mean, drawn.gap)
 
 
-def rate_of(spikes: FloatArray, start: float, end: float) -> Drawn:
-    """Instantaneous rate at each spike around [start, end] s; 0 at the first, Hz."""
+def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
+    """Instantaneous rate at each spike around [start, end] s; 0 at the first, Hz.
+
+    More than 4 `count` spikes become about `count` columns.
+    """
     first, last = np.searchsorted(spikes, [start, end])
     first, last = max(0, first - 2), min(spikes.size, last + 1)
     times = spikes[first:last]
@@ -32,7 +35,7 @@ def rate_of(spikes: FloatArray, start: float, end: float) -> Drawn:
     rate[1:] = 1 / np.maximum(np.diff(times), 1e-9)
     if first > 0:
         times, rate = times[1:], rate[1:]
-    return Drawn.line(times, rate)
+    return line_between(times, rate, start, end, count)
 
 
 def difference(measured: Drawn, model: Drawn) -> Drawn:

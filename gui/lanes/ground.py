@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtCore import QLineF, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from gui.lanes import paint
@@ -64,10 +64,11 @@ def ground(
     rows = max(2, int((frame.bottom - frame.top) / 21))
     step = step_of(frame.high - frame.low, rows)
     places = decimals(step)
-    for value in ticks(frame.low, frame.high, rows):
-        y = round(frame.y1(value)) + 0.5
-        painter.setPen(paint.pen(tokens.grid))
-        painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
+    values = ticks(frame.low, frame.high, rows)
+    heights = [round(frame.y1(value)) + 0.5 for value in values]
+    painter.setPen(paint.pen(tokens.grid))
+    painter.drawLines([QLineF(frame.left, y, frame.right, y) for y in heights])
+    for value, y in zip(values, heights, strict=True):
         if frame.top + 1 <= y <= frame.bottom + 1:
             words = number(value, places)
             paint.write(painter, QPointF(AXIS - 8, y), words, tokens.muted, align=1.0)
@@ -81,14 +82,15 @@ def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens, place: Place) ->
     most = max(2, int((frame.right - frame.left) / 90))
     step = step_of(frame.end - frame.start, most)
     places = decimals(step)
-    for value in ticks(frame.start, frame.end, most):
-        x = round(frame.x1(value)) + 0.5
-        painter.setPen(paint.pen(tokens.grid))
-        painter.drawLine(QPointF(x, 0), QPointF(x, frame.bottom + 3))
-        if place.bottom and value >= -1e-12 and x < frame.right - 14:
-            at, words = QPointF(x, frame.bottom + 13), number(value, places)
-            paint.write(painter, at, words, tokens.muted, align=0.5)
+    values = ticks(frame.start, frame.end, most)
+    across = [round(frame.x1(value)) + 0.5 for value in values]
+    painter.setPen(paint.pen(tokens.grid))
+    painter.drawLines([QLineF(x, 0, x, frame.bottom + 3) for x in across])
     if place.bottom:
+        for value, x in zip(values, across, strict=True):
+            if value >= -1e-12 and x < frame.right - 14:
+                at, words = QPointF(x, frame.bottom + 13), number(value, places)
+                paint.write(painter, at, words, tokens.muted, align=0.5)
         painter.setPen(paint.pen(tokens.border_strong))
         y = frame.bottom + 3.5
         painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))

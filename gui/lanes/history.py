@@ -147,9 +147,12 @@ class SlowTrack:
         self._rows[:, self._count] = time, value
         self._count += 1
 
-    def between(self, start: float, end: float, hold: float | None = None) -> Drawn:
+    def between(
+        self, start: float, end: float, count: int, hold: float | None = None
+    ) -> Drawn:
         """The readings around [start, end] s; the last one holds until `hold` s."""
-        rows = self._rows[:, : self._count]
-        if hold is not None and self._count and hold > rows[0, -1]:
+        first = np.searchsorted(self._rows[0, : self._count], start)
+        rows = self._rows[:, max(0, int(first) - 1) : self._count]
+        if hold is not None and rows.size and hold > rows[0, -1]:
             rows = np.concatenate([rows, [[hold], [rows[1, -1]]]], axis=1)
-        return line_between(rows[0], rows[1], start, end, 1 << 14)
+        return line_between(rows[0], rows[1], start, end, count)

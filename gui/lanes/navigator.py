@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import (
@@ -10,6 +12,7 @@ from PySide6.QtGui import (
     QMouseEvent,
     QPainter,
     QPaintEvent,
+    QPixmap,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QWidget
@@ -28,6 +31,9 @@ from gui.look.theme import Theme
 
 HEIGHT = 62
 
+GROWS = 0.2
+"""Seconds between pictures of a run in progress."""
+
 
 class Navigator(QWidget):
     """Force outline and spike rate of the whole run; drag the window, wheel zooms."""
@@ -37,6 +43,9 @@ class Navigator(QWidget):
         self.source: Source = Nothing()
         self._view, self._theme = view, theme
         self._grabbed: tuple[str, float, float, float] | None = None
+        self._run = QPixmap()
+        self._run_of: tuple[object, ...] = ()
+        self._run_until = 0.0
         self.setFixedHeight(HEIGHT)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -51,10 +60,36 @@ class Navigator(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw outline, rate, window and time."""
+        self._keep_run()
         painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._run)
+        frame = self.frame()
+        painter.save()
+        painter.setClipRect(frame.area.adjusted(-1, -4, 1, 4))
+        self._window(painter, frame)
+        painter.restore()
+        if self.hasFocus():
+            painter.setPen(paint.pen(self._theme.tokens.accent))
+            painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+
+    def _keep_run(self) -> None:
+        """Draw the run anew where it differs from the picture; growing, not always."""
+        source, now = self.source, time.monotonic()
+        grown = None if source.running else (source.reach, source.spikes.size)
+        of = (source, grown, self.size(), self.devicePixelRatio(), self._theme.tokens)
+        if of == self._run_of and not (source.running and now > self._run_until):
+            return
+        self._run_of, self._run_until = of, now + GROWS
+        ratio = self.devicePixelRatio()
+        self._run = QPixmap(self.size() * ratio)
+        self._run.setDevicePixelRatio(ratio)
+        painter = QPainter(self._run)
+        self._paint_run(painter, self.frame())
+        painter.end()
+
+    def _paint_run(self, painter: QPainter, frame: Frame) -> None:
         tokens = self._theme.tokens
         painter.fillRect(self.rect(), QColor(tokens.sunken))
-        frame = self.frame()
         painter.setPen(QColor(tokens.text))
         painter.setFont(sized(13, QFont.Weight.DemiBold))
         painter.drawText(12, 24, "Whole run")
@@ -66,7 +101,6 @@ class Navigator(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._force(painter, frame)
         self._rate(painter, frame)
-        self._window(painter, frame)
         painter.restore()
         most = max(2, int((frame.right - frame.left) / 80))
         step = step_of(frame.end, most)
@@ -74,22 +108,20 @@ class Navigator(QWidget):
             at = QPointF(frame.x1(value), frame.bottom + 11)
             words = number(value, decimals(step))
             paint.write(painter, at, words, tokens.muted, align=0.5)
-        if self.hasFocus():
-            painter.setPen(paint.pen(tokens.accent))
-            painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
 
     def _force(self, painter: QPainter, frame: Frame) -> None:
         tokens, source = self._theme.tokens, self.source
         count = max(50, int(frame.right - frame.left))
         measured = source.trace("force", 0.0, source.length, count)
-        time, force = source.planned(0.0, source.length)
+        planned, force = source.planned(0.0, source.length)
         peak = max(
             [1e-12, *np.abs(force[:1]), float(np.abs(force).max(initial=0.0))]
             + ([] if measured.empty else [abs(v) for v in measured.extent or ()])
         )
         if force.size > 1:
             y = frame.y(np.abs(force) / peak)
-            paint.polyline(painter, frame.x(time), y, paint.pen(tokens.border_strong))
+            line = paint.pen(tokens.border_strong)
+            paint.polyline(painter, frame.x(planned), y, line)
         if measured.empty:
             return
         colour = QColor(tokens.force)
@@ -105,12 +137,11 @@ class Navigator(QWidget):
         paint.trace(painter, frame, shown, paint.pen(tokens.force))
 
     def _rate(self, painter: QPainter, frame: Frame) -> None:
-        rate = rate_of(self.source.spikes, 0.0, self.source.length)
+        rate = rate_of(self.source.spikes, 0.0, self.source.length, 400)
         if rate.empty:
             return
         top = max(float(rate.high.max()), 1e-9) * 1.1
-        keep = slice(None, None, max(1, rate.time.size // 400))
-        x, y = frame.x(rate.time[keep]), frame.y(rate.low[keep] / top)
+        x, y = frame.x(rate.time), frame.y(rate.high / top)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(self._theme.tokens.rate))
         points = zip(x.tolist(), y.tolist(), strict=True)
@@ -124,7 +155,6 @@ class Navigator(QWidget):
         soft.setAlpha(36)
         box = QRectF(left, 2, max(right - left, 3), frame.bottom)
         painter.fillRect(box, soft)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.fillRect(QRectF(box.left(), 2, 2, frame.bottom), accent)
         painter.fillRect(QRectF(box.right() - 2, 2, 2, frame.bottom), accent)
 

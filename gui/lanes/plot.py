@@ -101,8 +101,8 @@ class LanePainter:
         if lane.kind is Kind.RATE:
             twin = none
             if self.options.twin:
-                twin = scaled(rate_of(source.twin_spikes, start, end), lane.scale)
-            return rate_of(source.spikes, start, end), twin
+                twin = rate_of(source.twin_spikes, start, end, count)
+            return rate_of(source.spikes, start, end, count), twin
         measured = source.trace(lane.signal, start, end, count)
         if lane.kind is Kind.RESIDUAL:
             model = source.twin(lane.signal, start, end, 4 * count)

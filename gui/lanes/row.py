@@ -229,7 +229,7 @@ class LaneRow(QFrame):
         """Value at a time in shown units; None outside the data."""
         lane = self.lane
         if lane.kind is Kind.RATE:
-            drawn = rate_of(source.spikes, time - 1e3, time + 1e3)
+            drawn = rate_of(source.spikes, time - 1e3, time + 1e3, 1 << 20)
         elif lane.kind is Kind.RESIDUAL:
             one = _at(source.trace(lane.signal, time - 0.02, time + 0.02, 100), time)
             two = _at(source.twin(lane.signal, time - 0.02, time + 0.02, 100), time)

@@ -158,7 +158,7 @@ class LiveSource:
         """The measured signal; the force holds from its last set-point to now."""
         if signal in self._slow and signal not in self._tracks:
             hold = self.reach if signal == "force" and self.running else None
-            return self._slow[signal].between(start, end, hold)
+            return self._slow[signal].between(start, end, count, hold)
         track = self._tracks.get(signal)
         return Drawn.nothing() if track is None else track.between(start, end, count)
 

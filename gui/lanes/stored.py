@@ -159,7 +159,7 @@ class RunSource:
         """The stored signal; where zoomed in, samples as soon as they are read."""
         if signal in self._slow and signal not in self._pyramids:
             time, value = self._slow[signal]
-            return line_between(time, value, start, end, 1 << 14)
+            return line_between(time, value, start, end, count)
         pyramid = self._pyramids.get(signal)
         if pyramid is None:
             return Drawn.nothing()

@@ -83,7 +83,7 @@ def test_history_is_bounded_and_keeps_a_single_spike() -> None:
 
 
 def test_rate_is_one_over_the_last_interval() -> None:
-    drawn = rate_of(np.array([1.0, 1.5, 1.75]), 0.0, 3.0)
+    drawn = rate_of(np.array([1.0, 1.5, 1.75]), 0.0, 3.0, 100)
     assert drawn.mean.tolist() == [0.0, 2.0, 4.0]
 
 
@@ -103,7 +103,7 @@ def test_slow_track_is_bounded() -> None:
     track = SlowTrack()
     for k in range(450_000):
         track.add(k * 0.01, float(k))
-    assert track.between(0.0, 1e9).time.size <= 1 << 16
+    assert track.between(0.0, 1e9, 1000).time.size <= 4000
     assert track.last == 449_999.0
 
 
