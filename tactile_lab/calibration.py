@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import datetime
+import hashlib
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -12,7 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.quantity import show
-from tactile_lab.scene.columns import read_columns
+from tactile_lab.scene.columns import read_columns, read_text
+
+COIL, VALID_UNTIL, HASH = "coil", "valid until", "sha256"
+UNCERTAINTY = {"T": "uncertainty T (95 %)", "N": "uncertainty N (95 %)"}
+"""Names in the head of a calibration file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +31,16 @@ class Calibration:
         value: shape (n,), T or N, strictly monotonic.
         unit: "T" where the field was measured, "N" where the force was.
         path: file it was read from.
+        head: what the file says of itself by name; empty for a bare table.
+        whole: the rows are those the head's hash was made of.
     """
 
     current: NDArray[np.float64]
     value: NDArray[np.float64]
     unit: Literal["T", "N"]
     path: Path
+    head: Mapping[str, str] = field(default_factory=dict)
+    whole: bool = False
 
     @property
     def least(self) -> float:
@@ -48,6 +59,75 @@ class Calibration:
         right = min(max(right, 1), self.current.size - 1)
         rise = self.value[right] - self.value[right - 1]
         return float(rise / (self.current[right] - self.current[right - 1]))
+
+    @property
+    def uncertainty(self) -> float | None:
+        """Half of the 95 % band of one value, T or N; None where none is stated."""
+        try:
+            stated = float(self.head[UNCERTAINTY[self.unit]])
+        except (KeyError, ValueError):
+            return None
+        return stated if self.whole and math.isfinite(stated) else None
+
+    @property
+    def valid_until(self) -> datetime.date | None:
+        """Last day it may be used; None where none is stated."""
+        try:
+            return datetime.date.fromisoformat(self.head[VALID_UNTIL])
+        except (KeyError, ValueError):
+            return None
+
+    def check(
+        self,
+        *,
+        today: datetime.date | None = None,
+        coil: str | None = None,
+        beyond_date: bool = False,
+        other_coil: bool = False,
+    ) -> tuple[str, ...]:
+        """What speaks against using it, one sentence each.
+
+        Args:
+            today: day of use; None: the date is not looked at.
+            coil: identity of the current source in use; None: not looked at.
+            beyond_date: a person takes that upon themselves: a doubt, no refusal.
+            other_coil: likewise.
+
+        Raises:
+            SceneError: changed since it was written, expired, or of another coil.
+        """
+        if HASH not in self.head:
+            return (
+                f"The calibration {self.path.name} states no uncertainty, date or "
+                "coil: nothing is carried into the forces. `calibrate_field` writes "
+                "one that does.",
+            )
+        if not self.whole:
+            raise SceneError(
+                f"Calibration {self.path} was changed after it was written: its hash "
+                "does not fit. Calibrate again (calibrate_field)."
+            )
+        doubts = []
+        until = self.valid_until
+        if today is not None and until is not None and today > until:
+            said = f"Calibration {self.path} expired on {until.isoformat()}"
+            if not beyond_date:
+                raise SceneError(
+                    f"{said}; today is {today.isoformat()}. Calibrate again "
+                    "(calibrate_field), or use it as it is with [magnet] "
+                    "allow_expired = true in the bench file."
+                )
+            doubts.append(f"{said} and was used nevertheless (allow_expired).")
+        own = self.head.get(COIL, "")
+        if coil and coil != own:
+            said = f"Calibration {self.path} belongs to the coil {own}, not to {coil}"
+            if not other_coil:
+                raise SceneError(
+                    f"{said}. Calibrate this one (calibrate_field), or use it as it "
+                    "is with [magnet] allow_other_coil = true in the bench file."
+                )
+            doubts.append(f"{said}, and was used nevertheless (allow_other_coil).")
+        return tuple(doubts)
 
     def at(self, current: ArrayLike) -> NDArray[np.float64]:
         """The value at `current` A (any shape).
@@ -92,4 +172,24 @@ def read_calibration(path: Path) -> Calibration:
         )
     if current[0] > 0 or current[-1] < 0:
         raise SceneError(f"{path}: the calibration must include 0 A.")
-    return Calibration(current, value, "T" if names[1] == "field_T" else "N", path)
+    head, whole = _head(read_text(path))
+    unit: Literal["T", "N"] = "T" if names[1] == "field_T" else "N"
+    return Calibration(current, value, unit, path, head, whole)
+
+
+def table_hash(body: str) -> str:
+    """SHA-256 of a calibration's header and rows, without its head."""
+    return hashlib.sha256(body.encode()).hexdigest()
+
+
+def _head(text: str) -> tuple[dict[str, str], bool]:
+    """Lines ``# name: value``, and whether the rest fits the hash among them."""
+    lines = text.splitlines(keepends=True)
+    head = {
+        name.strip(): value.strip()
+        for line in lines
+        if line.startswith("# ")
+        for name, _, value in [line[2:].partition(":")]
+    }
+    body = "".join(line for line in lines if not line.startswith("#"))
+    return head, head.get(HASH) == table_hash(body)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,24 @@ A2_PRINTED = 2.25e-3
 """A2 as Table 1 prints it, m^2; a 15 mm x 15 mm core has a tenth of it."""
 
 
+@dataclass(frozen=True)
+class ForceUncertainty:
+    """How well a force is known, as half-widths of 95 % bands.
+
+    Attributes:
+        absolute: by the calibration's readings and loop, the same at every force, N.
+        relative: by the geometry in Eq. (2), common to all forces, a part of each.
+    """
+
+    absolute: float
+    relative: float
+
+    def of(self, force: ArrayLike) -> NDArray[np.float64]:
+        """Half of the 95 % band of `force` N (any shape), N."""
+        newtons = np.asarray(force, dtype=np.float64)
+        return np.asarray(np.hypot(self.absolute, self.relative * newtons))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Magnet:
     """The electromagnet, the magnet on the cantilever and the distance between them.
@@ -36,6 +55,8 @@ class Magnet:
         B2_per_ampere: field of the electromagnet per current, T/A; not used where a
             calibration is given.
         calibration: measured field or force against current.
+        geometry_uncertainty: half of the 95 % band of Eq. (2)'s r, A1, A2 and B1
+            together, as a part of the force; None where nobody has stated it.
 
     Raises:
         ParameterError: a value is not finite or not above 0.
@@ -47,6 +68,7 @@ class Magnet:
     B1: float = 0.163
     B2_per_ampere: float = 0.011
     calibration: Calibration | None = None
+    geometry_uncertainty: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("r", "A1", "A2", "B1"):
@@ -69,6 +91,20 @@ class Magnet:
         if self.calibration is None:
             return self.newtons_per_tesla * self.B2_per_ampere
         return self._per_unit * self.calibration.slope_at_zero
+
+    @property
+    def force_uncertainty(self) -> ForceUncertainty | None:
+        """What calibration and geometry leave open; None where neither states any."""
+        used = self.calibration
+        stated = None if used is None else used.uncertainty
+        # a force that was measured owes nothing to the geometry
+        needs_geometry = used is None or used.unit == "T"
+        relative = self.geometry_uncertainty if needs_geometry else 0.0
+        if stated is None and not relative:
+            return None
+        # F(I) - F(0) is the difference of two values of the calibration
+        absolute = 0.0 if stated is None else math.sqrt(2) * stated * self._per_unit
+        return ForceUncertainty(absolute, relative or 0.0)
 
     @property
     def _per_unit(self) -> float:
@@ -113,13 +149,13 @@ class Magnet:
             LimitError: a force lies beyond the coil's limit or the calibration; the
                 reachable force is named.
         """
-        wanted = force.value[np.argmax(np.abs(force.value))]
         if self.calibration is None and math.isinf(limit):
             return force.scaled(1 / self.newtons_per_ampere)
         low, high = self.reachable(limit)
         slack = 1e-12 * max(abs(low), abs(high))
         if force.value.min() < low - slack or force.value.max() > high + slack:
-            over = float(wanted)
+            beyond = np.maximum(low - force.value, force.value - high)
+            over = float(force.value[np.argmax(beyond)])
             raise LimitError(
                 f"force {show(over, 'N')} is beyond the coil: reachable is "
                 f"{show(low, 'N')} to {show(high, 'N')} within {self._bounds(limit)}. "
@@ -130,10 +166,25 @@ class Magnet:
         bent = _with_kinks(force, self.force(self.calibration.current))
         return Waveform(bent.time, self._inverse(bent.value))
 
-    def force_for(self, current: Waveform) -> Waveform:
-        """The force, N, that `current`, A, gives."""
+    def force_for(
+        self, current: Waveform, beyond: Literal["refuse", "hold"] = "refuse"
+    ) -> Waveform:
+        """The force, N, that `current`, A, gives.
+
+        Args:
+            current: piecewise linear.
+            beyond: what to do outside the calibration; "hold" takes its last value,
+                for currents that were not asked for as a force (demagnetising).
+
+        Raises:
+            LimitError: the current leaves the calibration, and `beyond` refuses that.
+        """
         if self.calibration is None:
             return current.scaled(self.newtons_per_ampere)
+        if beyond == "hold":
+            ends = self.calibration.least, self.calibration.most
+            current = _with_kinks(current, np.array(ends))
+            current = Waveform(current.time, np.clip(current.value, *ends))
         bent = _with_kinks(current, self.calibration.current)
         return Waveform(bent.time, self.force(bent.value))
 

@@ -1,6 +1,7 @@
 """Force, field and current: Eq. (2), calibrations, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,6 +90,40 @@ def test_outside_the_calibration_is_refused(calibrated):
         magnet.current_for(Waveform.through([(0, 0), (1, -0.05)]), 2.0)
     with pytest.raises(LimitError, match=r"cal\.csv"):
         magnet.force(1.5)
+
+
+def test_the_force_that_is_out_of_reach_is_the_one_named(calibrated):
+    magnet = calibrated("current_A,force_N\n-0.1,-0.01\n0,0\n1,0.1\n")
+    wave = Waveform.through([(0, 0), (1, 0.09), (2, -0.05)])
+    with pytest.raises(LimitError, match="force −50 mN is beyond"):
+        magnet.current_for(wave, 2.0)
+
+
+def test_beyond_the_calibration_the_force_of_a_current_can_be_held(calibrated):
+    magnet = calibrated("current_A,force_N\n-1,-0.1\n0,0\n1,0.1\n")
+    swing = Waveform.through([(0, 0), (1, 2), (3, -2)])
+    with pytest.raises(LimitError):
+        magnet.force_for(swing)
+    held = magnet.force_for(swing, beyond="hold")
+    assert held.at([0.25, 0.5, 1, 2, 3]) == pytest.approx([0.05, 0.1, 0.1, 0, -0.1])
+
+
+def test_what_is_known_of_a_force(calibrated):
+    assert MAGNET.force_uncertainty is None
+    measured = calibrated("current_A,field_T\n-1,-0.011\n1,0.011\n")
+    assert measured.force_uncertainty is None
+    stated = replace(
+        measured.calibration,
+        head={"uncertainty T (95 %)": "1e-4"},
+        whole=True,
+    )
+    both = replace(measured, calibration=stated, geometry_uncertainty=0.05)
+    absolute = math.sqrt(2) * 1e-4 * both.newtons_per_tesla
+    assert both.force_uncertainty.of([0.0, 0.1]) == pytest.approx(
+        [absolute, math.hypot(absolute, 5e-3)]
+    )
+    only = replace(MAGNET, geometry_uncertainty=0.05)
+    assert only.force_uncertainty.of(0.1) == pytest.approx(5e-3)
 
 
 @given(st.lists(st.floats(-0.1, 0.15), min_size=1, max_size=6))

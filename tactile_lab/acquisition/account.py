@@ -74,6 +74,11 @@ class Account:
         else:
             self.journal.event(self.now, kind, text)
 
+    def warn(self, text: str) -> None:
+        """Something a person should know."""
+        self.note("warning", text)
+        self.emit(events.Message("warning", text))
+
     def outcome(self, outcome: Outcome) -> None:
         """A trial ended."""
         if self.journal is not None:
@@ -97,8 +102,7 @@ class Account:
         coil, meter = instruments.coil, instruments.meter
         if coil is not None:
             for text in coil.take_warnings():
-                self.note("warning", text)
-                self.emit(events.Message("warning", text))
+                self.warn(text)
             for applied in coil.take_applied():
                 self._current.append(applied)
                 row = (self.axis(applied.time), applied.setpoint, applied.measured)

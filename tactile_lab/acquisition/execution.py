@@ -28,6 +28,7 @@ from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.acquisition.task import Ending, Task
 from tactile_lab.bench import Bench, OffReport, Stream
 from tactile_lab.errors import RecordingError, TactileLabError
+from tactile_lab.plan.calibrated import check_coil
 from tactile_lab.plan.limited import limited
 from tactile_lab.plan.plan import plan
 from tactile_lab.plugins import open_bench
@@ -233,6 +234,7 @@ class Execution:
             detector=lambda stream: detector_of(_found(self._detection(stream))),
             current_for=self._current_for,
             expected=self.plan.estimate.duration,
+            doubts=self._doubts,
             drift=self._drift(),
         )
 
@@ -242,6 +244,11 @@ class Execution:
             return None
         force_for = scene.bench.magnet.force_for
         return Drift(scene.circuit, force_for, scene.protocol.drift_limit)
+
+    def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
+        if not self.plan.timeline.asks_force:
+            return ()
+        return check_coil(self.scene, settings)
 
     def _detection(self, stream: Stream | None) -> Detection | None:
         """The scene's detection in codes of the stream."""

@@ -99,6 +99,8 @@ class Runner:
     def _connect(self) -> None:
         self._account.state(events.RunState.CONNECTING, "opening instruments")
         self.instruments.open(self._serve)
+        for text in self._task.doubts(self.instruments.settings):
+            self._account.warn(text)
         self._start_stream()
         coil = self.instruments.coil
         if coil is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tactile_lab.acquisition.drift import Drift
@@ -25,8 +25,10 @@ class Task:
         detector: makes a detector for a running stream.
         current_for: coil current, A(t), that gives a trial's force within all limits,
             told the time between two set-points, s, and the last set-point, A.
-        drift: judges V_C1 at rest before each trial; None where no trial pushes.
         expected: run time expected, s; None if it depends on outcomes.
+        doubts: told the opened instruments' settings, says what a person should know
+            before the coil is switched on, or raises to prevent it.
+        drift: judges V_C1 at rest before each trial; None where no trial pushes.
     """
 
     trials: Callable[[], Trials]
@@ -36,6 +38,7 @@ class Task:
     detector: Callable[[Stream], OnlineDetector]
     current_for: Callable[[Trial, float, float], Waveform]
     expected: float | None
+    doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
     drift: Drift | None = None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 _Z95 = 1.959963984540054
@@ -21,6 +22,25 @@ class Estimate:
         """A symmetric interval for `freedom` degrees of freedom."""
         half = student_95(freedom) * error
         return cls(float(value), float(error), float(value - half), float(value + half))
+
+    def widened(self, *halves: float) -> Estimate:
+        """With further independent causes of error, half-widths of their 95 % bands."""
+        more = sum(half**2 for half in halves)
+        return Estimate(
+            self.value,
+            math.sqrt(self.error**2 + more / _Z95**2),
+            self.value - math.sqrt((self.value - self.low) ** 2 + more),
+            self.value + math.sqrt((self.high - self.value) ** 2 + more),
+        )
+
+    def to_dict(self) -> dict[str, float]:
+        """For JSON; units are in the key it is put under."""
+        return {
+            "value": self.value,
+            "error": self.error,
+            "low_95": self.low,
+            "high_95": self.high,
+        }
 
 
 def student_95(freedom: int) -> float:

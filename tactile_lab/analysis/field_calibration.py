@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.calibration import COIL, HASH, UNCERTAINTY, VALID_UNTIL, table_hash
 from tactile_lab.errors import NotIdentifiableError, SceneError
 from tactile_lab.quantity import show
 
@@ -169,14 +169,14 @@ def write_calibration(
     )
     body = f"{HEADER}\n{rows}\n"
     head = {
-        "coil": coil,
+        COIL: coil,
         "date": date.isoformat(),
-        "valid until": (date + datetime.timedelta(days=valid_days)).isoformat(),
+        VALID_UNTIL: (date + datetime.timedelta(days=valid_days)).isoformat(),
         "slope T/A": f"{calibration.slope.value:.6g} ({calibration.slope.low:.6g} to "
         f"{calibration.slope.high:.6g})",
         "loop half-width T": f"{calibration.half_width:.3g}",
-        "uncertainty T (95 %)": f"{calibration.uncertainty:.3g}",
-        "sha256": hashlib.sha256(body.encode()).hexdigest(),
+        UNCERTAINTY["T"]: f"{calibration.uncertainty:.3g}",
+        HASH: table_hash(body),
     }
     text = "".join(f"# {name}: {value}\n" for name, value in head.items()) + body
     try:
@@ -193,40 +193,3 @@ def write_calibration(
             f"Calibration {path} cannot be written: {reason.strerror}."
         ) from reason
     return path
-
-
-def check_calibration(
-    path: Path, *, coil: str | None = None, today: datetime.date | None = None
-) -> dict[str, str]:
-    """The head of a calibration file, once it is found whole, valid and of that coil.
-
-    Raises:
-        SceneError: not written by `write_calibration`, changed since, expired, or of
-            another coil.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as reason:
-        raise SceneError(f"Calibration {path} cannot be read: {reason}.") from reason
-    lines = text.splitlines(keepends=True)
-    head = {
-        name.strip(): value.strip()
-        for line in lines
-        if line.startswith("# ")
-        for name, _, value in [line[2:].partition(":")]
-    }
-    body = "".join(line for line in lines if not line.startswith("#"))
-    if head.get("sha256") != hashlib.sha256(body.encode()).hexdigest():
-        raise SceneError(
-            f"Calibration {path} has no valid hash: it was changed or not written by "
-            "this program. Calibrate again."
-        )
-    if today is not None and today > datetime.date.fromisoformat(head["valid until"]):
-        raise SceneError(
-            f"Calibration {path} expired on {head['valid until']}. Calibrate again."
-        )
-    if coil is not None and coil != head["coil"]:
-        raise SceneError(
-            f"Calibration {path} belongs to the coil {head['coil']}, not to {coil}."
-        )
-    return head

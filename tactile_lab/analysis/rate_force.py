@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import I_C, Circuit, rest_V_C1
 
 
@@ -48,6 +50,43 @@ def eq15_rate(circuit: Circuit, force: float, ramp: float = 0.0) -> float:
         (target - circuit.reset_voltage) / (target - circuit.fire_voltage)
     )
     return 1.0 / (circuit.reset_time + circuit.tau_L * charge)
+
+
+def mean_slope(
+    forces: Sequence[float],
+    rates: Sequence[float],
+    uncertainty: ForceUncertainty | None = None,
+) -> Estimate:
+    """Slope of the straight line through rates above onset, Hz/N.
+
+    Its interval holds the scatter about the line, which is the curve's own bend where
+    there is no noise, and the force's uncertainty if given: the absolute part strikes
+    each force on its own, the relative part all alike.
+
+    Args:
+        forces: N, of trials that fired.
+        rates: Hz.
+        uncertainty: of the forces.
+
+    Raises:
+        NotIdentifiableError: fewer than 3 different forces.
+    """
+    force, rate = np.asarray(forces, float), np.asarray(rates, float)
+    if np.unique(force).size < 3:
+        raise NotIdentifiableError(
+            f"{np.unique(force).size} different forces made it fire, 3 are needed for "
+            "a slope"
+        )
+    apart = force - force.mean()
+    spread, freedom = float(np.sum(apart**2)), force.size - 2
+    slope = float(np.sum(apart * rate) / spread)
+    left = rate - rate.mean() - slope * apart
+    error = float(np.sqrt(np.sum(left**2) / freedom / spread))
+    found = Estimate.of(slope, error, freedom)
+    if uncertainty is None:
+        return found
+    single = abs(slope) * uncertainty.absolute / math.sqrt(spread)
+    return found.widened(single, abs(slope) * uncertainty.relative)
 
 
 def onset(forces: Sequence[float], spikes: Sequence[int]) -> Onset:

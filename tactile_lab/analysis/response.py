@@ -19,12 +19,14 @@ class Gain:
         gain: amplitude of the answer over that of the cause, in their units.
         phase: of the answer against the cause, rad, -pi to pi.
         error: standard error of the gain.
+        amplitude: of the cause, in its unit.
     """
 
     frequency: float
     gain: float
     phase: float
     error: float
+    amplitude: float
 
 
 def gain(
@@ -60,4 +62,4 @@ def gain(
     scatter = np.sqrt(np.sum(left**2) / (t.size - design.shape[1]))
     error = scatter * np.sqrt(2 / t.size) / abs(given)
     ratio = got / given
-    return Gain(frequency, abs(ratio), float(np.angle(ratio)), float(error))
+    return Gain(frequency, abs(ratio), float(np.angle(ratio)), float(error), abs(given))

@@ -49,13 +49,7 @@ def answer(found: Identified) -> dict[str, Any]:
     """The object printed by ``--json``; SI units."""
     return {
         "parameters": {
-            name: {
-                "value": e.value,
-                "error": e.error,
-                "low_95": e.low,
-                "high_95": e.high,
-            }
-            for name, e in found.estimates.items()
+            name: estimate.to_dict() for name, estimate in found.estimates.items()
         },
         "correlation": found.correlation.tolist(),
         "scatter_V_C1_V": found.scatter_V_C1,

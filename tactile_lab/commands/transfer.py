@@ -35,15 +35,7 @@ def command(curve: Path, between: tuple[str, str] | None, as_json: bool) -> None
     if as_json:
         print_json(
             {
-                **{
-                    name: {
-                        "value": e.value,
-                        "error": e.error,
-                        "low_95": e.low,
-                        "high_95": e.high,
-                    }
-                    for name, e in found.items()
-                },
+                **{name: estimate.to_dict() for name, estimate in found.items()},
                 "points": fit.points,
                 "between_V": list(fit.range),
                 "scatter": fit.scatter,

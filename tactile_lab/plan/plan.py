@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tactile_lab.plan.calibrated import check_calibration
 from tactile_lab.plan.estimate import Estimate, estimate
 from tactile_lab.plan.needs import Needs, needs
 from tactile_lab.plan.reasons import Reasons, leaves_out, uses
@@ -114,7 +115,7 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
     """
     drive = timeline(scene, through_coil=True)
     needed = needs(scene)
-    told = warnings(scene, needed, drive)
+    told = (*check_calibration(scene, drive), *warnings(scene, needed, drive))
     result = _model(scene, drive) if preview else None
     if result is not None:
         told = (*told, *result.warnings, *_clipped(scene, needed, result))

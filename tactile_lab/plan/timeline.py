@@ -52,6 +52,14 @@ class Timeline:
         )
 
     @property
+    def asks_force(self) -> bool:
+        """Whether any trial asks for a force, not for a current, other than 0 N."""
+        return any(
+            step.trial.current is None and step.trial.force.peak > 0
+            for step in self.steps
+        )
+
+    @property
     def current(self) -> Waveform | None:
         """Current of the whole run, A; None where the force is taken as given."""
         played = [(s.start, s.current) for s in self.steps if s.current is not None]
@@ -127,7 +135,7 @@ class _Driver:
         if self.through_coil:
             force, current = self._played(trial, length)
         elif current is not None:
-            force = _cut(magnet.force_for(current), length)
+            force = _cut(magnet.force_for(current, beyond="hold"), length)
         else:
             force = _cut(force, length)
         step = Step(trial, self._time, force, current)
@@ -179,7 +187,7 @@ class _Driver:
                 f"{show(spent, 's')} after its start. Ask for less force, a shorter "
                 "hold, or a longer rest before it."
             )
-        return magnet.force_for(current), current
+        return magnet.force_for(current, beyond="hold"), current
 
     def timeline(self) -> Timeline:
         force = joined([(step.start, step.force) for step in self.steps])

@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+NO_UNCERTAINTY = (
+    "The calibration states no uncertainty of force: none is carried into this number."
+)
+
 
 @dataclass(frozen=True)
 class Conclusion:

@@ -11,7 +11,7 @@ import numpy as np
 from tactile_lab.analysis.decay import fit_decay
 from tactile_lab.analysis.drain_current import BOXCAR_3DB
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.rate_force import eq15_rate, onset
+from tactile_lab.analysis.rate_force import eq15_rate, mean_slope, onset
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.quantity import show
 from tactile_lab.report.bench_conclusions import (
@@ -20,7 +20,7 @@ from tactile_lab.report.bench_conclusions import (
     monitor,
     wiring_check,
 )
-from tactile_lab.report.conclusion import Conclusion
+from tactile_lab.report.conclusion import NO_UNCERTAINTY, Conclusion
 from tactile_lab.report.preparation import force_at_zero
 from tactile_lab.report.run_data import RunData, Trace
 from tactile_lab.report.sweep import sine_sweep
@@ -28,11 +28,6 @@ from tactile_lab.report.trial_finding import TrialFinding
 
 LATE = 0.15
 """A coil set over a serial line is late: the first part of a hold still rises, s."""
-
-
-NO_UNCERTAINTY = (
-    "The calibration states no uncertainty of force: none is carried into this number."
-)
 
 
 def conclude(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
@@ -62,9 +57,10 @@ def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         "critical_force_N": found.middle,
         "critical_force_half_width_N": found.half_width,
     }
-    if run.force_uncertainty is None:
+    known = run.uncertain(found.middle)
+    if known is None:
         return Conclusion((sentence, NO_UNCERTAINTY), values)
-    whole = math.hypot(found.half_width, run.force_uncertainty)
+    whole = math.hypot(found.half_width, known)
     values["critical_force_uncertainty_N_95"] = whole
     said = f"With the calibration's uncertainty: ±{show(whole, 'N', 2)} (95 %)."
     return Conclusion((sentence, said), values)
@@ -73,6 +69,7 @@ def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
 def _rate_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     critical = _critical_force(run, trials)
     rated = [t for t in trials if t.response.peak_rate is not None]
+    critical = _with_slope(run, critical, rated)
     if run.circuit is None or not rated:
         return critical
     ratios = []
@@ -91,6 +88,32 @@ def _rate_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     return Conclusion(
         (*critical.sentences, sentence),
         {**critical.values, "peak_rate_over_eq15": ratios},
+    )
+
+
+def _with_slope(
+    run: RunData, critical: Conclusion, rated: Sequence[TrialFinding]
+) -> Conclusion:
+    """The conclusion with the mean slope of rate over force above onset."""
+    levelled = [t for t in rated if t.trial.level is not None]
+    try:
+        slope = mean_slope(
+            [float(t.trial.level or 0.0) for t in levelled],
+            [t.response.peak_rate or 0.0 for t in levelled],
+            run.force_uncertainty,
+        )
+    except NotIdentifiableError as reason:
+        said, value = f"No slope: {reason}.", None
+    else:
+        low, high = slope.low * 1e-3, slope.high * 1e-3
+        said = (
+            f"Above onset the highest rate rises by {slope.value * 1e-3:.3g} Hz/mN "
+            f"({low:.3g} to {high:.3g} Hz/mN, 95 %) on average; the curve bends."
+        )
+        value = slope.to_dict()
+    return Conclusion(
+        (*critical.sentences, said),
+        {**critical.values, "slope_Hz_per_N": value},
     )
 
 
@@ -127,7 +150,7 @@ def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         during = _mean(trace.time, trace.mean, begin, begin + 0.1)
         if np.isnan(before) or np.isnan(during):
             continue
-        changes.append({"level_N": finding.trial.level, "change_A": during - before})
+        changes.append(_change(run, finding.trial.level, during - before))
         sentences.append(
             f"{finding.trial.label}: I_DS from {show(before, 'A', 3)} to "
             f"{show(during, 'A', 3)}"
@@ -135,6 +158,9 @@ def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     if not changes:
         return Conclusion()
     said = ["; ".join(sentences) + "."]
+    said += [_sensitivity(c) for c in changes if c["sensitivity_A_per_N"] is not None]
+    if run.force_uncertainty is None:
+        said.append(NO_UNCERTAINTY)
     values: dict[str, Any] = {"I_DS_changes": changes}
     tau, why_not = _tau(trace, trials)
     if tau is None:
@@ -144,8 +170,34 @@ def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
             f"The decay gives tau = {tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} "
             "s, 95 %)."
         )
-        values["tau_s"] = {"value": tau.value, "low_95": tau.low, "high_95": tau.high}
+        values["tau_s"] = tau.to_dict()
     return Conclusion(tuple(said), values)
+
+
+def _change(run: RunData, level: float | None, change: float) -> dict[str, Any]:
+    """What a force did to I_DS, and per force."""
+    known = run.uncertain(level)
+    found: dict[str, Any] = {
+        "level_N": level,
+        "level_uncertainty_N_95": known,
+        "change_A": change,
+        "sensitivity_A_per_N": None,
+        "sensitivity_uncertainty_A_per_N_95": None,
+    }
+    if level:
+        found["sensitivity_A_per_N"] = change / level
+        if known is not None:
+            found["sensitivity_uncertainty_A_per_N_95"] = abs(
+                change / level * known / level
+            )
+    return found
+
+
+def _sensitivity(change: dict[str, Any]) -> str:
+    value = change["sensitivity_A_per_N"] * 1e6
+    known = change["sensitivity_uncertainty_A_per_N_95"]
+    spread = "" if known is None else f" ± {known * 1e6:.2g}"
+    return f"{show(change['level_N'], 'N')}: {value:.3g}{spread} nA/mN."
 
 
 def _tau(trace: Trace, trials: Sequence[TrialFinding]) -> tuple[Estimate | None, str]:

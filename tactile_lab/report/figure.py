@@ -125,6 +125,13 @@ def _force(panel: Axes, run: RunData) -> None:
     panel.fill_between(
         time, 0, force, color=palette.FORCE.light, alpha=0.14, lw=0, zorder=1
     )
+    if run.force_uncertainty is not None:
+        # only where there is a force: at rest its zero is a definition
+        known = np.where(force == 0, 0.0, run.force_uncertainty.of(force * 1e-3) * 1e3)
+        panel.fill_between(
+            time, force - known, force + known,
+            color=palette.FORCE.light, alpha=0.3, lw=0, zorder=2,
+        )  # fmt: skip
     panel.plot(time, force, color=palette.FORCE.light, lw=1.2)
     low, high = min(0.0, float(force.min())), max(0.0, float(force.max()))
     span = (high - low) or 1.0

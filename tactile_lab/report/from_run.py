@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from datetime import datetime
+from collections.abc import Mapping, Sequence
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.drain_current import Divider
+from tactile_lab.calibration import UNCERTAINTY
+from tactile_lab.errors import SceneError
 from tactile_lab.quantity import show
-from tactile_lab.report.calibrated import provenance
 from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
-from tactile_lab.store.run import Run
+from tactile_lab.store.run import Records, Run
 from tactile_lab.waveform import Waveform
 
 CELLS = 4000
@@ -38,7 +39,8 @@ def read(folder: Path) -> RunData:
         before = float(getattr(scene.protocol, "before", 0.0))
         started = _for_people(str(info.get("started", "")))
         settings: Mapping[str, Mapping[str, str]] = info.get("instruments") or {}
-        uncertainty, doubts = _trust(scene, started, settings)
+        warnings = tuple(info.get("warnings") or ())
+        segments = run.records("segments")
         return RunData(
             title=str(info.get("title", scene.protocol.title)),
             protocol=scene.protocol.name,
@@ -50,11 +52,11 @@ def read(folder: Path) -> RunData:
             bench=scene.bench.name,
             duration=run.duration,
             took=info.get("took_s"),
-            trials=tuple(_trial(row, spikes, before) for row in run.trials),
+            trials=tuple(_trial(row, spikes, before, segments) for row in run.trials),
             force=_force(scene, current, run.duration),
             current=current,
             field=_field(run),
-            force_uncertainty=uncertainty,
+            force_uncertainty=scene.bench.magnet.force_uncertainty,
             field_per_ampere=_field_per_ampere(scene),
             newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
             traces=tuple(_trace(run, name) for name in run.signals),
@@ -63,7 +65,7 @@ def read(folder: Path) -> RunData:
             divider=_divider(scene),
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
-            warnings=(*(info.get("warnings") or ()), *doubts),
+            warnings=(*warnings, *_doubts(scene, started, settings, warnings)),
             assumptions=tuple(info.get("assumptions") or ()),
             parameters=_texts(scene, "protocol"),
             sensor=_texts(scene, "sensor"),
@@ -73,7 +75,9 @@ def read(folder: Path) -> RunData:
         )
 
 
-def _trial(row: Any, spikes: NDArray[np.float64], onset: float) -> TrialData:
+def _trial(
+    row: Any, spikes: NDArray[np.float64], onset: float, segments: Records
+) -> TrialData:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
     return TrialData(
@@ -87,6 +91,7 @@ def _trial(row: Any, spikes: NDArray[np.float64], onset: float) -> TrialData:
         pause=bool(row["pause"]),
         rest=_number(row, "rest_V_C1"),
         drift=_number(row, "drift_V_C1"),
+        clock_uncertainty=_clock_uncertainty(segments, start),
     )
 
 
@@ -95,6 +100,14 @@ def _number(row: Any, name: str) -> float | None:
     if name not in (row.dtype.names or ()) or np.isnan(row[name]):
         return None
     return float(row[name])
+
+
+def _clock_uncertainty(segments: Records, time: float) -> float | None:
+    """That of the segment that streams at `time` s; None where it never was told."""
+    number = int(np.searchsorted(segments["time"], time, side="right")) - 1
+    if number < 0 or not np.isfinite(segments["uncertainty"][number]):
+        return None
+    return float(segments["uncertainty"][number])
 
 
 def _trace(run: Run, name: str) -> Trace:
@@ -142,7 +155,8 @@ def _force(scene: Scene, current: NDArray[np.float64], end: float) -> Waveform:
     steps, held = np.append(steps, max(end, steps[-1])), np.append(held, held[-1])
     distinct = np.ones(steps.size, dtype=bool)
     distinct[1:-1] = (steps[2:] != steps[1:-1]) | (steps[1:-1] != steps[:-2])
-    return scene.bench.magnet.force_for(Waveform(steps[distinct], held[distinct]))
+    wave = Waveform(steps[distinct], held[distinct])
+    return scene.bench.magnet.force_for(wave, beyond="hold")
 
 
 def _divider(scene: Scene) -> Divider:
@@ -173,19 +187,28 @@ def _texts(scene: Scene, table: str) -> dict[str, str]:
     }
 
 
-def _trust(
-    scene: Scene, started: str, settings: Mapping[str, Mapping[str, str]]
-) -> tuple[float | None, tuple[str, ...]]:
-    """Uncertainty of a force by the calibration, N, and doubts about it."""
+def _doubts(
+    scene: Scene,
+    started: str,
+    settings: Mapping[str, Mapping[str, str]],
+    told: Sequence[str],
+) -> tuple[str, ...]:
+    """What speaks against the calibration on the day of the run, not yet told."""
     calibration = scene.bench.magnet.calibration
     if calibration is None:
-        return None, ()
-    coil = settings.get("coil", {}).get("identity", "")
-    known = provenance(calibration.path, started, coil)
-    if known.uncertainty is None or calibration.unit != "T":
-        return None, known.warnings
-    newtons = known.uncertainty * abs(scene.bench.magnet.newtons_per_tesla)
-    return newtons, known.warnings
+        return ()
+    try:
+        day = date.fromisoformat(started[:10])
+    except ValueError:
+        day = None
+    coil = settings.get("coil", {}).get("identity")
+    try:
+        found = calibration.check(
+            today=day, coil=coil, beyond_date=True, other_coil=True
+        )
+    except SceneError as reason:  # changed since: say so, and keep the run's numbers
+        found = (str(reason),)
+    return tuple(text for text in found if text not in told)
 
 
 def _calibration(scene: Scene) -> dict[str, str]:
@@ -201,6 +224,16 @@ def _calibration(scene: Scene) -> dict[str, str]:
         found["B2 per current"] = f"{show(magnet.B2_per_ampere, 'T')}/A, assumed linear"
     else:
         found["Calibration file"] = magnet.calibration.path.name
+        names = ("date", "valid until", "coil", "sha256", *UNCERTAINTY.values())
+        head = magnet.calibration.head
+        found |= {name.capitalize(): head[name] for name in names if name in head}
+    known = magnet.force_uncertainty
+    if known is None:
+        found["Uncertainty of a force"] = "not stated"
+    else:
+        found["Uncertainty of a force"] = (
+            f"±{show(known.absolute, 'N', 2)} and ±{100 * known.relative:.2g} % (95 %)"
+        )
     return found
 
 

@@ -115,9 +115,15 @@ def _legend(findings: Findings) -> str:
     if not findings.run.searched:
         return "V_K was not searched for spikes."
     return (
-        "First spike: time from the onset of the force. Final rate: "
+        "First spike: time from the onset of the force, ± how well the clocks of coil "
+        "and scope are aligned. Final rate: "
         "of the last two spikes within the hold. Fall: from the highest rate within "
         "the hold to the final one. Time constant: 1/|β| with its 95 % interval."
+        + (
+            " Force: ± its 95 % uncertainty by calibration and geometry."
+            if findings.run.force_uncertainty is not None
+            else ""
+        )
     )
 
 

@@ -6,9 +6,9 @@ import json
 from typing import Any
 
 from tactile_lab.analysis.adaptation import Adaptation
-from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.twin import Twin
 from tactile_lab.report.findings import Findings
+from tactile_lab.report.run_data import RunData
 from tactile_lab.report.trial_finding import TrialFinding
 
 SCHEMA = 1
@@ -30,9 +30,14 @@ def results(findings: Findings) -> dict[str, Any]:
         "bench": run.bench,
         "duration_s": run.duration,
         "took_s": run.took,
-        "force_uncertainty_N_95": run.force_uncertainty,
+        "force_uncertainty_95": None
+        if run.force_uncertainty is None
+        else {
+            "absolute_N": run.force_uncertainty.absolute,
+            "relative": run.force_uncertainty.relative,
+        },
         "spikes": sum(t.response.spikes for t in findings.trials),
-        "trials": [_trial(t) for t in findings.trials],
+        "trials": [_trial(run, t) for t in findings.trials],
         "loss": None
         if loss is None
         else {
@@ -59,11 +64,12 @@ def as_json(findings: Findings) -> str:
     return text + "\n"
 
 
-def _trial(finding: TrialFinding) -> dict[str, Any]:
+def _trial(run: RunData, finding: TrialFinding) -> dict[str, Any]:
     trial, response = finding.trial, finding.response
     return {
         "label": trial.label,
         "level_N": trial.level,
+        "level_uncertainty_N_95": run.uncertain(trial.level),
         "start_s": trial.start,
         "duration_s": trial.duration,
         "hold_s": None if trial.hold is None else list(trial.hold),
@@ -72,6 +78,9 @@ def _trial(finding: TrialFinding) -> dict[str, Any]:
         "spikes": response.spikes,
         "spike_times_s": [float(t) for t in trial.spike_times],
         "latency_s": response.latency,
+        "latency_uncertainty_s": None
+        if response.latency is None
+        else trial.clock_uncertainty,
         "peak_rate_Hz": response.peak_rate,
         "final_rate_Hz": response.final_rate,
         "fall": response.fall,
@@ -104,20 +113,11 @@ def _twin(twin: Twin) -> dict[str, Any]:
 
 def _adaptation(fit: Adaptation) -> dict[str, Any]:
     return {
-        "alpha_Hz": _estimate(fit.alpha),
-        "beta_per_s": _estimate(fit.beta),
-        "gamma_Hz": _estimate(fit.gamma),
-        "time_constant_s": _estimate(fit.time_constant),
+        "alpha_Hz": fit.alpha.to_dict(),
+        "beta_per_s": fit.beta.to_dict(),
+        "gamma_Hz": fit.gamma.to_dict(),
+        "time_constant_s": fit.time_constant.to_dict(),
         "irregularity": fit.irregularity,
         "r_squared": fit.r_squared,
         "intervals": fit.intervals,
-    }
-
-
-def _estimate(estimate: Estimate) -> dict[str, float]:
-    return {
-        "value": estimate.value,
-        "error": estimate.error,
-        "low_95": estimate.low,
-        "high_95": estimate.high,
     }

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.drain_current import Divider
+from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.signals import Source
 from tactile_lab.waveform import Waveform
@@ -36,6 +37,8 @@ class TrialData:
         rest: V_C1 just before the trial, V, or None.
         drift: change of that since the first trial, V, less what the film still
             remembers of the forces; None where it was not judged.
+        clock_uncertainty: bound on how far spike times lie from the coil's, s: how well
+            the scope's clock is aligned with the host's; None if not known.
     """
 
     label: str
@@ -48,6 +51,7 @@ class TrialData:
     pause: bool = False
     rest: float | None = None
     drift: float | None = None
+    clock_uncertainty: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,8 +120,8 @@ class RunData:
         trials: in order.
         force: N on the run's time axis, as applied (limited and stepped).
         current: applied coil current as read back, shape (n, 2), s and A, or None.
-        force_uncertainty: half of the 95 % band of a force by the calibration, N; None
-            where none is stated.
+        force_uncertainty: what calibration and geometry leave open; None where
+            neither states any.
         field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
         newtons_per_tesla: force over B2 by Eq. (2), N/T, or None.
         field: teslameter readings, shape (m, 2), s and T, or None.
@@ -149,7 +153,7 @@ class RunData:
     started: str = ""
     took: float | None = None
     current: FloatArray | None = None
-    force_uncertainty: float | None = None
+    force_uncertainty: ForceUncertainty | None = None
     field_per_ampere: float | None = None
     newtons_per_tesla: float | None = None
     field: FloatArray | None = None
@@ -178,6 +182,12 @@ class RunData:
             return np.empty(0)
         found: FloatArray = value[(time >= start) & (time <= end)]
         return found
+
+    def uncertain(self, force: float | None) -> float | None:
+        """Half of the 95 % band of `force` N, N; None where nothing is stated."""
+        if force is None or self.force_uncertainty is None:
+            return None
+        return float(self.force_uncertainty.of(force))
 
     def trace(self, signal: str, *, model: bool = False) -> Trace | None:
         """The measured or derived trace of `signal`, or the model's; None if none."""

@@ -75,9 +75,11 @@ def _rate_force(panel: Axes, findings: Findings, trials: list[TrialFinding]) -> 
     fired = np.array([t.response.spikes > 0 for t in trials])
     try:
         found = onset(force.tolist(), [t.response.spikes for t in trials])
+        known = findings.run.uncertain(found.middle) or 0.0
+        half = float(np.hypot(found.half_width, known))
         panel.axvspan(
-            found.silent * 1e3,
-            found.fires * 1e3,
+            (found.middle - half) * 1e3,
+            (found.middle + half) * 1e3,
             color=palette.RULE.light,
             lw=0,
             zorder=0,
@@ -95,6 +97,17 @@ def _rate_force(panel: Axes, findings: Findings, trials: list[TrialFinding]) -> 
             lw=1.0,
             ls=(0, (4, 2)),
             label="Eq. (15)",
+        )
+    if findings.run.force_uncertainty is not None:
+        panel.errorbar(
+            force * 1e3,
+            rate,
+            xerr=findings.run.force_uncertainty.of(force) * 1e3,
+            fmt="none",
+            ecolor=palette.QUIET.light,
+            elinewidth=0.8,
+            capsize=2,
+            zorder=3,
         )
     panel.plot(
         force[fired] * 1e3,

@@ -6,12 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.response import Gain, gain
 from tactile_lab.errors import NotIdentifiableError, QuantityError
 from tactile_lab.quantity import parse
-from tactile_lab.report.conclusion import Conclusion
+from tactile_lab.report.conclusion import NO_UNCERTAINTY, Conclusion
 from tactile_lab.report.run_data import RunData, Trace
 from tactile_lab.report.trial_finding import TrialFinding
+
+LARGE = 1000
+"""Degrees of freedom of a gain: hundreds of bins a cycle."""
 
 
 def responses(run: RunData, trials: Sequence[TrialFinding], trace: Trace) -> list[Gain]:
@@ -32,6 +36,15 @@ def responses(run: RunData, trials: Sequence[TrialFinding], trace: Trace) -> lis
     return found
 
 
+def _known(run: RunData, found: Gain) -> Estimate:
+    """The gain with its noise and the force's uncertainty."""
+    gain = Estimate.of(found.gain, found.error, LARGE)
+    if run.force_uncertainty is None:
+        return gain
+    part = float(run.force_uncertainty.of(found.amplitude)) / found.amplitude
+    return gain.widened(found.gain * part)
+
+
 def sine_sweep(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """Gain and phase of V_C1 per frequency, and of the model."""
     measured = run.trace("V_C1")
@@ -42,11 +55,15 @@ def sine_sweep(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         return Conclusion(("No frequency was completed.",))
     beside = run.trace("V_C1", model=True)
     expected = responses(run, trials, beside) if beside is not None else []
+    known = [(g, _known(run, g)) for g in found]
     said = "; ".join(
-        f"{g.frequency:.3g} Hz {g.gain:.3g} V/N at {np.degrees(g.phase):.0f}°"
-        for g in found
+        f"{g.frequency:.3g} Hz {u.value:.3g} ± {(u.high - u.low) / 2:.2g} V/N at "
+        f"{np.degrees(g.phase):.0f}°"
+        for g, u in known
     )
-    sentences = [f"V_C1 answers force with {said}.".replace("-", "−")]
+    sentences = [f"V_C1 answers force with {said} (95 %).".replace("-", "−")]
+    if run.force_uncertainty is None:
+        sentences.append(NO_UNCERTAINTY)
     if len(expected) == len(found):
         off = max(
             abs(g.gain / e.gain - 1) for g, e in zip(found, expected, strict=True)
@@ -54,8 +71,12 @@ def sine_sweep(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         sentences.append(f"The model's gain differs by {100 * off:.2g} % at most.")
     values = {
         "V_C1_over_force": [
-            {"frequency_Hz": g.frequency, "gain_V_per_N": g.gain, "phase_rad": g.phase}
-            for g in found
+            {
+                "frequency_Hz": g.frequency,
+                "gain_V_per_N": u.to_dict(),
+                "phase_rad": g.phase,
+            }
+            for g, u in known
         ]
     }
     return Conclusion(tuple(sentences), values)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tactile_lab.quantity import show
 from tactile_lab.report.findings import Findings
+from tactile_lab.report.run_data import RunData
 from tactile_lab.report.trial_finding import TrialFinding
 
 NONE = "–"
@@ -60,7 +61,7 @@ def table(findings: Findings) -> Table:
         "Force", "Spikes", "First spike", "Peak rate", "Final rate", "Fall in hold",
         "Time constant",
     )  # fmt: skip
-    return Table(headings, tuple(_row(trial) for trial in findings.trials))
+    return Table(headings, tuple(_row(findings.run, t) for t in findings.trials))
 
 
 def _without_spikes(findings: Findings) -> Table:
@@ -79,14 +80,19 @@ def _without_spikes(findings: Findings) -> Table:
     return Table(("Trial", "Start", "Length", "V_C1 before"), tuple(rows))
 
 
-def _row(finding: TrialFinding) -> tuple[str, ...]:
+def _row(run: RunData, finding: TrialFinding) -> tuple[str, ...]:
     trial, response = finding.trial, finding.response
-    force = trial.label if trial.level is None else show(trial.level, "N")
+    force = trial.label
+    if trial.level is not None:
+        force = _with(trial.level, run.uncertain(trial.level), "N", 4)
+    latency = NONE
+    if response.latency is not None:
+        latency = _with(response.latency, trial.clock_uncertainty, "s", 3)
     fall = NONE if response.fall is None else f"{100 * response.fall:.0f} %"
     return (
         force,
         str(response.spikes),
-        _shown(response.latency, "s"),
+        latency,
         _shown(response.peak_rate, "Hz"),
         _shown(response.final_rate, "Hz"),
         fall,
@@ -101,6 +107,12 @@ def time_constant(finding: TrialFinding) -> str:
         return NONE if finding.response.spikes == 0 else finding.why_not
     tau = fit.time_constant
     return f"{tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} s)"
+
+
+def _with(value: float, uncertainty: float | None, unit: str, digits: int) -> str:
+    """A value with its uncertainty, where that is known."""
+    text = show(value, unit, digits)
+    return text if uncertainty is None else f"{text} ± {show(uncertainty, unit, 2)}"
 
 
 def _shown(value: float | None, unit: str, digits: int = 3) -> str:

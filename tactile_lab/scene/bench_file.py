@@ -179,14 +179,21 @@ class FieldMeterSpec(Table):
 
 
 class MagnetTable(Table):
-    """``[magnet]``: geometry of Eq. (2), or a calibration (see `Magnet`)."""
+    """``[magnet]``: geometry of Eq. (2), or a calibration (see `Magnet`).
+
+    Attributes:
+        allow_expired, allow_other_coil: use the calibration nevertheless.
+    """
 
     r: Length
     A1: Area = 2.827e-5
     A2: Area = 2.25e-3
     B1: Field_ = 0.163
     B2_per_ampere: FieldPerCurrent = 0.011
+    geometry_uncertainty: float | None = Field(default=None, ge=0, lt=1)
     calibration: str | None = None
+    allow_expired: bool = False
+    allow_other_coil: bool = False
 
 
 class HandSet(Table):
@@ -290,6 +297,7 @@ class BenchSpec:
                 **values,
                 B2_per_ampere=table.magnet.B2_per_ampere,
                 calibration=calibration,
+                geometry_uncertainty=table.magnet.geometry_uncertainty,
             ),
             hand_set={
                 name: getattr(table.hand_set, name)

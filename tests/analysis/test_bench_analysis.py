@@ -5,7 +5,6 @@ import pytest
 
 from tactile_lab.analysis.field_calibration import (
     FieldStep,
-    check_calibration,
     fit_field,
     write_calibration,
 )
@@ -70,18 +69,26 @@ def test_the_file_is_one_a_bench_can_use(tmp_path):
 def test_the_file_is_dated_hashed_and_never_overwritten(tmp_path):
     found, path = fit_field(loop()), tmp_path / "b2.csv"
     write_calibration(path, found, coil="coil A", date=DAY)
-    head = check_calibration(path, coil="coil A", today=DAY)
-    assert head["date"] == "2026-11-21"
+    used = read_calibration(path)
+    assert used.check(coil="coil A", today=DAY) == ()
+    assert used.head["date"] == "2026-11-21"
+    assert used.uncertainty == pytest.approx(found.uncertainty, rel=0.01)
     with pytest.raises(SceneError, match="exists"):
         write_calibration(path, found, coil="coil A", date=DAY)
+    late = datetime.date(2027, 5, 21)
+    assert used.check(today=late - datetime.timedelta(days=1)) == ()
     with pytest.raises(SceneError, match="expired on 2027-05-20"):
-        check_calibration(path, today=datetime.date(2027, 5, 21))
+        used.check(today=late)
+    assert "was used nevertheless" in used.check(today=late, beyond_date=True)[0]
     with pytest.raises(SceneError, match="belongs to the coil coil A, not to coil B"):
-        check_calibration(path, coil="coil B")
+        used.check(coil="coil B")
+    assert "not to coil B" in used.check(coil="coil B", other_coil=True)[0]
     path.chmod(0o644)
     path.write_text(path.read_text().replace("1,0.011", "1,0.012"))
-    with pytest.raises(SceneError, match="no valid hash"):
-        check_calibration(path)
+    changed = read_calibration(path)
+    assert changed.uncertainty is None
+    with pytest.raises(SceneError, match="changed after it was written"):
+        changed.check(beyond_date=True, other_coil=True)
 
 
 EXPECTED = Levels(

@@ -1,6 +1,5 @@
 """What a report concludes from runs of each protocol, on plain values."""
 
-import datetime
 import json
 import re
 from dataclasses import replace
@@ -8,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.field_calibration import (
-    FieldStep,
-    check_calibration,
-    fit_field,
-    write_calibration,
-)
+from tactile_lab.calibration import read_calibration
+from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
-from tactile_lab.report.calibrated import provenance
 from tactile_lab.report.figure import figure
 from tactile_lab.report.findings import find
 from tactile_lab.report.run_data import RunData, Trace, TrialData
@@ -196,7 +190,9 @@ def test_calibrate_field_reads_both_branches(tmp_path):
     assert values["half_width_T"] == pytest.approx(3e-4, rel=1e-6)
     dated = replace(run, started="2026-11-21 03:00:00", settings={})
     write(tmp_path, dated)
-    assert check_calibration(tmp_path / "calibration.csv")["date"] == "2026-11-21"
+    written = read_calibration(tmp_path / "calibration.csv")
+    assert written.whole
+    assert written.head["date"] == "2026-11-21"
     write(tmp_path, dated)  # again: the calibration stays
     without = find(replace(run, field=None)).conclusion
     assert "no teslameter readings" in without.sentences[0]
@@ -242,37 +238,42 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
     circuit = Circuit()
     steep = 24.69e-9 / (circuit.m * circuit.V_T)
     resistance = 1 / (1 / circuit.R1 + 1 / circuit.R2)
-    assert found["gain_V_per_N"] == pytest.approx(
+    assert found["gain_V_per_N"]["value"] == pytest.approx(
         circuit.k_F * steep * resistance, rel=0.02
     )
     assert abs(found["phase_rad"]) == pytest.approx(np.pi, abs=0.2)
 
 
 def test_the_force_s_uncertainty_reaches_the_critical_force(rate_force):
-    known = find(replace(rate_force, force_uncertainty=5e-3)).conclusion
-    expected = np.hypot(0.0125, 5e-3)
+    sure = find(rate_force).conclusion
+    known = find(
+        replace(rate_force, force_uncertainty=ForceUncertainty(5e-3, 0.04))
+    ).conclusion
+    expected = np.sqrt(0.0125**2 + 5e-3**2 + (0.04 * 0.0975) ** 2)
     assert known.values["critical_force_uncertainty_N_95"] == pytest.approx(expected)
-    assert "states no uncertainty" in " ".join(find(rate_force).conclusion.sentences)
+    assert "states no uncertainty" in " ".join(sure.sentences)
+    wide, narrow = known.values["slope_Hz_per_N"], sure.values["slope_Hz_per_N"]
+    rates = [t.response.peak_rate for t in find(rate_force).trials[1:]]
+    line = np.polyfit([0.11, 0.15, 0.2], rates, 1)
+    assert wide["value"] == narrow["value"] == pytest.approx(line[0])
+    assert wide["high_95"] > narrow["high_95"]
+    assert wide["low_95"] < narrow["low_95"]
 
 
-def test_a_calibration_s_doubts_are_told(tmp_path):
-    plain = tmp_path / "plain.csv"
-    plain.write_text("current_A,field_T\n-1,-0.011\n1,0.011\n")
-    assert "no uncertainty" in provenance(plain, "2026-11-21", "").warnings[0]
-    currents = np.linspace(-1, 1, 9)
-    steps = [
-        FieldStep(branch=b, current=i, field=0.011 * i + s * 1e-4, error=1e-6)
-        for b, s in (("rising", -1), ("falling", 1))
-        for i in currents
-    ]
-    path = write_calibration(
-        tmp_path / "b2.csv", fit_field(steps), coil="A", date=datetime.date(2026, 1, 1)
+def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
+    trials = tuple(replace(t, clock_uncertainty=2e-3) for t in rate_force.trials)
+    known = ForceUncertainty(3e-3, 0.04)
+    report = write(
+        tmp_path, replace(rate_force, trials=trials, force_uncertainty=known)
     )
-    good = provenance(path, "2026-02-01 10:00:00", "A")
-    assert good.warnings == ()
-    assert good.uncertainty == pytest.approx(1e-4, rel=0.01)
-    assert "expired" in provenance(path, "2026-11-21 10:00:00", "A").warnings[0]
-    assert "belongs to the coil A" in provenance(path, "2026-02-01", "B").warnings[0]
+    first, *_, last = json.loads(report.results.read_text())["trials"]
+    assert last["level_uncertainty_N_95"] == pytest.approx(np.hypot(3e-3, 8e-3))
+    assert last["latency_uncertainty_s"] == 2e-3
+    assert first["latency_uncertainty_s"] is None, "it was silent"
+    page = report.html.read_text(encoding="utf-8")
+    assert "200 mN ± 8.5 mN" in page
+    assert "± 2 ms" in page
+    assert summary(report.findings).axes[0].collections, "error bars"
 
 
 def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_path):
