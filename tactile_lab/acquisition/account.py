@@ -13,6 +13,7 @@ from tactile_lab.acquisition.coil_thread import Applied
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Bins
+from tactile_lab.acquisition.rate import Rate
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.trial import Outcome
@@ -41,6 +42,7 @@ class Account:
         self._clock = clock
         self._open_journal = open_journal
         self._origin: float | None = None
+        self._rate = Rate()
         self._waiting: list[tuple[str, str]] = []
         self.edges: list[Edge] = []
         self._current: list[Applied] = []
@@ -93,7 +95,8 @@ class Account:
     def spikes(self, times: tuple[float, ...]) -> None:
         """Spikes were found at these run times, s."""
         if times:
-            self.emit(events.SpikesSeen(times))
+            rates = self._rate.feed(np.array(times))
+            self.emit(events.SpikesSeen(times, tuple(rates.tolist())))
 
     def readings(self, instruments: Instruments) -> None:
         """Take what coil and meter have told since last time."""

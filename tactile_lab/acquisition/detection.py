@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+DEVIATIONS = 7.0
+"""Height of an estimated threshold over the rest, in standard deviations of the noise.
+
+Gaussian noise crosses it once in 1e12 samples.
+"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Detection:

@@ -6,6 +6,7 @@ not events: a watcher polls them from `tactile_lab.acquisition.live.Live`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -87,9 +88,24 @@ class FieldRead:
 
 @dataclass(frozen=True)
 class SpikesSeen:
-    """Times of newly detected spikes on the run's axis, s, ascending."""
+    """Newly detected spikes.
+
+    A watcher that shows one number shows the last rate. It falls to 0 only in the eye
+    of a watcher that counts the time since the last spike: silence is no event.
+
+    Attributes:
+        times: on the run's axis, s, ascending.
+        rates: instantaneous rate right after each of them, 1/ISI, Hz: 0 after the
+            run's first spike; the ISI may span a planned pause.
+    """
 
     times: tuple[float, ...]
+    rates: tuple[float, ...]
+
+    @property
+    def intervals(self) -> tuple[float, ...]:
+        """Time since the spike before each, s; infinite for the run's first."""
+        return tuple(1 / rate if rate > 0 else math.inf for rate in self.rates)
 
 
 @dataclass(frozen=True)

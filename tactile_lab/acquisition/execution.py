@@ -9,7 +9,6 @@ print(done.folder, done.spikes)
 
 from __future__ import annotations
 
-import math
 import time
 import traceback
 from collections.abc import Mapping
@@ -18,12 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.acquisition import events
-from tactile_lab.acquisition.detection import Detection
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.environment import environment
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.runner import Runner
-from tactile_lab.acquisition.spikes import detector_of
+from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.acquisition.task import Ending, Task
 from tactile_lab.bench import Bench, OffReport, Stream
@@ -41,9 +39,6 @@ from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.recorder_thread import RecorderThread
 from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
-
-RESET_EDGE = 0.5e-6
-"""Longest a reset of V_C2 takes at the follower's output, s: 4 V at 13 V/us."""
 
 STATUS: dict[events.RunState, Status] = {
     events.RunState.COMPLETE: "complete",
@@ -125,6 +120,8 @@ class Execution:
         self._emit = emit
         self._notes = dict(notes or {})
         self._live = Live()
+        on = self.needs.detect_on
+        self._search = SpikeSearch(scene, on) if on is not None else None
         self._journal: RecorderThread | None = None
         self.folder = RunFolder.create(
             out, scene.name, self._info(), needed=self.plan.estimate.disk
@@ -188,9 +185,13 @@ class Execution:
     def _begin_record(self, stream: Stream | None) -> RecorderThread:
         """Start the record; codes can be scaled from now on."""
         magnet = self.scene.bench.magnet
+        detection = None
+        if self._search is not None and stream is not None:
+            detection = self._search.detection(stream)
+            self.folder.update(detection=self._search.describe(stream))
         layout = Layout(
             signals=self.needs.stored,
-            detection=self._detection(stream),
+            detection=detection,
             simulated=self.bench.simulated,
             attributes={"newtons_per_ampere": magnet.newtons_per_ampere},
         )
@@ -224,14 +225,11 @@ class Execution:
 
     def _task(self) -> Task:
         scene, needed = self.scene, self.needs
-        rows = [channel.signal for channel in needed.channels]
-        row = rows.index(needed.detect_on) if needed.detect_on else None
         return Task(
             trials=scene.protocol.trials,
             channels=needed.channels,
             interval=1.0 / scene.record.sample_rate,
-            spike_row=row,
-            detector=lambda stream: detector_of(_found(self._detection(stream))),
+            search=self._search,
             current_for=self._current_for,
             expected=self.plan.estimate.duration,
             doubts=self._doubts,
@@ -249,32 +247,6 @@ class Execution:
         if not self.plan.timeline.asks_force:
             return ()
         return check_coil(self.scene, settings)
-
-    def _detection(self, stream: Stream | None) -> Detection | None:
-        """The scene's detection in codes of the stream."""
-        signal = self.needs.detect_on
-        if stream is None or signal is None:
-            return None
-        row = [channel.signal for channel in stream.channels].index(signal)
-        gain, offset = stream.volts_per_code(row)
-        chosen = self.scene.detect
-        refractory = round(chosen.refractory / stream.interval)
-        if signal == "V_K":
-            return Detection(
-                signal=signal,
-                threshold=round((chosen.threshold - offset) / gain),
-                hysteresis=max(1, round(chosen.hysteresis / gain)),
-                refractory=refractory,
-            )
-        swing = self.scene.circuit.fire_voltage - self.scene.circuit.reset_voltage
-        return Detection(
-            signal=signal,
-            threshold=round(swing / 2 / gain),
-            hysteresis=1,
-            refractory=refractory,
-            kind="reset",
-            span=max(2, math.ceil(RESET_EDGE / stream.interval)),
-        )
 
     def _current_for(
         self, trial: Trial, update_interval: float, before: float
@@ -314,8 +286,3 @@ class Execution:
             "notes": self._notes,
             "environment": environment(),
         }
-
-
-def _found(detection: Detection | None) -> Detection:
-    assert detection is not None, "a detector is asked for only where spikes are"
-    return detection

@@ -49,9 +49,9 @@ class Intake:
         produced: samples per channel the scope delivered.
     """
 
-    def __init__(self, live: Live, row: int | None) -> None:
+    def __init__(self, live: Live) -> None:
         self._live = live
-        self._row = row
+        self._row = 0
         self._sink: Sink | None = None
         self._detector: OnlineDetector | None = None
         self._stream: Stream | None = None
@@ -63,6 +63,11 @@ class Intake:
         self.overrange: set[str] = set()
 
     @property
+    def streaming(self) -> bool:
+        """Whether blocks are taken."""
+        return self._stream is not None
+
+    @property
     def reached(self) -> float:
         """Run time just past the newest sample, s."""
         interval = self._stream.interval if self._stream else 0.0
@@ -72,10 +77,20 @@ class Intake:
         self,
         stream: Stream,
         start: float,
-        detector: OnlineDetector | None,
         sink: Sink,
+        detector: OnlineDetector | None = None,
+        row: int = 0,
     ) -> None:
-        """A stream starts; its first sample is at `start` s on the run's axis."""
+        """A stream starts.
+
+        Args:
+            stream: as it runs.
+            start: of its first sample on the run's axis, s.
+            sink: stores what comes.
+            detector: finds spikes; None where none are searched.
+            row: of each block that is searched.
+        """
+        self._row = row
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._sink = detector, sink
         self._live.begin(stream, start)
@@ -101,7 +116,7 @@ class Intake:
                 self.overrange.add(channel.signal)
         self._sink.append(block)
         self._live.add(block)
-        if self._detector is None or self._row is None:
+        if self._detector is None:
             return ()
         return self._keep(self._detector.feed(block.first, block.codes[self._row]))
 

@@ -17,6 +17,8 @@ from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.scope_thread import ScopeThread
+from tactile_lab.acquisition.search import REST, SpikeSearch
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.acquisition.task import Ending, Task
 from tactile_lab.bench import Bench, Stream
@@ -58,7 +60,7 @@ class Runner:
         live: Live,
         emit: events.Emit = events.ignore,
     ) -> None:
-        self.intake = Intake(live, task.spike_row)
+        self.intake = Intake(live)
         self._live = live
         self._task = task
         self._clock = bench.clock
@@ -219,11 +221,35 @@ class Runner:
         stream = scope.stream
         if stream is None:
             raise RefusedError("The scope did not start its stream.")
+        search = self._task.search
+        if search is not None and search.must_learn:
+            self._learn(search, scope, stream)
         journal = self._account.journal or self._account.begin(stream)
-        searched = self._task.spike_row is not None
-        detector = self._task.detector(stream) if searched else None
         start = self._account.axis(stream.started)
-        self.intake.begin(stream, start, detector, journal)
+        if search is None:
+            self.intake.begin(stream, start, journal)
+            return
+        detector, row = search.detector(stream), search.row(stream)
+        self.intake.begin(stream, start, journal, detector, row)
+
+    def _learn(self, search: SpikeSearch, scope: ScopeThread, stream: Stream) -> None:
+        """Have the search learn from the first samples while they wait.
+
+        The record names the threshold from its first byte on, so it begins after
+        this; no sample is lost, for none is taken.
+        """
+        wanted = max(1, round(REST / stream.interval))
+        until = self._clock.now() + REST + GRACE
+        self._serve(lambda: scope.ahead >= wanted, until)
+        if scope.ahead == 0:
+            raise InstrumentError(
+                f"The scope has sent no samples for {REST + GRACE:g} s, so no spike "
+                "threshold could be estimated. Set detect.threshold."
+            )
+        search.learn(stream, scope.look_ahead(search.row(stream)))
+        text = search.told(stream)
+        self._account.note("detection", text)
+        self._emit(events.Message("info", text))
 
     def _stop_stream(self) -> None:
         scope = self.instruments.scope
@@ -269,17 +295,19 @@ class Runner:
                     return
                 wake = min(wake, until)
             self._clock.wait_for(
-                lambda: (
+                lambda: bool(
                     done()
                     or self._stop.requested
                     or self.instruments.failed
-                    or (scope is not None and scope.waiting > 0)
+                    or (scope and self.intake.streaming and scope.waiting > 0)
                 ),
                 wake,
             )
 
     def _take_blocks(self) -> None:
         scope = self.instruments.scope
+        if not self.intake.streaming:
+            return
         while scope is not None and (block := scope.take()) is not None:
             self._account.spikes(self.intake.add(block))
             self._lease.renew()

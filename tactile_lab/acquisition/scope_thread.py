@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tactile_lab.acquisition.instrument_thread import InstrumentThread
 from tactile_lab.bench import Block, Channel, Scope, Stream
 from tactile_lab.clock import Clock
@@ -58,6 +61,15 @@ class ScopeThread(InstrumentThread):
     def waiting(self) -> int:
         """Blocks not taken yet."""
         return len(self._queue)
+
+    @property
+    def ahead(self) -> int:
+        """Samples per channel not taken yet."""
+        return sum(block.samples for block in tuple(self._queue))
+
+    def look_ahead(self, row: int) -> NDArray[np.int16]:
+        """A copy of the codes in one row of all blocks not taken yet."""
+        return np.concatenate([block.codes[row] for block in tuple(self._queue)])
 
     def open(self) -> None:
         """Open the scope."""

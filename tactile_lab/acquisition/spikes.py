@@ -19,7 +19,7 @@ from tactile_lab.acquisition.crossings import (
     Spikes,
     scan,
 )
-from tactile_lab.acquisition.detection import Detection
+from tactile_lab.acquisition.detection import DEVIATIONS, Detection
 from tactile_lab.errors import ParameterError
 
 SPIKE = np.dtype([("sample", "f8"), ("amplitude", "i2"), ("width", "f4")])
@@ -28,6 +28,9 @@ SPIKE = np.dtype([("sample", "f8"), ("amplitude", "i2"), ("width", "f4")])
 For polarity -1 the amplitude is the smallest code. The width is NaN where the
 signal never came back.
 """
+
+QUARTILES_APART = 1.349
+"""Distance of the quartiles of Gaussian noise, in standard deviations."""
 
 _ROOM = 1024  # spikes one call of the loop can hold; it is called again
 
@@ -201,18 +204,23 @@ def detect(codes: Codes, detection: Detection, *, first: int = 0) -> Spikes:
 
 
 def estimate(
-    codes: Codes, *, step: int = 1, factor: float = 7.0, polarity: Literal[1, -1] = 1
+    codes: Codes,
+    *,
+    step: int = 1,
+    factor: float = DEVIATIONS,
+    polarity: Literal[1, -1] = 1,
 ) -> tuple[int, int]:
     """(threshold, hysteresis) in codes from the noise of a record.
 
-    Baseline median plus `factor` standard deviations, the deviation taken from the
-    median absolute deviation, which rare spikes do not move. A quantised signal that
-    rests on one code is taken to have half a code step of noise.
+    Median plus `factor` standard deviations, the deviation taken from the distance of
+    the quartiles, which rare spikes do not move. Each code stands for all values of
+    its step, so noise of about one step is measured, not rounded. A signal that rests
+    on one code is taken to have half a step of noise.
 
     Args:
         codes: shape (n,), a stretch of the channel, quiet most of the time.
         step: distance of neighbouring codes (256 for left-justified 8 bit).
-        factor: standard deviations; at 7 Gaussian noise crosses once in 1e12 samples.
+        factor: standard deviations.
         polarity: +1 or -1.
 
     Raises:
@@ -220,8 +228,8 @@ def estimate(
     """
     if codes.size == 0:
         raise ParameterError("A threshold cannot be estimated from no samples.")
-    baseline = float(np.median(codes))
-    deviation = 1.4826 * float(np.median(np.abs(codes.astype(np.int32) - baseline)))
+    low, baseline, high = _quartiles(codes, step)
+    deviation = (high - low) / QUARTILES_APART
     distance = factor * max(deviation, step / 2)
     threshold = round(baseline + polarity * distance)
     if not -32768 <= threshold <= 32767:
@@ -230,3 +238,14 @@ def estimate(
             "beyond the channel's range; set detect.threshold or a wider range."
         )
     return threshold, max(1, round(distance / 2))
+
+
+def _quartiles(codes: Codes, step: int) -> tuple[float, float, float]:
+    """Quartiles of values that were rounded to `step`: even within each code's step."""
+    values, counts = np.unique(codes, return_counts=True)
+    below = np.concatenate([[0], np.cumsum(counts)])
+    # each code's step begins with all samples below it and ends with its own as well
+    edges = np.stack([values - step / 2, values + step / 2], axis=1).ravel()
+    ranks = np.stack([below[:-1], below[1:]], axis=1).ravel()
+    found = np.interp(np.array([0.25, 0.5, 0.75]) * codes.size, ranks, edges)
+    return float(found[0]), float(found[1]), float(found[2])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.intake import OnlineDetector
-from tactile_lab.bench import Channel, OffReport, Stream
+from tactile_lab.acquisition.search import SpikeSearch
+from tactile_lab.bench import Channel, OffReport
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -21,8 +21,7 @@ class Task:
         trials: the protocol's generator, not started yet.
         channels: scope channels to enable, in row order.
         interval: sample interval asked for, s.
-        spike_row: row whose codes are searched for spikes; None for none.
-        detector: makes a detector for a running stream.
+        search: how spikes are searched; None where they are not.
         current_for: coil current, A(t), that gives a trial's force within all limits,
             told the time between two set-points, s, and the last set-point, A.
         expected: run time expected, s; None if it depends on outcomes.
@@ -34,8 +33,7 @@ class Task:
     trials: Callable[[], Trials]
     channels: tuple[Channel, ...]
     interval: float
-    spike_row: int | None
-    detector: Callable[[Stream], OnlineDetector]
+    search: SpikeSearch | None
     current_for: Callable[[Trial, float, float], Waveform]
     expected: float | None
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]

@@ -142,6 +142,8 @@ class Narrator:
         self._label = label
         self._progress: Progress | None = None
         self._trial = ""
+        self._spikes = 0
+        self._rate = 0.0
 
     def expect(self, duration: float) -> None:
         """The run will take `duration` s of its own time."""
@@ -157,12 +159,22 @@ class Narrator:
         match event:
             case events.TrialStarted(trial=trial):
                 self._trial = trial.label
+            case events.SpikesSeen(times=times, rates=rates):
+                self._spikes += len(times)
+                self._rate = rates[-1]
             case events.Progress(elapsed=elapsed):
-                progress.update(elapsed, self._trial)
+                progress.update(elapsed, self._now())
             case events.Message(level=level, text=text):
                 progress.note(f"{level}: {text}")
             case events.StateChanged(state=events.RunState.STOPPING, text=text):
                 progress.note(text)
+
+    def _now(self) -> str:
+        """The trial, and the spikes so far with the last interval's rate."""
+        if not self._spikes:
+            return self._trial
+        told = f"{self._spikes} spikes, last at {self._rate:.3g} Hz"
+        return f"{self._trial}  {told}".strip()
 
     def close(self) -> None:
         """Leave the terminal ready for other output."""

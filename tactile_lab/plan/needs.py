@@ -112,12 +112,14 @@ def needs(scene: Scene) -> Needs:
 
 
 def _check_threshold(scene: Scene, channel: Channel) -> None:
+    threshold, hysteresis = scene.detect.threshold, scene.detect.hysteresis
+    if isinstance(threshold, str) or isinstance(hysteresis, str):
+        return
     top = (channel.range - channel.offset) * channel.scale
-    low = scene.detect.threshold - scene.detect.hysteresis
     bottom = (-channel.range - channel.offset) * channel.scale
-    if scene.detect.threshold >= top or low <= bottom:
+    if threshold >= top or threshold - hysteresis <= bottom:
         raise SceneError(
-            f"[detect] threshold {scene.detect.threshold:g} V less hysteresis "
-            f"{scene.detect.hysteresis:g} V lies outside what the V_K channel sees, "
+            f"[detect] threshold {threshold:g} V less hysteresis "
+            f"{hysteresis:g} V lies outside what the V_K channel sees, "
             f"{bottom:g} V to {top:g} V."
         )

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from tactile_lab.plan.needs import Needs
 from tactile_lab.plan.timeline import Timeline
+from tactile_lab.plan.warn import threshold_of
+from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.tables import AUTO
 from tactile_lab.signals import SIGNALS
 
 Reasons = tuple[tuple[str, str], ...]
@@ -23,7 +26,7 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
         name = channel.signal
         why = "stored" if name in stored else "streamed, not stored"
         if name == needed.detect_on:
-            why += "; spikes are detected on it"
+            why += f"; spikes are detected on it{_threshold(scene, name)}"
         if name == "V_C1" and name not in scene.record.signals:
             why += "; I_DS is derived from it, Eq. (16)"
         found.append((f"channel {channel.input}: {name}", why))
@@ -78,3 +81,11 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
         found.append(("simulated instruments", "the bench is real"))
     found.append(("window", "Qt is loaded by `tactile-lab gui` alone"))
     return tuple(found)
+
+
+def _threshold(scene: Scene, name: str) -> str:
+    """What decides a threshold that is not given."""
+    if name != "V_K" or scene.detect.threshold != AUTO:
+        return ""
+    about = show(threshold_of(scene), "V")
+    return f", threshold from its noise at the start, about {about}"

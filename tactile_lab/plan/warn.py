@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from tactile_lab.acquisition.detection import DEVIATIONS
 from tactile_lab.magnetics import A2_PRINTED
+from tactile_lab.plan.estimate import resolution
 from tactile_lab.plan.needs import Needs
 from tactile_lab.plan.timeline import Timeline
 from tactile_lab.quantity import show
@@ -30,9 +32,25 @@ def spike_width(scene: Scene) -> float:
     """Time a spike stays above the threshold, s; 0 if it never reaches it."""
     circuit = scene.circuit
     height = circuit.fire_voltage - circuit.reset_voltage
-    if height <= scene.detect.threshold:
+    threshold = threshold_of(scene)
+    if height <= threshold:
         return 0.0
-    return circuit.tau_K * math.log(height / scene.detect.threshold)
+    return circuit.tau_K * math.log(height / threshold)
+
+
+def threshold_of(scene: Scene) -> float:
+    """Threshold on V_K, V; where noise decides it, the value that is expected.
+
+    A real channel is taken to have the noise of its converter alone, half a code.
+    """
+    threshold = scene.detect.threshold
+    if not isinstance(threshold, str):
+        return threshold
+    scope = scene.bench.scope
+    wired = scope.channels if scope is not None else ()
+    step = max((resolution(c) for c in wired if c.signal == "V_K"), default=0.0)
+    noise = scene.simulated.noise.get("V_K", 0.0) if scene.bench.simulated else 0.0
+    return DEVIATIONS * max(noise, step / 2)
 
 
 def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
@@ -48,12 +66,12 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
         height = scene.circuit.fire_voltage - scene.circuit.reset_voltage
         yield (
             f"no spike is high enough: V_K rises to {show(height, 'V')}, the "
-            f"threshold is {show(scene.detect.threshold, 'V')}. Lower it."
+            f"threshold is {show(threshold_of(scene), 'V')}. Lower it."
         )
     elif interval > width:
         yield (
             f"V_K at {show(rate, 'S/s')} misses about {1 - width / interval:.0%} of "
-            f"the spikes: they stay above {show(scene.detect.threshold, 'V')} for "
+            f"the spikes: they stay above {show(threshold_of(scene), 'V')} for "
             f"{show(width, 's', 2)}, one sample takes {show(interval, 's')}. Sample at "
             f"{show(_round_up(2 / width), 'S/s')} or faster."
         )
@@ -73,12 +91,13 @@ def _noise(scene: Scene, needed: Needs, streamed: float) -> Iterator[str]:
     sigma = scene.simulated.noise.get("V_K", 0.0)
     if sigma <= 0:
         return
-    above = 0.5 * math.erfc(scene.detect.threshold / sigma / math.sqrt(2))
+    threshold = threshold_of(scene)
+    above = 0.5 * math.erfc(threshold / sigma / math.sqrt(2))
     expected = above * scene.record.sample_rate * streamed
     if expected > 0.5:
         yield (
             f"noise of {show(sigma, 'V')} on V_K reaches the threshold of "
-            f"{show(scene.detect.threshold, 'V')} about {expected:.3g} times and adds "
+            f"{show(threshold, 'V')} about {expected:.3g} times and adds "
             "spikes. Raise the threshold."
         )
 

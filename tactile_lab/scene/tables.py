@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from tactile_lab.plugins import nearest
 from tactile_lab.quantity import Current, Pause, SampleRate, Unit, Voltage
 from tactile_lab.signals import SIGNALS
 
 Noise = Annotated[float, Unit("V", least=0.0)]
-Level = Annotated[float, Unit("V", above=0.0)]
 HalfWidth = Annotated[float, Unit("A", least=0.0)]
 Pull = Annotated[float, Unit("N", least=0.0)]
-Hysteresis = Annotated[float, Unit("V", least=0.0)]
+
+AUTO: Literal["auto"] = "auto"
+"""Instead of a quantity: to be found from what is measured."""
+
+
+@dataclass(frozen=True)
+class OrAuto(Unit):
+    """A quantity, or the text "auto"."""
+
+    def validate(self, value: Any, info: ValidationInfo) -> Any:
+        """The SI value or "auto"."""
+        return AUTO if value == AUTO else super().validate(value, info)
+
+    def write(self, value: Any) -> str:
+        """Text that is read back the same."""
+        return AUTO if value == AUTO else super().write(value)
+
+
+Level = Annotated[float | Literal["auto"], OrAuto("V", above=0.0)]
+Hysteresis = Annotated[float | Literal["auto"], OrAuto("V", least=0.0)]
 
 
 class Table(BaseModel):
@@ -54,8 +80,10 @@ class Detect(Table):
     """``[detect]``: how spikes are found on the streamed V_K.
 
     Attributes:
-        threshold: a spike starts where V_K reaches it, V.
-        hysteresis: V_K must fall this far below the threshold before the next, V.
+        threshold: a spike starts where V_K reaches it, V; "auto" for 7 standard
+            deviations of the noise at the start of the run.
+        hysteresis: V_K must fall this far below the threshold before the next, V;
+            "auto", with a threshold of "auto" only, for half its height.
         refractory: nothing is found for so long after a spike, s.
     """
 
@@ -63,9 +91,22 @@ class Detect(Table):
     hysteresis: Hysteresis = 0.1
     refractory: Pause = 50e-6
 
+    @model_validator(mode="before")
+    @classmethod
+    def _follows(cls, given: Any) -> Any:
+        """Hysteresis goes with the threshold unless it is given."""
+        if isinstance(given, dict) and given.get("threshold") == AUTO:
+            return {"hysteresis": AUTO, **given}
+        return given
+
     @model_validator(mode="after")
     def _ordered(self) -> Detect:
-        if self.hysteresis >= self.threshold:
+        if isinstance(self.threshold, str) or isinstance(self.hysteresis, str):
+            if self.threshold != self.hysteresis:
+                raise ValueError(
+                    'threshold and hysteresis must both be "auto" or both be given'
+                )
+        elif self.hysteresis >= self.threshold:
             raise ValueError(
                 f"hysteresis {self.hysteresis:g} V must be below the threshold "
                 f"{self.threshold:g} V, or V_K could never re-arm the detector."

@@ -51,6 +51,43 @@ def test_noise_above_the_threshold_adds_spikes(run_scene, short):
     assert noisy.done.spikes > quiet.done.spikes + 10
 
 
+def test_a_threshold_from_the_noise_is_found_told_and_kept(run_scene, short):
+    given = run_scene(*short)
+    ran = run_scene(*short, "detect.threshold=auto")
+    assert ran.done.spikes == given.done.spikes
+    assert dict(ran.done.loss) == {"samples": 0, "spikes": 0}
+    told = [e.text for e in ran.told if isinstance(e, events.Message)]
+    assert any("estimated from the noise" in text for text in told)
+    with ran.stored() as run:
+        found = run.info["detection"]
+        # 20 mV of noise and 39 mV of code step are 23 mV: 7 of them
+        assert found["from"] == "noise"
+        assert 0.10 < found["threshold_V"] < 0.25
+        attrs = run.table_attributes("spikes")
+        volts = attrs["threshold"] * attrs["gain"] + attrs["offset"]
+        assert volts == pytest.approx(found["threshold_V"])
+        assert run.records("gaps").size == 0
+        assert run.axis.first[0] == 0  # what was learnt from is stored, too
+
+
+def test_more_noise_means_a_higher_threshold(run_scene, short):
+    ran = run_scene(
+        *short, "detect.threshold=auto", 'simulated.noise={ V_K = "200 mV" }'
+    )
+    quiet = run_scene(*short)
+    assert ran.done.spikes == quiet.done.spikes
+    assert 1.2 < ran.stored().info["detection"]["threshold_V"] < 1.7
+
+
+def test_each_spike_is_told_with_the_rate_it_brings(run_scene, short):
+    ran = run_scene(*short)
+    seen = [e for e in ran.told if isinstance(e, events.SpikesSeen)]
+    times = np.concatenate([e.times for e in seen])
+    rates = np.concatenate([e.rates for e in seen])
+    assert rates[0] == 0 and seen[0].intervals[0] == np.inf
+    np.testing.assert_allclose(rates[1:], 1 / np.diff(times))
+
+
 def test_too_slow_sampling_loses_spikes(run_scene, short):
     fast = run_scene(*short)
     slow = run_scene(*short, "record.sample_rate=0.2 MS/s")

@@ -171,6 +171,14 @@ def test_threshold_from_noise_ignores_the_spikes_themselves():
     assert estimate(still, step=256)[0] >= 512 + 2 * 256
 
 
+@pytest.mark.parametrize("sigma", [0.1, 0.3, 0.5, 0.75, 1.0, 3.0])
+def test_noise_around_one_code_is_measured_not_rounded(sigma):
+    noise = np.random.default_rng(4).normal(0.2, sigma, 100_000)
+    codes = (256 * np.round(noise)).astype(np.int16)
+    spread = (estimate(codes, step=256)[0] / 256 - 0.2) / 7
+    assert spread == pytest.approx(max(0.5, np.hypot(sigma, 12**-0.5)), rel=0.15)
+
+
 def test_rate_is_carried_from_block_to_block():
     rate = Rate()
     times = np.array([1.0, 1.5, 1.6, 3.6])

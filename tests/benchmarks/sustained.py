@@ -79,7 +79,7 @@ def one(rate: float, seconds: float, root: Path) -> str:
     clock.wait_for(lambda: thread.settled)
     thread.raise_failure()
     live = Live()
-    intake = Intake(live, ROW)
+    intake = Intake(live)
     detector = detector_of(DETECTION)
     detector.feed(0, np.zeros(10, np.int16))  # compile or load before samples come
     detector.flush()
@@ -91,8 +91,7 @@ def one(rate: float, seconds: float, root: Path) -> str:
     folder = RunFolder.create(root, "sustained", {})
     layout = Layout(signals=SIGNALS, detection=DETECTION, simulated=True)
     recorder = RecorderThread(Recorder(folder, layout), when_full="error")
-    intake.sink = recorder
-    intake.begin(stream, 0.0, detector)
+    intake.begin(stream, 0.0, recorder, detector, ROW)
     worked, began, ended, fullest = time.process_time(), time.monotonic(), "", 0.0
     try:
         while intake.reached < seconds:

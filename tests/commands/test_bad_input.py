@@ -52,6 +52,10 @@ SCENES = {
     "bench is a folder": (PULSES + '[bench]\nfile = "."\n', "folder"),
     "geometry": (PULSES + '[bench.magnet]\nr = "0 m"\n', r"\[bench.magnet\] r"),
     "hysteresis": (PULSES + '[detect]\nhysteresis = "1 V"\n', "hysteresis"),
+    "half auto": (
+        PULSES + '[detect]\nthreshold = "auto"\nhysteresis = "1 V"\n',
+        "both",
+    ),
     "force table missing": (TABLE.replace("force", "nope"), "nope.csv does not exist"),
     "force table a folder": (TABLE.replace("force.csv", "."), "folder"),
 }
