@@ -318,6 +318,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                         limit = max(
                             5e-3 * tolerance * (1.0 + max(Q_low, 0.0) / span),
                             2e-15 * largest_Q,
+                            # the last digit of V_C1, which "direct" multiplies
+                            4e-16 * biggest * Q_gain(Q_high, par),
                         )
                         piece = width * h
                         r = piece / par[TAU_L]
