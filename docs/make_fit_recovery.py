@@ -25,7 +25,8 @@ from tactile_lab.analysis.identify import identify
 from tactile_lab.analysis.transfer import fit_transfer
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.model.circuit import I_C, Circuit, rest_V_C1, rest_V_C2
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import I_C, rest_V_C1, rest_V_C2
 from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
 

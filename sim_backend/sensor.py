@@ -17,7 +17,8 @@ import numpy as np
 from sim_backend.pieces import FloatArray, Pieces, join
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.advance import Outputs, State, advance, rest
-from tactile_lab.model.circuit import Circuit, rest_V_C2
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest_V_C2
 from tactile_lab.waveform import Waveform
 
 SHORTEST, LONGEST = 10e-3, 60.0

@@ -20,7 +20,8 @@ from scipy.optimize import least_squares
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
-from tactile_lab.model.circuit import I_C, PARAMETERS, Circuit
+from tactile_lab.model.circuit import PARAMETERS, Circuit
+from tactile_lab.model.equations import I_C
 from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
 

@@ -11,7 +11,8 @@ import numpy as np
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ForceUncertainty
-from tactile_lab.model.circuit import I_C, Circuit, rest_V_C1
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import I_C, rest_V_C1
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import SolverError
-from tactile_lab.model.circuit import Circuit, rest_V_C1, wright_omega
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest_V_C1, wright_omega
 from tactile_lab.model.simulate import Start
 from tactile_lab.model.tableau import differentiation, radau_nodes
 from tactile_lab.waveform import Waveform

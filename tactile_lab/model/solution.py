@@ -8,7 +8,8 @@ import numpy as np
 
 from tactile_lab.errors import ParameterError
 from tactile_lab.model import sampling
-from tactile_lab.model.circuit import I_C, I_DS, Circuit, FloatArray
+from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.equations import I_C, I_DS
 from tactile_lab.model.need import Need
 from tactile_lab.waveform import Waveform
 

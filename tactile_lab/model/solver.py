@@ -16,8 +16,8 @@ from tactile_lab.model.circuit import (
     SUBTHRESHOLD_LIMIT,
     Circuit,
     FloatArray,
-    fires_at_rest,
 )
+from tactile_lab.model.equations import fires_at_rest
 from tactile_lab.model.need import STAGES, Need
 from tactile_lab.model.solution import Solution, Statistics
 from tactile_lab.model.state import State

@@ -17,7 +17,7 @@ from tactile_lab.analysis.field_calibration import (
 )
 from tactile_lab.analysis.wiring import Levels, explaining_V_GS, hum, judge
 from tactile_lab.errors import NotIdentifiableError, QuantityError
-from tactile_lab.model.circuit import rest_V_C1
+from tactile_lab.model.equations import rest_V_C1
 from tactile_lab.model.simulate import simulate
 from tactile_lab.quantity import parse, show
 from tactile_lab.report.conclusion import Conclusion

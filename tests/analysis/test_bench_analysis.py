@@ -11,7 +11,8 @@ from tactile_lab.analysis.field_calibration import (
 from tactile_lab.analysis.wiring import Levels, explaining_V_GS, hum, judge
 from tactile_lab.calibration import read_calibration
 from tactile_lab.errors import LimitError, NotIdentifiableError, SceneError
-from tactile_lab.model.circuit import Circuit, rest_V_C1
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest_V_C1
 
 DAY = datetime.date(2026, 11, 21)
 

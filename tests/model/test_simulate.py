@@ -5,7 +5,8 @@ import pytest
 
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.advance import advance, rest
-from tactile_lab.model.circuit import I_C, Circuit, rest_V_C1, rest_V_C2
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import I_C, rest_V_C1, rest_V_C2
 from tactile_lab.model.simulate import Start, simulate
 from tactile_lab.waveform import Waveform
 

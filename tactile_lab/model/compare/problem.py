@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.errors import SolverError
-from tactile_lab.model.circuit import V_P as closed_V_P
-from tactile_lab.model.circuit import Circuit, FloatArray, rest_point
+from tactile_lab.model.circuit import Circuit, FloatArray
 from tactile_lab.model.compiled import entry
+from tactile_lab.model.equations import V_P as closed_V_P
+from tactile_lab.model.equations import rest_point
 from tactile_lab.model.integrator import TAU_L, Q_at
 from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
 from tactile_lab.model.simulate import Start
