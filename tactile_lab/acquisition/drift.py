@@ -12,7 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from tactile_lab.errors import LimitError
-from tactile_lab.model.circuit import V_P, Circuit, rest_V_C1
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import V_P, rest_V_C1
 from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
 
