@@ -137,19 +137,28 @@ class Conversation:
         """Whether the link is open, after trying to open it for `patience` s."""
         if self.link.is_open:
             return True
-        why = ""
+        why, known = "", self.link.identity
         for attempt in range(1 + round(patience / RETRY)):
             if attempt:
                 self.link.pause(RETRY)
             try:
                 self.link.open()
                 self.recognise()
+                self._same_as(known)
                 return True
             except InstrumentError as reason:
                 self.link.close()  # a stranger is not to be told anything
+                self.link.identity = known
                 why = f"reconnect: {reason}"
         trouble.append(why)
         return False
+
+    def _same_as(self, known: str | None) -> None:
+        if known is not None and known != (found := self.link.identity):
+            raise BadReplyError(
+                f"At {self.link.port} {found!r} answers now, not {known!r} as before. "
+                "Connect the same instrument again."
+            )
 
     def _blindly(self, line: str, trouble: list[str]) -> None:
         """Send without waiting for anything; reopen a lost port once."""

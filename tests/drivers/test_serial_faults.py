@@ -219,7 +219,14 @@ def test_a_far_end_takes_any_split(resistor, cuts):
     assert answers == [first, b"0\r\n"]
 
 
-def test_a_stranger_found_on_reconnecting_is_told_nothing(serial_bench):
+@pytest.mark.parametrize(
+    ("model", "name", "other"),
+    [("keithley-2400", b"", b""), ("kepco-bop", b"E123456", b"E654321")],
+    ids=["another model", "another unit"],
+)
+def test_a_stranger_found_on_reconnecting_is_told_nothing(
+    serial_bench, model, name, other
+):
     it = serial_bench
     it.coil.open()
     it.coil.energise()
@@ -227,14 +234,20 @@ def test_a_stranger_found_on_reconnecting_is_told_nothing(serial_bench):
     it.end.faults.add(SerialFault(kind="unplug", line="CURR [^M]", amount=0.3))
     with pytest.raises(LinkLostError):
         it.drive(0.7)
-    stranger = SimCoilSource(it.plant, "keithley-2400", it.clock)
+    stranger = SimCoilSource(it.plant, model, it.clock)
     it.end.instrument = stranger
     heard = []
-    stranger.line = lambda line: (
-        heard.append(line) or SimCoilSource.line(stranger, line)
-    )
-    assert not it.coil.safe_off().verified
-    assert set(heard) == {b"\x1b", b"*IDN?"}
+
+    def line(words):
+        heard.append(words)
+        answer = SimCoilSource.line(stranger, words)
+        return answer and answer.replace(name, other)
+
+    stranger.line = line
+    report = it.coil.safe_off()
+    assert not report.verified
+    assert "reconnect: At sim" in report.text
+    assert set(heard) <= {b"\x1b", b"*IDN?"}
 
 
 def test_a_source_that_was_never_reached_is_not_called_safe(serial_bench):

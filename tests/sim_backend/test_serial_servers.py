@@ -19,7 +19,7 @@ from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LinkLostError, NotFoundError
 
 KEPCO = coil_dialect("kepco-bop")
-FAST = KEPCO.serial.model_copy(update={"latency": 0.0, "timeout": 0.1})
+FAST = KEPCO.serial.model_copy(update={"latency": 0.0, "timeout": 0.3})
 ROW = KEPCO.model_copy(update={"serial": FAST})
 PATIENCE = 60.0
 """Longest wait for what a busy machine does late, s."""
@@ -105,7 +105,7 @@ def test_one_bad_exchange_does_not_end_the_run(served, kind):
     clock, source, end, _server, coil = served
     coil.open()
     coil.energise()
-    end.faults.add(SerialFault(kind=kind, line="CURR", amount=0.15))
+    end.faults.add(SerialFault(kind=kind, line="CURR", amount=0.45))
     drive(clock, coil, 0.05)
     assert end.faults.struck == 1
     assert source.setpoint == pytest.approx(coil.setpoint, abs=1e-5)
@@ -113,7 +113,9 @@ def test_one_bad_exchange_does_not_end_the_run(served, kind):
 
 
 @pytest.mark.parametrize("form", ["closed", "reset"])
-def test_unplugged_while_playing(served, form):
+def test_unplugged_while_playing(served, form, monkeypatch):
+    # long enough, and another test may be given the lost pseudo-terminal's name
+    monkeypatch.setattr("drivers.coil_off.RECONNECT", 0.0)
     clock, source, end, server, coil = served
     coil.open()
     coil.energise()
@@ -135,12 +137,12 @@ def test_a_stuck_peer_does_not_hang_us(served):
     clock, _source, end, server, coil = served
     coil.open()
     coil.energise()
-    end.faults.add(SerialFault(kind="stuck", line="CURR", amount=60.0))
+    end.faults.add(SerialFault(kind="stuck", line="CURR", amount=600.0))
     begun = time.monotonic()
     with pytest.raises(InstrumentError):
         drive(clock, coil, 0.05)
     assert not coil.safe_off().verified
-    assert time.monotonic() - begun < 10
+    assert time.monotonic() - begun < PATIENCE
     server.close()
 
 
@@ -189,7 +191,7 @@ def test_pacing_takes_the_time_of_the_wire():
     end = FarEnd(SimCoilSource(Wireless(), "kepco-bop", clock), wire, clock, "coil")
     server = PtyServer(end, paced=True)
     server.start()
-    with serial.serial_for_url(server.url, timeout=1) as port:
+    with serial.serial_for_url(server.url, timeout=PATIENCE) as port:
         begun = time.monotonic()
         port.write(b"CURR 0.10000;:SYST:ERR?\n")
         assert port.read_until(b"\n") == b'0,"No error"\r\n'

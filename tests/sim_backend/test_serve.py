@@ -89,7 +89,7 @@ def test_the_command_serves_until_told_to_end(ending):
     assert coil.identity.startswith("KEPCO")
     coil.close()
     served.send_signal(ending)
-    assert served.wait(5) == 0
+    assert served.wait(60) == 0
     served.stdout.close()
 
 
