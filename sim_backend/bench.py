@@ -15,6 +15,7 @@ from sim_backend.picoscope import Make
 from sim_backend.picoscope_faults import Fault
 from sim_backend.picosdk import FakePs3000a
 from sim_backend.plant import Plant
+from sim_backend.scope_input import BUFFERED
 from sim_backend.scope_source import Acquisition, Codes
 from sim_backend.serial_wires import plug_in
 from sim_backend.teslameter import SimTeslameter
@@ -40,6 +41,20 @@ class WiredPlant:
     def __init__(self, plant: Plant, wiring: tuple[Channel, ...]) -> None:
         self._plant = plant
         self._wiring = {channel.input: channel for channel in wiring}
+        self._probes = "circuit"
+
+    def place_probes(self, where: str) -> None:
+        """Put the probes of the circuit's voltages on "ground", "supply", "circuit"."""
+        self._probes = where
+
+    def _touches(self, name: str) -> str:
+        """What the probe of input `name` touches."""
+        if name not in self._wiring:
+            return "none"
+        signal = self._wiring[name].signal
+        if signal not in BUFFERED or self._probes == "circuit":
+            return signal
+        return self._probes
 
     def render(
         self, acquisition: Acquisition, first: int, samples: int
@@ -47,9 +62,7 @@ class WiredPlant:
         """Codes and over-range flags, as the scope is set and the plant is wired."""
         channels = [
             Channel(
-                signal=self._wiring[one.name].signal
-                if one.name in self._wiring
-                else "none",
+                signal=self._touches(one.name),
                 input=one.name,
                 range=one.range,
                 offset=one.offset,
@@ -69,12 +82,12 @@ class WiredPlant:
         )
 
 
-def plant_of(scene: Scene) -> Plant:
-    """The physical world of a scene's simulated bench."""
+def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
+    """The physical world of a scene's simulated bench, or `world` with its sensor."""
     return Plant(
         scene.circuit,
         scene.bench.magnet,
-        options(scene.simulated),
+        world or options(scene.simulated),
         scene.simulated.seed,
     )
 
@@ -102,6 +115,7 @@ def open_bench(
     scope_faults: Sequence[Fault] = (),
     coil_faults: Sequence[SerialFault] = (),
     meter_faults: Sequence[SerialFault] = (),
+    world: PlantOptions | None = None,
 ) -> Bench:
     """Drivers and far ends of the instruments `scene` needs; nothing is opened.
 
@@ -111,13 +125,14 @@ def open_bench(
         scope_faults: what goes wrong with the scope, and when.
         coil_faults: the same for the current source.
         meter_faults: the same for the teslameter.
+        world: physics with its wiring faults, instead of the scene's.
 
     Raises:
         SceneError: the bench file lacks an instrument the scene needs.
     """
     clock: Clock = RealClock() if realtime else SimulatedClock()
-    plant, spec, needed = plant_of(scene), scene.bench, needs(scene)
-    coil = scope = meter = None
+    plant, spec, needed = plant_of(scene, world), scene.bench, needs(scene)
+    coil = scope = meter = wired = None
     if needed.coil:
         if spec.coil is None:
             raise SceneError("The scene drives the coil, but the bench has no [coil].")
@@ -133,8 +148,9 @@ def open_bench(
             raise SceneError(
                 "The scene needs scope channels; the bench has no [scope]."
             )
+        wired = WiredPlant(plant, spec.scope.channels)
         library = FakePs3000a(
-            WiredPlant(plant, spec.scope.channels),
+            wired,
             clock,
             Make(clock_error=scene.simulated.clock_error),
             scope_faults,
@@ -163,5 +179,6 @@ def open_bench(
         coil=coil,
         scope=scope,
         field_meter=meter,
+        place_probes=wired.place_probes if wired is not None else None,
         accuracy=plant.accuracy,
     )

@@ -20,7 +20,7 @@ from sim_backend.electromagnet import Electromagnet
 from sim_backend.options import PlantOptions, passive_attraction
 from sim_backend.pieces import FloatArray, Pieces
 from sim_backend.render import noise_table
-from sim_backend.scope_input import ScopeInput, scope_inputs
+from sim_backend.scope_input import PLACED, ScopeInput, scope_inputs
 from sim_backend.sensor import NEEDS, Sensor
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
@@ -34,7 +34,7 @@ MEMORY = 0.2
 BACKLOG = 4096
 """Commands that may wait to be solved while nobody looks."""
 Coupled = tuple[ScopeInput, Capacitor | None]
-SIGNALS = (*NEEDS, "coil_current", "field", "none")
+SIGNALS = (*NEEDS, "coil_current", "field", *PLACED)
 """What may lie at a scope input."""
 
 
@@ -229,7 +229,9 @@ class Plant(DrivenCoil):
         )
 
     def _pieces(self, signal: str, start: float, end: float) -> Pieces:
-        if signal in ("none", "V_K"):
+        if signal == "supply":
+            return Pieces.constant(self.circuit.V_S, start)
+        if signal in (*PLACED, "V_K"):
             return Pieces.constant(0.0, start)
         if signal == "coil_current":
             return self._electromagnet.currents(start, end)

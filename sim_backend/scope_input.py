@@ -19,6 +19,8 @@ from tactile_lab.bench import Channel
 
 BUFFERED = ("V_C1", "V_C2", "V_K")
 """Nodes of the circuit that are measured through a voltage follower."""
+PLACED = ("none", "ground", "supply")
+"""What a probe touches that is at no node: nothing, 0 V, V_S."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +111,9 @@ def scope_inputs(
     inputs = []
     for channel in channels:
         loose = channel.input in options.open_inputs
-        signal = options.wired.get(channel.input, channel.signal)
+        signal = channel.signal
+        if signal not in PLACED:
+            signal = options.wired.get(channel.input, signal)
         scale = channel.scale
         if loose:
             signal = "none"

@@ -294,6 +294,8 @@ class Bench:
         name: for people.
         simulated: whether physics is computed.
         clock: the time all of it lives in.
+        place_probes: puts the probes of the circuit's voltages on "ground", "supply"
+            or back on the "circuit"; None where a person must.
         accuracy: says, after a run, how accurate the computed physics was.
     """
 
@@ -303,4 +305,5 @@ class Bench:
     coil: Coil | None = None
     scope: Scope | None = None
     field_meter: FieldMeter | None = None
+    place_probes: Callable[[str], None] | None = None
     accuracy: Callable[[], str] | None = None

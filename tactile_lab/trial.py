@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
+from pydantic.fields import FieldInfo
 
 from tactile_lab.waveform import Waveform
+
+Probes = Literal["circuit", "ground", "supply"]
+"""What the probes of the circuit's voltages touch: their nodes, 0 V, or V_S."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +31,8 @@ class Trial:
         hold: (start s, end s) of the part that adaptation is judged on, or None.
         current: drive the coil by this current (A against s) instead of `force`, for
             calibrations that know no force yet.
+        probes: where a person puts the probes of V_C1, V_C2 and V_K before the trial;
+            a simulated bench does it itself.
     """
 
     force: Waveform
@@ -36,6 +42,7 @@ class Trial:
     pause: bool = False
     hold: tuple[float, float] | None = None
     current: Waveform | None = None
+    probes: Probes = "circuit"
 
     @property
     def length(self) -> float:
@@ -98,6 +105,18 @@ class Protocol(BaseModel):
     def trials(self) -> Trials:
         """Yield trials; each ``yield`` returns that trial's outcome."""
         raise NotImplementedError
+
+    sees_supply: ClassVar[bool] = False
+    """The voltage channels' ranges are widened to see all from 0 V to V_S."""
+
+    @classmethod
+    def parameters(cls) -> dict[str, FieldInfo]:
+        """All fields, the class's own before those it shares with others."""
+        named = (
+            n for kind in cls.__mro__ for n in vars(kind).get("__annotations__", ())
+        )
+        fields = cls.model_fields
+        return {name: fields[name] for name in named if name in fields}
 
     def wishes(self) -> tuple[str, ...]:
         """Signals acquired where the bench has them, and missed without complaint."""

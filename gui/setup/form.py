@@ -32,7 +32,7 @@ class Form(QWidget):
         empty(self._rows)
         self.protocol = kind
         self.fields = []
-        for key, info in kind.model_fields.items():
+        for key, info in kind.parameters().items():
             wanted = parameter(key, info)
             field = Field(wanted, values.get(key, wanted.default))
             field.lock(self._locked)

@@ -20,12 +20,13 @@ from tactile_lab.acquisition import events
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.environment import environment
 from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.acquisition.task import Ending, Task
 from tactile_lab.bench import Bench, OffReport, Stream
-from tactile_lab.errors import RecordingError, TactileLabError
+from tactile_lab.errors import RecordingError, SceneError, TactileLabError
 from tactile_lab.plan.calibrated import check_coil
 from tactile_lab.plan.limited import limited
 from tactile_lab.plan.plan import plan
@@ -96,6 +97,8 @@ class Execution:
         realtime: pace a simulated bench by the wall clock.
         emit: told of everything that happens, from the deciding thread.
         notes: kept with the run (operator, sample, ...).
+        ask: asks a person to do something at a real bench and returns when it is done;
+            called in a thread of its own.
 
     Raises:
         SceneError, LimitError: the scene cannot be run on its bench.
@@ -111,11 +114,14 @@ class Execution:
         realtime: bool = False,
         emit: events.Emit = events.ignore,
         notes: Mapping[str, str] | None = None,
+        ask: Ask | None = None,
     ) -> None:
         self.scene = scene
         self.plan = plan(scene, preview=False)
         self.needs = self.plan.needs
         self.bench = bench or open_bench(scene, realtime=realtime)
+        self._ask = ask
+        self._check_somebody_is_there()
         self.stop = StopRequest(self.bench.clock)
         self._emit = emit
         self._notes = dict(notes or {})
@@ -234,7 +240,16 @@ class Execution:
             expected=self.plan.estimate.duration,
             doubts=self._doubts,
             drift=self._drift(),
+            ask=self._ask,
         )
+
+    def _check_somebody_is_there(self) -> None:
+        probed = any(s.trial.probes != "circuit" for s in self.plan.timeline.steps)
+        if probed and self._ask is None and self.bench.place_probes is None:
+            raise SceneError(
+                f"{self.scene.name} needs a person who puts the probes on 0 V and V_S. "
+                "Run it in a terminal, or set protocol.calibrate = false."
+            )
 
     def _drift(self) -> Drift | None:
         scene = self.scene

@@ -17,6 +17,7 @@ from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.person import PLACES, Errand
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.acquisition.search import REST, SpikeSearch
 from tactile_lab.acquisition.stop import Lease, StopRequest
@@ -70,6 +71,8 @@ class Runner:
         self._lease = Lease(bench.clock)
         self.instruments = Instruments.of(bench, stop, self._lease)
         self._told = 0.0
+        self._place_probes = bench.place_probes
+        self._probes = "circuit"
 
     @property
     def duration(self) -> float:
@@ -129,6 +132,8 @@ class Runner:
 
     def _play(self, index: int, trial: Trial) -> Outcome:
         """Play one trial while everything streams."""
+        if trial.probes != self._probes:
+            self._move_probes(trial.probes)
         rest = self._live.levels(self.intake.reached - BASELINE, self.intake.reached)
         drift = self._drifted(rest)
         begin, start = self._begin(index, trial)
@@ -189,6 +194,23 @@ class Runner:
             spike_times=np.empty(0),
             current=self._account.applied_since(begin),
         )
+
+    def _move_probes(self, where: str) -> None:
+        """Have the probes put elsewhere; nothing is streamed meanwhile."""
+        start = self._account.now
+        self._stop_stream()
+        if self._place_probes is not None:
+            self._place_probes(where)
+        elif self._task.ask is not None:
+            errand = Errand(self._task.ask, PLACES[where])
+            self._serve(lambda: errand.ended)
+            errand.check()
+        else:
+            raise RefusedError(f"Nobody is there to ask: {PLACES[where]}")
+        self._probes = where
+        self._account.pause(start, self._account.now)
+        self._start_stream()
+        self._rest_until(self._clock.now() + BASELINE)
 
     def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
         """Begin a trial now: its start in clock time and in run time, s."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.events import RunState
+from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Channel, OffReport
 from tactile_lab.trial import Trial, Trials
@@ -24,6 +25,7 @@ class Task:
         search: how spikes are searched; None where they are not.
         current_for: coil current, A(t), that gives a trial's force within all limits,
             told the time between two set-points, s, and the last set-point, A.
+        ask: asks a person to put the probes elsewhere; None where nobody is there.
         expected: run time expected, s; None if it depends on outcomes.
         doubts: told the opened instruments' settings, says what a person should know
             before the coil is switched on, or raises to prevent it.
@@ -38,6 +40,7 @@ class Task:
     expected: float | None
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
     drift: Drift | None = None
+    ask: Ask | None = None
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,18 @@ from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import show
 
+NODES = ("V_C1", "V_C2", "V_K")
+"""Voltages of the circuit, each on a probe of its own."""
 TOLERANCE = 0.15
 """A voltage may differ from the model by this part of itself, and by 0.25 V."""
 SLACK = 0.25
 FACTORS = (10.0, 0.1, 100.0, 0.01)
 DEAD = 0.02
 """A channel whose voltage is below this part of what it should be is not connected."""
+GAIN_ERROR = 0.1
+"""A gain further from 1 than this is no calibration but a mistake."""
+LEAK = 0.3
+"""Current at rest that no shunt shows where none flows, A: another signal lies there."""
 
 
 @dataclass(frozen=True)
@@ -45,16 +51,78 @@ class Levels:
     push: Mapping[str, float]
 
 
-def judge(found: Levels, expected: Levels) -> tuple[Verdict, ...]:
+@dataclass(frozen=True)
+class ChannelCalibration:
+    """Offset and gain of one channel, from its probe on 0 V and on the supply.
+
+    Attributes:
+        offset: shown at 0 V, V.
+        gain: volts shown per volt.
+        error: standard uncertainty of a corrected voltage, V.
+    """
+
+    offset: float
+    gain: float
+    error: float
+
+    def corrected(self, shown: float) -> float:
+        """The voltage where the channel shows `shown` V."""
+        return (shown - self.offset) / self.gain
+
+
+def calibrate_channel(
+    at_ground: float, at_supply: float, supply: float, code: float
+) -> ChannelCalibration:
+    """Offset and gain of a channel.
+
+    Args:
+        at_ground: mean shown with the probe on 0 V, V.
+        at_supply: mean shown with the probe on the supply, V.
+        supply: the supply, V.
+        code: one code of the converter, V: a mean is known to that over root 12.
+
+    Raises:
+        NotIdentifiableError: offset or gain is absurd; the text says what it may be.
+    """
+    gain = (at_supply - at_ground) / supply
+    shows = f"shows {show(at_ground, 'V', 3)} on 0 V and {show(at_supply, 'V', 3)} on "
+    shows += f"{show(supply, 'V', 3)}"
+    if abs(gain) < DEAD:
+        raise NotIdentifiableError(f"{shows}: open probe")
+    if gain < 0:
+        raise NotIdentifiableError(f"{shows}: the probe is reversed")
+    for factor in FACTORS:
+        if abs(gain / factor - 1) < TOLERANCE:
+            raise NotIdentifiableError(f"{shows}: {_attenuated(factor)}")
+    if gain > 1 + GAIN_ERROR:
+        # past the end of the range: how much too large cannot be told
+        raise NotIdentifiableError(f"{shows} or more: {_attenuated(10)}")
+    if abs(gain - 1) > GAIN_ERROR:
+        raise NotIdentifiableError(f"{shows}: a gain of {gain:.3g}; check the probe")
+    if abs(at_ground) > SLACK:
+        raise NotIdentifiableError(
+            f"{shows}: an offset of {show(at_ground, 'V', 3)}; check the probe's ground"
+        )
+    one = code / math.sqrt(12)
+    return ChannelCalibration(at_ground, gain, math.hypot(one, one))
+
+
+def judge(
+    found: Levels, expected: Levels, faults: Mapping[str, str] | None = None
+) -> tuple[Verdict, ...]:
     """One verdict per measured signal.
 
     Args:
-        found: as measured.
+        found: as measured, corrected where calibrated.
         expected: by the model, and for the coil by what was set.
+        faults: what is wrong by the calibration at 0 V and V_S, by signal.
     """
+    faults = faults or {}
     verdicts = []
     for signal in found.rest:
-        if signal in ("V_C1", "V_C2"):
+        if signal in faults:
+            verdicts.append(Verdict(signal, False, faults[signal]))
+        elif signal in NODES and signal in expected.rest:
             verdicts.append(_voltage(signal, found, expected))
         elif signal in ("coil_current", "field") and expected.push.get(signal):
             verdicts.append(_drive(signal, found, expected))
@@ -66,38 +134,61 @@ def _voltage(signal: str, found: Levels, expected: Levels) -> Verdict:
     change = found.push[signal] - rest
     wanted = expected.push[signal] - should
     says = f"{show(rest, 'V', 3)} at rest, {_signed(change)} by the push"
-    other = "V_C2" if signal == "V_C1" else "V_C1"
-    if _near(rest, should) and change * wanted > 0 and _similar(change, wanted):
+
+    def wrong(text: str) -> Verdict:
+        return Verdict(signal, False, f"{says}{text}")
+
+    alike = change * wanted > 0 and _similar(change, wanted)
+    if _near(rest, should) and (alike or max(abs(change), abs(wanted)) < SLACK / 5):
         return Verdict(signal, True, says)
-    if _near(rest, expected.rest[other]) and _near(found.rest.get(other, rest), should):
-        return Verdict(signal, False, f"{says}: swapped with {other}")
+    for other in NODES:
+        if other != signal and _swapped(signal, other, found, expected):
+            return wrong(f": swapped with {other}")
     if abs(rest) < DEAD * abs(should):
-        return Verdict(signal, False, f"{says}: open probe, or no supply")
+        if abs(found.rest.get("coil_current", 0.0)) > LEAK:
+            return wrong(": swapped with coil_current")
+        return wrong(": open probe, or no supply")
     for factor in FACTORS:
-        if _near(rest / factor, should):
-            return Verdict(
-                signal, False, f"{says}: {factor:g} times too much, check the probe's "
-                "attenuation against `scale`",
-            )  # fmt: skip
+        if abs(should) > SLACK and _near(rest / factor, should):
+            return wrong(f": {_attenuated(factor)}")
     if _near(rest, should) and change * wanted < 0 and _similar(-change, wanted):
-        return Verdict(
-            signal, False, f"{says}: the force acts the other way, so the coil or the "
-            "magnet is reversed",
-        )  # fmt: skip
+        return wrong(": the force acts the other way, so the coil is inverted or the "
+                     "magnet reversed")  # fmt: skip
     if _near(rest, should):
-        return Verdict(
-            signal, False, f"{says}, {_signed(wanted)} expected: the force is not "
-            "what Eq. (2) says, or the magnet is away",
-        )  # fmt: skip
-    return Verdict(
-        signal, False, f"{says}, {show(should, 'V', 3)} expected: check V_GS and V_S"
+        return wrong(f", {_signed(wanted)} expected: the force is not what Eq. (2) "
+                     "says, or the magnet is away")  # fmt: skip
+    return wrong(f", {show(should, 'V', 3)} expected: check V_GS and V_S")
+
+
+def _swapped(one: str, other: str, found: Levels, expected: Levels) -> bool:
+    """Whether each of the two shows what the other should."""
+    if other not in found.rest or other not in expected.rest:
+        return False
+    if _near(expected.rest[one], expected.rest[other]):
+        return False
+    return _near(found.rest[one], expected.rest[other]) and _near(
+        found.rest[other], expected.rest[one]
     )
+
+
+def _attenuated(factor: float) -> str:
+    much = (
+        f"{factor:g} times too much"
+        if factor > 1
+        else f"{1 / factor:g} times too little"
+    )
+    return f"{much}: check the probe's attenuation against `scale`"
 
 
 def _drive(signal: str, found: Levels, expected: Levels) -> Verdict:
     unit = "A" if signal == "coil_current" else "T"
     change = found.push[signal] - found.rest[signal]
     wanted = expected.push[signal] - expected.rest[signal]
+    if signal == "coil_current" and abs(found.rest[signal]) > LEAK:
+        return Verdict(
+            signal, False, f"{show(found.rest[signal], unit, 3)} although none flows: "
+            "another signal's probe lies on its input",
+        )  # fmt: skip
     says = f"{_signed(change, unit)} by the push, {_signed(wanted, unit)} expected"
     ratio = change / wanted if wanted else math.nan
     # a shunt read by 8 bits and an uncalibrated field are rough
@@ -109,7 +200,7 @@ def _drive(signal: str, found: Levels, expected: Levels) -> Verdict:
         return Verdict(signal, False, f"{says}: reversed")
     for factor in FACTORS:
         if 0.5 < ratio / factor < 2:
-            return Verdict(signal, False, f"{says}: {factor:g} times, check the scale")
+            return Verdict(signal, False, f"{says}: {_attenuated(factor)}")
     return Verdict(signal, False, f"{says}: check wiring and scale")
 
 

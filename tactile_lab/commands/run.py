@@ -19,6 +19,7 @@ from tactile_lab.commands.terminal import (
     print_json,
     refusing,
     scene_options,
+    somebody,
     warn,
 )
 
@@ -91,7 +92,12 @@ def command(
         loaded = _scene(scene, overrides, bench, again)
         narrator = Narrator(loaded.name)
         execution = Execution(
-            loaded, out, realtime=realtime, emit=narrator, notes=_notes(notes)
+            loaded,
+            out,
+            realtime=realtime,
+            emit=narrator,
+            notes=_notes(notes),
+            ask=somebody(),
         )
         if transcripts is not None:
             record(execution.bench, transcripts)

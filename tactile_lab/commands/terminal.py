@@ -70,6 +70,19 @@ def print_json(data: Mapping[str, Any]) -> None:
     click.echo(json.dumps(data, allow_nan=False))
 
 
+def somebody() -> Callable[[str], None] | None:
+    """Asks the person at the terminal to do something; None where none sits there."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return None
+
+    def ask(text: str) -> None:
+        click.echo(f"\n{text} Then press Enter.", err=True)
+        if not sys.stdin.readline():
+            raise EOFError("the terminal was closed")
+
+    return ask
+
+
 class Progress:
     """How far a long piece of work is, on stderr.
 

@@ -6,7 +6,8 @@ opened, enabled, streamed, stored or computed by any of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from tactile_lab.bench import Channel
 from tactile_lab.errors import SceneError
@@ -18,6 +19,9 @@ from tactile_lab.signals import SIGNALS
 
 SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
 """Signals that exist as samples of a scope channel and in no other way."""
+
+NODES = ("V_C1", "V_C2", "V_K")
+"""Voltages of the circuit between 0 V and its supply."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +81,9 @@ def needs(scene: Scene) -> Needs:
             "[field_meter]."
         )
     channels = tuple(c for name, c in wired.items() if name in streamed)
+    if scene.protocol.sees_supply and scope is not None:
+        ranges = scope_capability(scope).ranges
+        channels = tuple(_widened(c, scene.circuit.V_S, ranges) for c in channels)
     if detect_on == "V_K":
         _check_threshold(scene, wired["V_K"])
     rate = float("inf")
@@ -109,6 +116,16 @@ def needs(scene: Scene) -> Needs:
         ),
         guaranteed_rate=rate,
     )
+
+
+def _widened(channel: Channel, supply: float, ranges: Sequence[float]) -> Channel:
+    """A voltage channel that sees all from 0 V to the supply, with a margin of 10 %."""
+    if channel.signal not in NODES:
+        return channel
+    middle = supply / 2 / channel.scale
+    enough = [r for r in ranges if r >= 1.2 * abs(middle)]
+    chosen = min(enough) if enough else max(ranges)
+    return replace(channel, range=chosen, offset=-middle, coupling="DC")
 
 
 def _check_threshold(scene: Scene, channel: Channel) -> None:

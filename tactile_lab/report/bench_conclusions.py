@@ -15,19 +15,13 @@ from tactile_lab.analysis.field_calibration import (
     fit_field,
     write_calibration,
 )
-from tactile_lab.analysis.wiring import Levels, explaining_V_GS, hum, judge
 from tactile_lab.errors import NotIdentifiableError, QuantityError
-from tactile_lab.model.equations import rest_V_C1
-from tactile_lab.model.simulate import simulate
 from tactile_lab.quantity import parse, show
 from tactile_lab.report.conclusion import Conclusion
-from tactile_lab.report.run_data import RunData, Trace, TrialData
+from tactile_lab.report.run_data import RunData, TrialData
 from tactile_lab.report.trial_finding import TrialFinding
 
 FloatArray = NDArray[np.float64]
-
-EIGHT_BITS = 16e-3
-"""One code of V_C1 on the built-in bench, V: what its offset is known to."""
 
 
 def calibrate_field(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
@@ -141,74 +135,6 @@ def force_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     return Conclusion((said,), {"read_over_eq2": scale, "standard_error": error})
 
 
-def wiring_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
-    """One verdict per channel, the mains hum, and the V_GS the rest explains."""
-    if run.circuit is None or len(trials) < 2:
-        return Conclusion(("Rest and push were not both completed.",))
-    windows = [_window(t.trial) for t in trials[:2]]
-    signals = [t for t in run.traces if t.source == "measured"]
-    found = Levels(
-        *({t.signal: _mean(t, w) for t in signals} | _readings(run, w) for w in windows)
-    )
-    model = simulate(
-        run.circuit, run.force, keep=("V_C1",), until=run.duration, tolerance=1e-6
-    )
-    centres = np.array([sum(w) / 2 for w in windows])
-    node_a = model.sample("V_C1", centres)
-    silent = simulate(
-        run.circuit, run.force, keep=("V_C2",), until=run.duration, tolerance=1e-6
-    )
-    second = silent.sample("V_C2", centres)
-    amperes = [_applied(run, w) for w in windows]
-    expected = Levels(
-        *(
-            {
-                "V_C1": float(a),
-                "V_C2": float(b),
-                "coil_current": c,
-                "field": c * (run.field_per_ampere or 0.0),
-            }
-            for a, b, c in zip(node_a, second, amperes, strict=True)
-        )
-    )
-    verdicts = judge(found, expected)
-    sentences = [
-        f"{v.signal}: {'as wired' if v.ok else 'WRONG'}, {v.text}." for v in verdicts
-    ]
-    values = {"channels": {v.signal: {"ok": v.ok, "text": v.text} for v in verdicts}}
-    sentences += _hum(signals, windows[0])
-    if "V_C1" in found.rest:
-        sentences.append(_gate(run, found.rest["V_C1"]))
-    return Conclusion(tuple(sentences), values)
-
-
-def _hum(signals: Sequence[Trace], window: tuple[float, float]) -> list[str]:
-    said = []
-    for trace in signals:
-        inside = (trace.time >= window[0]) & (trace.time <= window[1])
-        unit = "A" if trace.signal == "coil_current" else "V"
-        try:
-            size = hum(trace.time[inside], trace.mean[inside])
-        except NotIdentifiableError:
-            continue
-        said.append(f"{trace.signal}: {show(size, unit, 2)} of 50 Hz hum.")
-    return said
-
-
-def _gate(run: RunData, V_C1: float) -> str:
-    assert run.circuit is not None
-    model = rest_V_C1(run.circuit)
-    try:
-        gate = explaining_V_GS(run.circuit, V_C1, EIGHT_BITS)
-    except NotIdentifiableError as reason:
-        return f"{str(reason)[0].upper()}{str(reason)[1:]}."
-    return (
-        f"V_C1 rests at {show(V_C1, 'V')}, the model at {show(model, 'V')}: a V_GS of "
-        f"{show(gate.value, 'V')} ({show(gate.low, 'V')} to {show(gate.high, 'V')}) "
-        "explains it; `threshold_search` refines it (0.65 mN per mV)."
-    )
-
-
 def monitor(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """How far the sensor sits from its threshold."""
     trace = run.trace("V_C1")
@@ -223,29 +149,3 @@ def monitor(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         f"{'is silent' if distance > 0 else 'fires'} at rest."
     )
     return Conclusion((said,), {"distance_to_threshold_V": distance})
-
-
-def _window(trial: TrialData) -> tuple[float, float]:
-    start, end = trial.hold or (0.0, trial.duration)
-    # the second half: the followers and node A have settled
-    return trial.start + (start + end) / 2, trial.start + end
-
-
-def _mean(trace: Trace, window: tuple[float, float]) -> float:
-    inside = (trace.time >= window[0]) & (trace.time <= window[1])
-    return float(trace.mean[inside].mean()) if inside.any() else float("nan")
-
-
-def _readings(run: RunData, window: tuple[float, float]) -> dict[str, float]:
-    if run.field is None or not len(run.field):
-        return {}
-    time, value = run.field.T
-    inside = (time >= window[0]) & (time <= window[1])
-    return {"field": float(value[inside].mean())} if inside.any() else {}
-
-
-def _applied(run: RunData, window: tuple[float, float]) -> float:
-    if run.current is None or not len(run.current):
-        return 0.0
-    before = run.current[:, 0] <= window[1]
-    return float(run.current[before][-1, 1]) if before.any() else 0.0

@@ -18,13 +18,13 @@ from tactile_lab.report.bench_conclusions import (
     calibrate_field,
     force_check,
     monitor,
-    wiring_check,
 )
 from tactile_lab.report.conclusion import NO_UNCERTAINTY, Conclusion
 from tactile_lab.report.preparation import force_at_zero
 from tactile_lab.report.run_data import RunData, Trace
 from tactile_lab.report.sweep import sine_sweep
 from tactile_lab.report.trial_finding import TrialFinding
+from tactile_lab.report.wiring import wiring_check
 
 LATE = 0.15
 """A coil set over a serial line is late: the first part of a hold still rises, s."""

@@ -111,7 +111,8 @@ def _clock_uncertainty(segments: Records, time: float) -> float | None:
 
 
 def _trace(run: Run, name: str) -> Trace:
-    cells = run.signal(name).envelope(cells=CELLS)
+    signal = run.signal(name)
+    cells = signal.envelope(cells=CELLS)
     half = np.diff(cells.time, append=cells.time[-1:]) / 2
     half[-1:] = half[-2:-1]
     return Trace(
@@ -120,6 +121,8 @@ def _trace(run: Run, name: str) -> Trace:
         mean=cells.mean,
         low=cells.low,
         high=cells.high,
+        scale=float(signal.attributes.get("scale", 1.0)),
+        code=abs(signal.gain),
     )
 
 

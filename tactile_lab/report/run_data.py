@@ -65,6 +65,8 @@ class Trace:
         mean: shape (n,), SI.
         low, high: shape (n,), extremes within each bin, SI, or None.
         source: "measured", "derived" or "model".
+        scale: unit per volt at the scope's input.
+        code: one code of the converter, SI; None where it is not digitised.
     """
 
     signal: str
@@ -73,6 +75,8 @@ class Trace:
     low: FloatArray | None = None
     high: FloatArray | None = None
     source: Source = "measured"
+    scale: float = 1.0
+    code: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
