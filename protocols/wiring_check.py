@@ -26,7 +26,7 @@ class WiringCheck(Protocol):
     name: ClassVar[str] = "wiring_check"
     title: ClassVar[str] = "Wiring check"
     signals: ClassVar[tuple[str, ...]] = (
-        "force", "coil_current", "field", "V_C1", "V_C2", "V_K", "spikes",
+        "force", "coil_current", "field", "V_C1", "V_C2", "V_K",
     )  # fmt: skip
     sees_supply: ClassVar[bool] = True
 

@@ -25,7 +25,7 @@ DEAD = 0.02
 GAIN_ERROR = 0.1
 """A gain further from 1 than this is no calibration but a mistake."""
 LEAK = 0.3
-"""Current at rest that no shunt shows where none flows, A: another signal lies there."""
+"""A shunt that shows more where none flows, A, carries another signal."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:
     """Amplitude of a sine of that frequency in a trace, in the trace's unit.
 
     Args:
-        time: s; at least four points a cycle.
+        time: s; at least two and a half points a cycle.
         values: any unit.
         frequency: mains, Hz.
 
@@ -228,7 +228,7 @@ def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:
         NotIdentifiableError: too coarse or too short for that frequency.
     """
     t, y = np.asarray(time, float), np.asarray(values, float)
-    if t.size < 8 or np.median(np.diff(t)) > 0.25 / frequency:
+    if t.size < 8 or np.median(np.diff(t)) > 0.4 / frequency:
         raise NotIdentifiableError(
             f"the trace is too coarse to show {frequency:g} Hz; sample faster"
         )

@@ -61,7 +61,7 @@ def read(folder: Path) -> RunData:
             newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
             traces=tuple(_trace(run, name) for name in run.signals),
             circuit=scene.circuit,
-            searched=bool({"V_K", "spikes", "rate"} & set(scene.record.signals)),
+            searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             divider=_divider(scene),
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),

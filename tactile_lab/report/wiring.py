@@ -18,7 +18,7 @@ from tactile_lab.analysis.wiring import (
     judge,
 )
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.model.circuit import rest_V_C1
+from tactile_lab.model.equations import rest_V_C1
 from tactile_lab.model.simulate import simulate
 from tactile_lab.quantity import parse, show
 from tactile_lab.report.conclusion import Conclusion
@@ -60,8 +60,8 @@ def wiring_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
             f"{verdict.text}{said}."
         )
     sentences += [
-        f"{name}: offset {show(c.offset, 'V', 2)}, gain {c.gain:.3f}, from 0 V and V_S; a "
-        f"voltage is known to ±{show(2 * c.error, 'V', 2)} (95 %)."
+        f"{name}: offset {show(c.offset, 'V', 2)}, gain {c.gain:.3f} by 0 V and V_S; "
+        f"it is known to ±{show(2 * c.error, 'V', 2)} (95 %)."
         for name, c in calibrations.items()
     ]
     values: dict[str, Any] = {"channels": channels}

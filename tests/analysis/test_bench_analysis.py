@@ -121,7 +121,7 @@ def test_a_right_wiring_passes():
         ("V_C2", {"V_C1": (1.448, 2.05), "V_C2": (4.347, 4.21)}, "swapped with V_C1"),
         ("V_C1", {"V_C1": (4.347, 4.47)}, "reversed"),
         ("V_C1", {"V_C1": (0.01, 0.01)}, "open probe"),
-        ("V_C1", {"V_C1": (0.4347, 0.421)}, "0.1 times too much"),
+        ("V_C1", {"V_C1": (0.4347, 0.421)}, "10 times too little"),
         ("V_C2", {"V_C2": (14.48, 20.5)}, "10 times too much"),
         ("V_C1", {"V_C1": (4.347, 4.346)}, "magnet is away"),
         ("V_C1", {"V_C1": (3.0, 2.8)}, "check V_GS"),

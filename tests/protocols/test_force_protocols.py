@@ -230,7 +230,12 @@ def test_calibrate_field_never_overshoots_a_step():
 
 
 def test_wiring_check_pushes_little():
-    rest, push, again = drive(WiringCheck(), quiet)
+    ground, supply, rest, push, again = drive(WiringCheck(), quiet)
+    assert (ground.probes, supply.probes, rest.probes) == (
+        "ground",
+        "supply",
+        "circuit",
+    )
     assert rest.force.peak == again.force.peak == 0
     assert push.force.peak <= 0.1
 

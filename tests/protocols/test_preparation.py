@@ -18,7 +18,8 @@ from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
 from tactile_lab.errors import LimitError
-from tactile_lab.model.circuit import Circuit, rest_V_C1
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest_V_C1
 from tactile_lab.model.simulate import simulate
 from tactile_lab.plan.needs import needs
 from tactile_lab.report.from_run import read
