@@ -210,7 +210,8 @@ class Runner:
         self._probes = where
         self._account.pause(start, self._account.now)
         self._start_stream()
-        self._rest_until(self._clock.now() + BASELINE)
+        # the newest samples lag by a poll: none from before the move count as rest
+        self._rest_until(self._clock.now() + 2 * BASELINE)
 
     def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
         """Begin a trial now: its start in clock time and in run time, s."""

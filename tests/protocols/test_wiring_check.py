@@ -107,9 +107,8 @@ def test_where_nobody_can_move_the_probes_it_is_refused_at_once(tmp_path):
 
 
 def test_a_person_is_asked_for_each_place_in_turn(tmp_path):
-    """On the wall clock, as on a real bench; the coil stays at 0 A meanwhile."""
     scene = load("wiring_check", ("protocol.hold=0.2 s", "record.sample_rate=10 kS/s"))
-    bench = open_bench(scene, realtime=True)
+    bench = open_bench(scene)
     move, asked = bench.place_probes, []
 
     def ask(text):
@@ -126,7 +125,7 @@ def test_a_person_is_asked_for_each_place_in_turn(tmp_path):
 
 def test_a_person_who_goes_away_ends_the_run_safely(tmp_path):
     scene = load("wiring_check", ("protocol.hold=0.2 s", "record.sample_rate=10 kS/s"))
-    bench = replace(open_bench(scene, realtime=True), place_probes=None)
+    bench = replace(open_bench(scene), place_probes=None)
 
     def gone(text):
         raise EOFError("the terminal was closed")

@@ -147,7 +147,7 @@ def test_bipolar_tells_the_currents_and_tau():
 
 def test_wiring_check_passes_a_right_bench_and_names_a_wrong_one():
     quiet = Waveform.through([(0.0, 0.0), (1.25, 0.0)])
-    steps = [("rest", 0.0, quiet, False), pulse(0.05)]
+    steps = [("rest", 0.0, quiet, False), ("push", *pulse(0.05)[1:])]
     run = modelled("wiring_check", steps)
     channels = find(run).conclusion.values["channels"]
     assert {name for name, given in channels.items() if given["ok"]} == {"V_C1", "V_C2"}
