@@ -50,7 +50,6 @@ class WiringCheck(Protocol):
         return Trial(
             force=Waveform.through([(0.0, 0.0), (self.hold, 0.0)]),
             label=label,
-            level=0.0,
             hold=(0.0, self.hold),
             probes=probes,
         )

@@ -37,6 +37,10 @@ class Findings:
     twin: Twin | None
 
 
+ELSEWHERE = frozenset({"wiring_check"})
+"""Protocols that put the probes elsewhere: nothing follows from V_C1 alone."""
+
+
 def find(run: RunData) -> Findings:
     """Compute a run's numbers.
 
@@ -44,15 +48,9 @@ def find(run: RunData) -> Findings:
     statement, never an error: what can be told is told.
     """
     notes: tuple[str, ...] = ()
-    try:
-        run, notes = _with_drain_current(run)
-    except TactileLabError as reason:
-        notes = (f"No I_DS: {reason}",)
     beside = None
-    try:
-        run, beside = with_twin(run)
-    except TactileLabError as reason:
-        notes = (*notes, f"The model could not run beside: {reason}")
+    if run.protocol not in ELSEWHERE:
+        run, beside, notes = _derived(run)
     trials = tuple(TrialFinding.of(trial) for trial in _shown(run.trials))
     try:
         conclusion = conclude(run, trials)
@@ -65,6 +63,21 @@ def find(run: RunData) -> Findings:
         conclusion=conclusion,
         twin=beside,
     )
+
+
+def _derived(run: RunData) -> tuple[RunData, Twin | None, tuple[str, ...]]:
+    """The run with I_DS and the model beside it, and what to say of them."""
+    notes: tuple[str, ...] = ()
+    beside = None
+    try:
+        run, notes = _with_drain_current(run)
+    except TactileLabError as reason:
+        notes = (f"No I_DS: {reason}",)
+    try:
+        run, beside = with_twin(run)
+    except TactileLabError as reason:
+        notes = (*notes, f"The model could not run beside: {reason}")
+    return run, beside, notes
 
 
 def _shown(trials: Sequence[TrialData]) -> list[TrialData]:
