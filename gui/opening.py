@@ -75,14 +75,17 @@ class Opening(QObject):
         else:
             self.open_scene(str(path))
 
-    def open_scene(self, name: str | None) -> None:
-        """Put a scene into the form; a mistake in it is shown, nothing else changes."""
+    def open_scene(self, name: str | None) -> bool:
+        """Put a scene into the form; whether that went well.
+
+        A mistake in the scene is shown, and nothing else changes.
+        """
         before = self._window.setup.form.texts()
         try:
             self._window.setup.open_scene(name)
         except (TactileLabError, OSError) as error:
             self.say(str(error))
-            return
+            return False
         after = self._window.setup.form.texts()
         new = [f"{key} {before[key]} → {value}" for key, value in after.items()
                if key in before and before[key] != value]  # fmt: skip
@@ -90,6 +93,13 @@ class Opening(QObject):
         self._window.session.log(
             Level.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
         )
+        return True
+
+    def run_scene(self, name: str) -> None:
+        """Put a shipped scene into the form, and run it as soon as it is planned."""
+        self.leave_run()
+        if self.open_scene(name):
+            self._window.setup.start_when_planned()
 
     def open_run(self, folder: Path) -> None:
         """Open a run from disk in the same lanes; read away from this thread."""

@@ -24,7 +24,9 @@ class Choice:
         scope: driver of the oscilloscope, "" for none.
         scope_serial, scope_library: which one, and where the vendor's library lies.
         channels: (input, signal, range, offset, shunt) of each wired input.
-        magnet: r, A1, A2, B1 and B2_per_ampere.
+        magnet: r, A1, A2, B1 and B2_per_ampere, and the calibration if there is one.
+        base: the bench that the choice started from; what the dialog does not show
+            (limits, hand-set voltages, couplings) is taken over from it.
     """
 
     name: str = "my bench"
@@ -37,47 +39,51 @@ class Choice:
     scope_library: str = ""
     channels: list[tuple[str, str, str, str, str]] = field(default_factory=list)
     magnet: dict[str, str] = field(default_factory=dict)
+    base: dict[str, Any] = field(default_factory=dict)
 
 
 def start_choice() -> Choice:
     """The built-in bench's wiring and geometry, with no instrument chosen."""
-    data = _built_in()
-    channels = [
-        (
-            str(one["input"]),
-            str(one["signal"]),
-            str(one["range"]),
-            str(one.get("offset", "0 V")),
-            str(one.get("shunt", "")),
-        )
-        for one in data["scope"]["channels"]
-    ]
-    return Choice(
-        channels=channels, magnet={k: str(v) for k, v in data["magnet"].items()}
-    )
+    choice = Choice()
+    _take_over(choice, _built_in())
+    return choice
+
+
+def show_bench(choice: Choice, spec: BenchSpec) -> None:
+    """Let `choice` start from a bench; a simulated one chooses no port."""
+    choice.name = spec.name
+    _take_over(choice, spec.table.model_dump(by_alias=True, exclude_none=True))
 
 
 def bench_text(choice: Choice) -> str:
-    """The bench file; limits are the built-in ones and can be narrowed by hand."""
+    """The bench file that `choice` describes."""
+    base = choice.base
+    kept = ("notes", "hand_set")
     data: dict[str, Any] = {"name": choice.name, "simulated": False}
+    data |= {key: base[key] for key in kept if base.get(key)}
     if choice.coil_port:
+        same = base.get("coil", {}).get("dialect") == choice.coil_dialect
         data["coil"] = {
+            **(base["coil"] if same else {}),
             "dialect": choice.coil_dialect,
             "port": choice.coil_port,
-            "limits": _built_in()["coil"]["limits"],
+            "limits": base.get("coil", _built_in()["coil"])["limits"],
         }
     if choice.scope:
-        scope: dict[str, Any] = {"driver": choice.scope}
-        for key, value in (
-            ("serial", choice.scope_serial),
-            ("library", choice.scope_library),
-        ):
-            if value:
-                scope[key] = value
-        scope["channels"] = [_channel(row) for row in choice.channels if row[1]]
+        scope = dict(base.get("scope", {}))
+        if scope.get("driver") != choice.scope:
+            scope = {}
+        scope |= {
+            "driver": choice.scope,
+            "serial": choice.scope_serial or None,
+            "library": choice.scope_library or None,
+            "channels": [_channel(choice, row) for row in choice.channels if row[1]],
+        }
         data["scope"] = scope
     if choice.meter_port:
+        meter = base.get("field_meter", {})
         data["field_meter"] = {
+            **(meter if meter.get("dialect") == choice.meter_dialect else {}),
             "dialect": choice.meter_dialect,
             "port": choice.meter_port,
         }
@@ -103,13 +109,40 @@ def save_bench(choice: Choice, path: Path) -> BenchSpec:
     return spec
 
 
-def _channel(row: tuple[str, str, str, str, str]) -> dict[str, str]:
+def _take_over(choice: Choice, data: dict[str, Any]) -> None:
+    choice.base = data
+    scope = data.get("scope", {})
+    choice.channels = [
+        (
+            str(one["input"]),
+            str(one["signal"]),
+            str(one["range"]),
+            str(one.get("offset", "0 V")),
+            str(one.get("shunt", "")),
+        )
+        for one in scope.get("channels", ())
+    ]
+    choice.magnet = {key: str(value) for key, value in data["magnet"].items()}
+    choice.scope = str(scope.get("driver", ""))
+    choice.scope_serial = str(scope.get("serial", ""))
+    choice.scope_library = str(scope.get("library", ""))
+    for role, name in (("coil", "coil"), ("field_meter", "meter")):
+        found = data.get(role, {})
+        port = str(found.get("port", ""))
+        setattr(choice, f"{name}_port", "" if port.startswith("sim:") else port)
+        if "dialect" in found:
+            setattr(choice, f"{name}_dialect", str(found["dialect"]))
+
+
+def _channel(choice: Choice, row: tuple[str, str, str, str, str]) -> dict[str, Any]:
     where, signal, full, offset, shunt = row
-    made = {"signal": signal, "input": where, "range": full}
-    if offset and offset != "0 V":
-        made["offset"] = offset
+    known = choice.base.get("scope", {}).get("channels", ())
+    base = next((dict(one) for one in known if one["signal"] == signal), {})
+    made = {**base, "signal": signal, "input": where, "range": full}
+    made["offset"] = offset or "0 V"
+    made["shunt"] = shunt or None
     if shunt:
-        made["shunt"] = shunt
+        made.pop("scale", None)
     return made
 
 

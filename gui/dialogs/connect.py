@@ -1,159 +1,115 @@
-"""The connect dialog: instruments, wiring, calibration; saves a bench file."""
+"""The connect dialog: instruments, wiring, calibration; saves a bench file.
+
+The wiring check and the field calibration run as any other scene does: the form shows
+them, STOP stops them, their run folder is kept. The pages only watch.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFileDialog,
-    QGridLayout,
     QHBoxLayout,
     QLineEdit,
     QStackedWidget,
-    QTableWidget,
-    QTableWidgetItem,
     QWidget,
 )
 
-from gui.dialogs.bench_text import Choice, save_bench, start_choice
+from gui.dialogs.bench_text import save_bench, show_bench, start_choice
+from gui.dialogs.calibrating import Calibrating
 from gui.dialogs.instruments import Instruments
 from gui.dialogs.overlay import Overlay
-from gui.parts import Segments, column, label, push
-from gui.session.messages import Level
+from gui.dialogs.wiring import Wiring
+from gui.look.theme import Theme
+from gui.parts import Segments, column, label, push, scrolling
+from gui.review.conclusion import conclusion_of
+from gui.session.messages import Level, Planned
+from gui.session.session import Session
+from gui.state import State, minutes
 from tactile_lab.errors import TactileLabError
+from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 
 if TYPE_CHECKING:
     from gui.window import Window
 
-COLUMNS = ("Input", "Signal", "Range", "Offset", "Shunt")
-MAGNET = (
-    ("r", "Distance magnet to pole face"),
-    ("A1", "Area of the magnet"),
-    ("A2", "Area of the core"),
-    ("B1", "Field of the magnet"),
-    ("B2_per_ampere", "Field of the coil"),
-)
-
-
-class Wiring(QWidget):
-    """What is connected to which input, and the geometry of the magnet."""
-
-    def __init__(self, choice: Choice) -> None:
-        super().__init__()
-        self._choice = choice
-        self.table = QTableWidget(len(choice.channels), len(COLUMNS))
-        self.table.setAccessibleName("Oscilloscope inputs")
-        self.table.setHorizontalHeaderLabels(list(COLUMNS))
-        self.table.verticalHeader().hide()
-        self.table.horizontalHeader().setStretchLastSection(True)
-        self.table.setMinimumHeight(160)
-        for row, cells in enumerate(choice.channels):
-            for where, text in enumerate(cells):
-                self.table.setItem(row, where, QTableWidgetItem(text))
-        self.fields: dict[str, QLineEdit] = {}
-        grid = QGridLayout()
-        for row, (key, words) in enumerate(MAGNET):
-            edit = QLineEdit(choice.magnet.get(key, ""))
-            edit.setAccessibleName(words)
-            self.fields[key] = edit
-            grid.addWidget(label(words), row, 0)
-            grid.addWidget(edit, row, 1)
-        self.check = push("Prepare the wiring check")
-        whole = column(self, spacing=10)
-        whole.addWidget(
-            label(
-                "The wiring check makes a small push and says whether each channel is "
-                "what this table says: swapped, inverted, open, wrong attenuation.",
-                "muted",
-                wrap=True,
-            )
-        )
-        whole.addWidget(self.table)
-        whole.addLayout(grid)
-        whole.addWidget(self.check)
-
-    def take(self) -> None:
-        """Put the table and the geometry into the choice."""
-        rows = []
-        for row in range(self.table.rowCount()):
-            cells = [self.table.item(row, where) for where in range(len(COLUMNS))]
-            texts = [cell.text().strip() if cell else "" for cell in cells]
-            rows.append((texts[0], texts[1], texts[2], texts[3], texts[4]))
-        self._choice.channels = rows
-        for key, edit in self.fields.items():
-            self._choice.magnet[key] = edit.text().strip()
-
-
-class Calibration(QWidget):
-    """Which calibrations there are, and how to run them."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.field = push("Prepare the field calibration")
-        self.force = push("Prepare the force check")
-        whole = column(self, spacing=10)
-        whole.addWidget(label("Field of the coil", "title"))
-        whole.addWidget(
-            label(
-                "Demagnetises the core, runs conditioning loops, then both branches of "
-                "the field against the current with the teslameter at the magnet's "
-                "place. Results shows the loop while it runs; the report writes a "
-                "dated calibration file that a bench file names under [magnet].",
-                "",
-                wrap=True,
-            )
-        )
-        whole.addWidget(self.field)
-        whole.addSpacing(10)
-        whole.addWidget(label("Force", "title"))
-        whole.addWidget(
-            label(
-                "Holds some currents and compares Eq. (2) with your own reading of the "
-                "force. Table 1 prints an A2 ten times too large for a 15 mm core.",
-                "",
-                wrap=True,
-            )
-        )
-        whole.addWidget(self.force)
-        whole.addStretch(1)
+WIRING, FIELD = "wiring_check", "calibrate_field"
 
 
 class Connect(Overlay):
-    """Three pages and one file."""
+    """Three pages and one file.
 
-    def __init__(self, window: Window) -> None:
-        super().__init__(window, 720)
-        self._main = window
+    Args:
+        window: what is covered.
+        session: of the window; the pages watch what it runs.
+        theme: colours.
+    """
+
+    prepare_asked = Signal(str)
+    """A shipped scene belongs into the form."""
+    run_asked = Signal(str)
+    """A shipped scene belongs into the form, and is to be run."""
+
+    def __init__(self, window: QWidget, session: Session, theme: Theme) -> None:
+        super().__init__(window, 760)
+        self.session = session
         self._choice = start_choice()
+        self._shown: BenchSpec | None = None
+        self._running, self._begun = "", False
         self.instruments = Instruments(self._choice)
-        self.wiring = Wiring(self._choice)
-        self.calibration = Calibration()
+        self.wiring = Wiring(self._choice, theme)
+        self.calibration = Calibrating(self._choice, theme)
         self.name = QLineEdit(self._choice.name)
         self.name.setAccessibleName("Name of the bench")
         self.problem = label("", "error", wrap=True)
         self.problem.hide()
-        self._pages = QStackedWidget()
+        self.pages = QStackedWidget()
         for page in (self.instruments, self.wiring, self.calibration):
-            self._pages.addWidget(page)
-        self._tabs = Segments(["Instruments", "Wiring", "Calibration"], "Page")
-        self._tabs.choose(0)
-        self._tabs.group.idClicked.connect(self._pages.setCurrentIndex)
+            self.pages.addWidget(scrolling(page))
+        self.tabs = Segments(["Instruments", "Wiring", "Calibration"], "Page")
         self.save = push("Save bench file and connect …", "primary")
         self.open_file = push("Open bench file …")
         self.close_button = push("Close")
         self._lay_out()
+        self.show_page(0)
+        self.tabs.group.idClicked.connect(self.show_page)
         self.save.clicked.connect(self._ask_and_save)
         self.open_file.clicked.connect(self._ask_and_open)
         self.close_button.clicked.connect(self.hide)
-        self.wiring.check.clicked.connect(lambda: self._prepare("wiring_check"))
-        self.calibration.field.clicked.connect(lambda: self._prepare("calibrate_field"))
-        self.calibration.force.clicked.connect(lambda: self._prepare("force_check"))
+        self.wiring.check_asked.connect(lambda: self._run(WIRING))
+        self.calibration.field_asked.connect(lambda: self._run(FIELD))
+        self.calibration.force_asked.connect(self._prepare_force)
+        self.calibration.use_asked.connect(self._ask_and_use)
+        session.changed.connect(self._follow)
+        session.planned.connect(self._planned)
+        session.trial_ended.connect(self._trial_ended)
+        session.reported.connect(self._reported)
+
+    def show_bench(self) -> None:
+        """Show the connected bench, where there is one."""
+        spec = self.session.spec
+        if spec is not None and spec is not self._shown:
+            self._shown = spec
+            show_bench(self._choice, spec)
+            self.name.setText(self._choice.name)
+            self.instruments.show_choice()
+            self.wiring.show_choice()
+            self.calibration.show_choice()
+        self._follow()
+
+    def show_page(self, number: int) -> None:
+        """0 Instruments, 1 Wiring, 2 Calibration."""
+        self.tabs.choose(number)
+        self.pages.setCurrentIndex(number)
 
     def save_to(self, path: Path) -> bool:
         """Write the bench file and connect; whether it can be used."""
         choice = self.instruments.take()
         self.wiring.take()
+        self.calibration.take()
         choice.name = self.name.text().strip() or "my bench"
         try:
             save_bench(choice, path)
@@ -161,10 +117,108 @@ class Connect(Overlay):
             self._say(str(error))
             return False
         self._say("")
-        self._main.session.log(Level.GOOD, "bench", f"Saved {path}")
+        self.session.log(Level.GOOD, "bench", f"Saved {path}")
         self.hide()
-        self._main.session.connect_bench(str(path))
+        self.session.connect_bench(str(path))
         return True
+
+    def use_calibration(self, calibration: Path, path: Path) -> bool:
+        """Save the connected bench with a calibration, and connect to it."""
+        spec = self.session.spec
+        if spec is None:
+            self._say("No bench is connected that the calibration could belong to.")
+            return False
+        try:
+            write_calibrated_bench(spec, calibration, path)
+        except TactileLabError as error:
+            self._say(str(error))
+            return False
+        self._say("")
+        self.session.log(Level.GOOD, "bench", f"Saved {path} with its calibration")
+        self.session.connect_bench(str(path))
+        self.show_bench()
+        return True
+
+    # --- the runs the pages ask for
+
+    def _run(self, scene: str) -> None:
+        self._running, self._begun = scene, False
+        self._say_progress("Preparing …", busy=True)
+        self.run_asked.emit(scene)
+        self._follow()
+
+    def _planned(self, planned: Planned) -> None:
+        if self._running and planned.problem:
+            self._end(planned.problem)
+
+    def _trial_ended(self, outcome: object) -> None:
+        source = self.session.source
+        if self._running == FIELD and source is not None:
+            self.calibration.show_loop(source.loop)
+
+    def _reported(self, folder: Path) -> None:
+        """Show what a wiring check or a field calibration found, whoever ran it."""
+        try:
+            found = conclusion_of(folder)
+        except TactileLabError as error:
+            if self._running:
+                self._end(str(error))
+            return
+        if found.protocol == WIRING:
+            self.wiring.show_conclusion(found)
+        elif found.protocol == FIELD:
+            self.calibration.show_conclusion(found)
+        if found.protocol == self._running:
+            self._end(f"Kept as {folder.name}")
+        if self.isVisible():
+            self.open()
+
+    def _follow(self) -> None:
+        """Say where the run is that a page asked for, or why there can be none."""
+        session = self.session
+        if self._running:
+            if session.state is State.FAULT:
+                self._end(session.fault.title if session.fault else "Fault")
+            elif session.state is State.RUNNING and session.trial is not None:
+                self._begun = True
+                index, words = session.trial
+                left = ""
+                if session.expected is not None:
+                    rest = minutes(max(0.0, session.expected - session.elapsed))
+                    left = f", {rest} left"
+                self._say_progress(f"Step {index + 1}: {words}{left}", busy=True)
+            elif session.state is State.ABORTING:
+                self._end("Stopped.")
+            elif session.state is State.READY and self._begun:
+                self._say_progress("Judging what was recorded …", busy=True)
+            return
+        reason = {
+            State.READY: "",
+            State.DISCONNECTED: "Connect a bench first.",
+            State.CONNECTING: "The bench is still connecting.",
+        }.get(session.state, "Another run is in progress.")
+        if session.manual is not None:
+            reason = "The coil is driven by hand; switch it off first."
+        for page, button in (
+            (self.wiring, self.wiring.check),
+            (self.calibration, self.calibration.field),
+        ):
+            button.setEnabled(not reason)
+            button.setToolTip(reason)
+            if reason or not page.progress.text().startswith("Kept"):
+                page.progress.setText(reason)
+
+    def _say_progress(self, text: str, *, busy: bool) -> None:
+        page = self.wiring if self._running == WIRING else self.calibration
+        page.show_progress(text, busy=busy)
+        for other in (self.wiring.check, self.calibration.field):
+            other.setEnabled(not busy)
+
+    def _end(self, text: str) -> None:
+        self._say_progress(text, busy=False)
+        self._running = ""
+
+    # --- files
 
     def _ask_and_save(self) -> None:
         name, _ = QFileDialog.getSaveFileName(
@@ -179,11 +233,22 @@ class Connect(Overlay):
         )
         if name:
             self.hide()
-            self._main.session.connect_bench(name)
+            self.session.connect_bench(name)
 
-    def _prepare(self, scene: str) -> None:
+    def _ask_and_use(self, calibration: Path | None) -> None:
+        spec = self.session.spec
+        if calibration is None or spec is None:
+            return
+        start = "bench.toml" if spec.path is None else str(spec.path)
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Save the calibrated bench", start, "Bench files (*.toml)"
+        )
+        if name:
+            self.use_calibration(calibration, Path(name))
+
+    def _prepare_force(self) -> None:
         self.hide()
-        self._main.opening.open_scene(scene)
+        self.prepare_asked.emit("force_check")
 
     def _say(self, problem: str) -> None:
         self.problem.setText(problem)
@@ -194,7 +259,7 @@ class Connect(Overlay):
         head = QHBoxLayout()
         head.addWidget(label("Connect instruments", "big"))
         head.addStretch(1)
-        head.addWidget(self._tabs)
+        head.addWidget(self.tabs)
         named = QHBoxLayout()
         named.addWidget(label("Name of the bench"))
         named.addWidget(self.name, 1)
@@ -206,15 +271,22 @@ class Connect(Overlay):
         whole = column(self.card, margin=22, spacing=14)
         whole.addLayout(head)
         whole.addLayout(named)
-        whole.addWidget(self._pages, 1)
+        whole.addWidget(self.pages, 1)
         whole.addWidget(self.problem)
         whole.addLayout(foot)
-        self._pages.setMinimumHeight(400)
+        self.pages.setMinimumHeight(400)
+        self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
 
 def show_connect(window: Window) -> None:
     """Open the dialog."""
     found = window.findChild(Connect)
-    shown = found if isinstance(found, Connect) else Connect(window)
+    if isinstance(found, Connect):
+        shown = found
+    else:
+        shown = Connect(window, window.session, window.theme)
+        shown.prepare_asked.connect(window.opening.open_scene)
+        shown.run_asked.connect(window.opening.run_scene)
+    shown.show_bench()
     shown.open()
     shown.instruments.scan.setFocus()

@@ -45,9 +45,7 @@ class Instruments(QWidget):
         self.coil_port, self.coil_row = self._ports("Coil source port"), QComboBox()
         self.meter_port, self.meter_row = self._ports("Teslameter port"), QComboBox()
         self.coil_row.addItems(rows_of("coil"))
-        self.coil_row.setCurrentText(choice.coil_dialect)
         self.meter_row.addItems(rows_of("meter"))
-        self.meter_row.setCurrentText(choice.meter_dialect)
         self.scope = QComboBox()
         for driver, title in SCOPES:
             self.scope.addItem(title, driver)
@@ -57,6 +55,7 @@ class Instruments(QWidget):
         self.library.setPlaceholderText("vendor library, if not in the usual places")
         self.test_coil, self.test_meter = push("Test"), push("Test")
         self._lay_out()
+        self.show_choice()
         self.scan.clicked.connect(self.look)
         self.found.connect(self._show_found)
         self.tested.connect(
@@ -68,6 +67,22 @@ class Instruments(QWidget):
         self.test_meter.clicked.connect(
             lambda: self._test("teslameter", self.meter_port, self.meter_row)
         )
+
+    def show_choice(self) -> None:
+        """Show the choice."""
+        choice = self._choice
+        self.coil_port.setCurrentText(choice.coil_port)
+        self.meter_port.setCurrentText(choice.meter_port)
+        for row, dialect in (
+            (self.coil_row, choice.coil_dialect),
+            (self.meter_row, choice.meter_dialect),
+        ):
+            if row.findText(dialect) < 0:  # a row of the user's own
+                row.addItem(dialect)
+            row.setCurrentText(dialect)
+        self.scope.setCurrentIndex(max(self.scope.findData(choice.scope), 0))
+        self.serial.setText(choice.scope_serial)
+        self.library.setText(choice.scope_library)
 
     def take(self) -> Choice:
         """The choice as it stands."""

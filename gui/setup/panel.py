@@ -43,6 +43,7 @@ class SetupPanel(QFrame):
         self._session, self._theme = session, theme
         self._path: str | None = None
         self._snapshot = Snapshot()
+        self._start_planned = False
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(SETTLE)
@@ -131,6 +132,11 @@ class SetupPanel(QFrame):
             return
         self._session.start(self.request(), self.title)
 
+    def start_when_planned(self) -> None:
+        """Have the plan that is being computed run, unless something is in its way."""
+        self._session.expectation = None
+        self._start_planned = True
+
     def enqueue(self) -> None:
         """Have it follow the run in progress."""
         if self.form.problem or self._session.plan_problem:
@@ -184,6 +190,9 @@ class SetupPanel(QFrame):
             self.warnings.setToolTip("\n".join(expectation.warnings))
             self.warnings.setVisible(bool(expectation.warnings))
         self.render_snapshot(self._snapshot)
+        if self._start_planned:
+            self._start_planned = False
+            self.start()
 
     def _show_problem(self, problem: str) -> None:
         self._session.plan_problem = problem
@@ -195,6 +204,7 @@ class SetupPanel(QFrame):
             self.warnings.hide()
 
     def _form_changed(self) -> None:
+        self._start_planned = False
         if self.form.problem:
             self._show_problem(self.form.problem)
         self._timer.start()

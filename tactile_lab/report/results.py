@@ -47,6 +47,7 @@ def results(findings: Findings) -> dict[str, Any]:
             "spikes_online": loss.spikes_online,
         },
         "conclusion": findings.conclusion.values,
+        "statements": list(findings.conclusion.sentences),
         "twin": None if findings.twin is None else _twin(findings.twin),
         "accuracy": run.accuracy or None,
         "notes": list(findings.notes),

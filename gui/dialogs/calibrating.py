@@ -1,0 +1,139 @@
+"""The connect dialog's third page: force per current, assumed or measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
+
+from gui.dialogs.bench_text import Choice
+from gui.lanes.decimate import FloatArray
+from gui.look.theme import Theme
+from gui.parts import column, label, line, push
+from gui.review.conclusion import Conclusion
+from gui.review.loop import LoopPlot
+
+MAGNET = (
+    ("r", "Distance magnet to pole face"),
+    ("A1", "Area of the magnet"),
+    ("A2", "Area of the core"),
+    ("B1", "Field of the magnet"),
+    ("B2_per_ampere", "Field of the coil"),
+)
+
+
+class Calibrating(QWidget):
+    """Geometry of Eq. (2); the field calibration with its loop; the force check."""
+
+    field_asked = Signal()
+    force_asked = Signal()
+    use_asked = Signal(object)
+
+    def __init__(self, choice: Choice, theme: Theme) -> None:
+        super().__init__()
+        self._choice = choice
+        self._file: Path | None = None
+        self.fields: dict[str, QLineEdit] = {}
+        self.named = label("", "muted", wrap=True)
+        self.field = push("Calibrate the field", "primary")
+        self.progress = label("", "muted", wrap=True)
+        self.loop = LoopPlot(theme)
+        self.loop.setFixedHeight(200)
+        self.loop.hide()
+        self.findings = label("", "", wrap=True)
+        self.findings.hide()
+        self.use = push("Use it: save a bench file with this calibration …", "primary")
+        self.use.hide()
+        self.force = push("Prepare the force check")
+        self._lay_out()
+        self.show_choice()
+        self.field.clicked.connect(self.field_asked)
+        self.force.clicked.connect(self.force_asked)
+        self.use.clicked.connect(lambda: self.use_asked.emit(self._file))
+
+    def show_choice(self) -> None:
+        """Fill the geometry from the choice."""
+        for key, edit in self.fields.items():
+            edit.setText(self._choice.magnet.get(key, ""))
+        file = self._choice.magnet.get("calibration", "")
+        self.named.setText(
+            f"The field comes from {file}; the field per ampere below is not used."
+            if file
+            else "The field per ampere is assumed to be the same at every current."
+        )
+
+    def take(self) -> None:
+        """Put the geometry into the choice."""
+        for key, edit in self.fields.items():
+            self._choice.magnet[key] = edit.text().strip()
+
+    def show_progress(self, text: str, *, busy: bool) -> None:
+        """Say how far the calibration is."""
+        self.progress.setText(text)
+        self.field.setEnabled(not busy)
+        if busy:
+            self.findings.hide()
+            self.use.hide()
+
+    def show_loop(self, loop: FloatArray) -> None:
+        """Show the readings so far, shape (n, 2): A and T."""
+        self.loop.show_loop(loop)
+        self.loop.setVisible(loop.shape[0] > 2)
+
+    def show_conclusion(self, found: Conclusion) -> None:
+        """Show slope, loop and uncertainty, and offer the file."""
+        self._file = found.calibration
+        self.findings.setText("\n".join(found.statements))
+        self.findings.show()
+        self.use.setVisible(found.calibration is not None)
+
+    def _lay_out(self) -> None:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(6)
+        for number, (key, words) in enumerate(MAGNET):
+            edit = QLineEdit()
+            edit.setAccessibleName(words)
+            self.fields[key] = edit
+            row, side = divmod(number, 2)
+            grid.addWidget(label(words), row, 2 * side)
+            grid.addWidget(edit, row, 2 * side + 1)
+        grid.setColumnStretch(1, 1)
+        grid.setColumnStretch(3, 1)
+        run = QHBoxLayout()
+        run.setSpacing(12)
+        run.addWidget(self.field)
+        run.addWidget(self.progress, 1)
+        check = QHBoxLayout()
+        check.setSpacing(12)
+        check.addWidget(self.force)
+        check.addWidget(
+            label(
+                "Holds some currents and compares Eq. (2) with your own reading of the "
+                "force. Table 1 prints an A2 ten times too large for a 15 mm core.",
+                "muted",
+                wrap=True,
+            ),
+            1,
+        )
+        whole = column(self, spacing=10)
+        whole.addLayout(grid)
+        whole.addWidget(self.named)
+        whole.addWidget(line())
+        whole.addWidget(
+            label(
+                "Take the magnet away and put the probe in its place. The core is "
+                "demagnetised, then both branches of the field are read against the "
+                "current, and a dated calibration file with its uncertainty is kept.",
+                "muted",
+                wrap=True,
+            )
+        )
+        whole.addLayout(run)
+        whole.addWidget(self.loop)
+        whole.addWidget(self.findings)
+        whole.addWidget(self.use)
+        whole.addWidget(line())
+        whole.addLayout(check)
+        whole.addStretch(1)

@@ -1,0 +1,163 @@
+"""The connect dialog's second page: what is wired to which input, and is it true?"""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
+
+from gui.dialogs.bench_text import Choice
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import column, label, push, set_role
+from gui.review.conclusion import Conclusion
+
+COLUMNS = ("Input", "Signal", "Range", "Offset", "Shunt")
+ROW = 28
+
+
+class Wiring(QWidget):
+    """The table of inputs; below it the wiring check and its verdicts."""
+
+    check_asked = Signal()
+
+    def __init__(self, choice: Choice, theme: Theme) -> None:
+        super().__init__()
+        self._choice, self._theme = choice, theme
+        self._concluded: Conclusion | None = None
+        self.table = QTableWidget(0, len(COLUMNS))
+        self.table.setAccessibleName("Oscilloscope inputs")
+        self.table.setHorizontalHeaderLabels(list(COLUMNS))
+        self.table.verticalHeader().hide()
+        self.table.verticalHeader().setDefaultSectionSize(ROW)
+        self.table.setTabKeyNavigation(False)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft)
+        self.check = push("Run the wiring check", "primary")
+        self.progress = label("", "muted", wrap=True)
+        self.mark = label("", "pill")
+        self.mark.hide()
+        self._verdicts = QGridLayout()
+        self._verdicts.setHorizontalSpacing(10)
+        self._verdicts.setVerticalSpacing(6)
+        self._verdicts.setColumnStretch(2, 1)
+        self._also = label("", "muted", wrap=True)
+        self._also.hide()
+        self._lay_out()
+        self.show_choice()
+        self.check.clicked.connect(self.check_asked)
+        theme.changed.connect(self._show_verdicts)
+
+    def show_choice(self) -> None:
+        """Fill the table from the choice."""
+        self.table.setRowCount(0)
+        for row, cells in enumerate(self._choice.channels):
+            self.table.insertRow(row)
+            for where, text in enumerate(cells):
+                self.table.setItem(row, where, QTableWidgetItem(text))
+        rows = max(self.table.rowCount(), 2)
+        self.table.setFixedHeight(ROW * rows + 32)
+
+    def take(self) -> None:
+        """Put the table into the choice."""
+        rows = []
+        for row in range(self.table.rowCount()):
+            cells = [self.table.item(row, where) for where in range(len(COLUMNS))]
+            texts = [cell.text().strip() if cell else "" for cell in cells]
+            rows.append((texts[0], texts[1], texts[2], texts[3], texts[4]))
+        self._choice.channels = rows
+
+    def show_progress(self, text: str, *, busy: bool) -> None:
+        """Say how far the check is; a check in progress cannot be asked for again."""
+        self.progress.setText(text)
+        self.check.setEnabled(not busy)
+        if busy and self._concluded is not None:
+            self._concluded = None
+            self._show_verdicts()
+
+    def show_conclusion(self, found: Conclusion) -> None:
+        """Show what the check found."""
+        self._concluded = found
+        self._show_verdicts()
+
+    @property
+    def verdicts(self) -> list[str]:
+        """The verdicts as they are shown: "V_C1 as wired: 4.35 V at rest ..."."""
+        found = self._concluded.verdicts if self._concluded else ()
+        return [f"{v.signal} {_word(v.ok)}: {v.text}" for v in found]
+
+    def _show_verdicts(self) -> None:
+        while (item := self._verdicts.takeAt(0)) is not None:
+            widget = item.widget()
+            if widget is not None:
+                widget.setParent(None)
+                widget.deleteLater()
+        found = self._concluded
+        verdicts = found.verdicts if found else ()
+        tokens = self._theme.tokens
+        for row, verdict in enumerate(verdicts):
+            sign = QLabel()
+            name, colour = (
+                ("check", tokens.green) if verdict.ok else ("warning", tokens.red)
+            )
+            sign.setPixmap(pixmap(name, colour, 18))
+            sign.setAccessibleName(_word(verdict.ok))
+            text = label(f"{_word(verdict.ok)}: {verdict.text}", wrap=True)
+            if not verdict.ok:
+                set_role(text, "error")
+            top = Qt.AlignmentFlag.AlignTop
+            self._verdicts.addWidget(sign, row, 0, top)
+            self._verdicts.addWidget(label(verdict.signal, "strong"), row, 1, top)
+            self._verdicts.addWidget(text, row, 2)
+        named = tuple(
+            f"{v.signal}: {'as wired' if v.ok else 'WRONG'}" for v in verdicts
+        )
+        rest = [
+            s for s in (found.statements if found else ()) if not s.startswith(named)
+        ]
+        self._also.setText("\n".join(rest))
+        self._also.setVisible(bool(rest))
+        wrong = sum(not verdict.ok for verdict in verdicts)
+        self.mark.setVisible(found is not None)
+        set_role(self.mark, "pill-ok" if verdicts and not wrong else "pill-bad")
+        self.mark.setText(
+            "no verdict"
+            if not verdicts
+            else f"{wrong} of {len(verdicts)} channels WRONG"
+            if wrong
+            else f"all {len(verdicts)} channels as wired"
+        )
+
+    def _lay_out(self) -> None:
+        run = QHBoxLayout()
+        run.setSpacing(12)
+        run.addWidget(self.check)
+        run.addWidget(self.progress, 1)
+        run.addWidget(self.mark)
+        whole = column(self, spacing=10)
+        whole.addWidget(
+            label(
+                "The wiring check makes a small push on the connected bench and says "
+                "whether each channel is what its bench file says: swapped, inverted, "
+                "open, wrong attenuation, and how much mains hum it carries.",
+                "muted",
+                wrap=True,
+            )
+        )
+        whole.addWidget(self.table)
+        whole.addLayout(run)
+        whole.addLayout(self._verdicts)
+        whole.addWidget(self._also)
+        whole.addStretch(1)
+
+
+def _word(ok: bool) -> str:
+    return "as wired" if ok else "WRONG"

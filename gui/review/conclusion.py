@@ -1,0 +1,66 @@
+"""What a run's report concluded, as its results.json holds it. No Qt here."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactile_lab.errors import RunFolderError
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The wiring check on one channel."""
+
+    signal: str
+    ok: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The parts of results.json that the window shows.
+
+    Attributes:
+        protocol: name.
+        statements: what the run says as a whole, one sentence each.
+        verdicts: of a wiring check, one per channel.
+        calibration: file a field calibration wrote; None if there is none.
+        twin: results.json's table of the model beside the run; empty without one.
+    """
+
+    protocol: str
+    statements: tuple[str, ...]
+    verdicts: tuple[Verdict, ...]
+    calibration: Path | None
+    twin: dict[str, Any]
+
+
+def conclusion_of(folder: Path) -> Conclusion:
+    """What the report in a run's folder concluded.
+
+    Raises:
+        RunFolderError: there is no report, or it cannot be read.
+    """
+    file = folder / "results.json"
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        values = found["conclusion"] or {}
+        made = folder / "calibration.csv"
+        return Conclusion(
+            protocol=found["protocol"],
+            statements=tuple(found.get("statements", ())),
+            verdicts=tuple(
+                Verdict(signal, bool(one["ok"]), str(one["text"]))
+                for signal, one in values.get("channels", {}).items()
+            ),
+            calibration=made if made.is_file() else None,
+            twin=found.get("twin") or {},
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RunFolderError(
+            f"{file} cannot be read ({type(error).__name__}: {error}). Write the "
+            f"report again: tactile-lab report {folder}"
+        ) from error

@@ -1,0 +1,53 @@
+"""A bench file that takes its force from a measured calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tactile_lab.errors import SceneError
+from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.scene.load import load_bench
+from tactile_lab.scene.toml_text import to_toml
+
+
+def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> BenchSpec:
+    """Write `spec` as the bench file `path`, with a copy of `calibration` beside it.
+
+    The copy keeps the bench usable when the run that measured it is cleared away. A
+    calibration is never changed: a copy of that name with other contents is refused.
+
+    Args:
+        spec: the bench as it is used now.
+        calibration: as `analysis.field_calibration.write_calibration` made it.
+        path: ends in .toml; a bench file there is replaced.
+
+    Raises:
+        SceneError: the calibration or the bench cannot be used or written; the bench
+            file that was there stays.
+    """
+    copy = path.with_name(f"{path.stem}-{calibration.parent.name}.csv")
+    draft = path.with_suffix(".new.toml")
+    table = spec.table.model_dump(by_alias=True, exclude_none=True)
+    table["magnet"]["calibration"] = copy.name
+    try:
+        contents = calibration.read_bytes()
+        if copy.exists() and copy.read_bytes() != contents:
+            raise SceneError(
+                f"Calibration {copy} exists with other contents; calibrations are "
+                "never changed. Choose another name for the bench file."
+            )
+        if not copy.exists():
+            copy.write_bytes(contents)
+            copy.chmod(0o444)
+        draft.write_text(to_toml(table), encoding="utf-8")
+        try:
+            load_bench(draft)
+        except SceneError:
+            draft.unlink()
+            raise
+        draft.replace(path)
+    except OSError as reason:
+        raise SceneError(
+            f"Bench file {path} cannot be written: {reason.strerror or reason}."
+        ) from reason
+    return load_bench(path)
