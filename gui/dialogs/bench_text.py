@@ -8,6 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from gui.setup.texts import exact
+from tactile_lab.quantity import parse
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.scene.toml_text import to_toml
@@ -38,7 +40,7 @@ class Choice:
     scope_serial: str = ""
     scope_library: str = ""
     channels: list[tuple[str, str, str, str, str]] = field(default_factory=list)
-    magnet: dict[str, str] = field(default_factory=dict)
+    magnet: dict[str, Any] = field(default_factory=dict)
     base: dict[str, Any] = field(default_factory=dict)
 
 
@@ -87,7 +89,7 @@ def bench_text(choice: Choice) -> str:
             "dialect": choice.meter_dialect,
             "port": choice.meter_port,
         }
-    data["magnet"] = {key: value for key, value in choice.magnet.items() if value}
+    data["magnet"] = {key: value for key, value in choice.magnet.items() if value != ""}
     return to_toml(data)
 
 
@@ -116,13 +118,17 @@ def _take_over(choice: Choice, data: dict[str, Any]) -> None:
         (
             str(one["input"]),
             str(one["signal"]),
-            str(one["range"]),
-            str(one.get("offset", "0 V")),
-            str(one.get("shunt", "")),
+            _short(one["range"], "V"),
+            _short(one.get("offset", "0 V"), "V"),
+            _short(one.get("shunt", ""), "Ohm"),
         )
         for one in scope.get("channels", ())
     ]
-    choice.magnet = {key: str(value) for key, value in data["magnet"].items()}
+    units = {"r": "m", "A1": "m^2", "A2": "m^2", "B1": "T", "B2_per_ampere": "T/A"}
+    choice.magnet = {
+        key: _short(value, units[key]) if key in units else value
+        for key, value in data["magnet"].items()
+    }
     choice.scope = str(scope.get("driver", ""))
     choice.scope_serial = str(scope.get("serial", ""))
     choice.scope_library = str(scope.get("library", ""))
@@ -132,6 +138,11 @@ def _take_over(choice: Choice, data: dict[str, Any]) -> None:
         setattr(choice, f"{name}_port", "" if port.startswith("sim:") else port)
         if "dialect" in found:
             setattr(choice, f"{name}_dialect", str(found["dialect"]))
+
+
+def _short(text: str, symbol: str) -> str:
+    """The same quantity with the prefix that makes it shortest."""
+    return exact(parse(text, symbol), symbol).replace("−", "-") if text else ""
 
 
 def _channel(choice: Choice, row: tuple[str, str, str, str, str]) -> dict[str, Any]:

@@ -29,14 +29,19 @@ from gui.review.conclusion import conclusion_of
 from gui.session.messages import Level, Planned
 from gui.session.session import Session
 from gui.state import State, minutes
+from tactile_lab.acquisition.events import RunState
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 
 if TYPE_CHECKING:
     from gui.window import Window
+    from tactile_lab.acquisition.execution import Executed
 
 WIRING, FIELD = "wiring_check", "calibrate_field"
+
+PAGE = 540
+"""Height of a page where the window is high enough, px."""
 
 
 class Connect(Overlay):
@@ -58,7 +63,8 @@ class Connect(Overlay):
         self.session = session
         self._choice = start_choice()
         self._shown: BenchSpec | None = None
-        self._running, self._begun = "", False
+        self._running = ""
+        self._ended = {WIRING: "", FIELD: ""}
         self.instruments = Instruments(self._choice)
         self.wiring = Wiring(self._choice, theme)
         self.calibration = Calibrating(self._choice, theme)
@@ -86,6 +92,7 @@ class Connect(Overlay):
         session.changed.connect(self._follow)
         session.planned.connect(self._planned)
         session.trial_ended.connect(self._trial_ended)
+        session.run_ended.connect(self._run_ended)
         session.reported.connect(self._reported)
 
     def show_bench(self) -> None:
@@ -142,7 +149,7 @@ class Connect(Overlay):
     # --- the runs the pages ask for
 
     def _run(self, scene: str) -> None:
-        self._running, self._begun = scene, False
+        self._running = scene
         self._say_progress("Preparing …", busy=True)
         self.run_asked.emit(scene)
         self._follow()
@@ -155,6 +162,14 @@ class Connect(Overlay):
         source = self.session.source
         if self._running == FIELD and source is not None:
             self.calibration.show_loop(source.loop)
+
+    def _run_ended(self, done: Executed) -> None:
+        if not self._running:
+            return
+        if done.ending.state is RunState.COMPLETE:
+            self._say_progress("Judging what was recorded …", busy=True)
+        else:
+            self._end(f"Not completed: {done.ending.reason or done.ending.state}.")
 
     def _reported(self, folder: Path) -> None:
         """Show what a wiring check or a field calibration found, whoever ran it."""
@@ -180,17 +195,12 @@ class Connect(Overlay):
             if session.state is State.FAULT:
                 self._end(session.fault.title if session.fault else "Fault")
             elif session.state is State.RUNNING and session.trial is not None:
-                self._begun = True
                 index, words = session.trial
                 left = ""
                 if session.expected is not None:
                     rest = minutes(max(0.0, session.expected - session.elapsed))
                     left = f", {rest} left"
                 self._say_progress(f"Step {index + 1}: {words}{left}", busy=True)
-            elif session.state is State.ABORTING:
-                self._end("Stopped.")
-            elif session.state is State.READY and self._begun:
-                self._say_progress("Judging what was recorded …", busy=True)
             return
         reason = {
             State.READY: "",
@@ -199,14 +209,13 @@ class Connect(Overlay):
         }.get(session.state, "Another run is in progress.")
         if session.manual is not None:
             reason = "The coil is driven by hand; switch it off first."
-        for page, button in (
-            (self.wiring, self.wiring.check),
-            (self.calibration, self.calibration.field),
+        for page, button, ended in (
+            (self.wiring, self.wiring.check, self._ended[WIRING]),
+            (self.calibration, self.calibration.field, self._ended[FIELD]),
         ):
             button.setEnabled(not reason)
             button.setToolTip(reason)
-            if reason or not page.progress.text().startswith("Kept"):
-                page.progress.setText(reason)
+            page.progress.setText(reason or ended)
 
     def _say_progress(self, text: str, *, busy: bool) -> None:
         page = self.wiring if self._running == WIRING else self.calibration
@@ -216,7 +225,7 @@ class Connect(Overlay):
 
     def _end(self, text: str) -> None:
         self._say_progress(text, busy=False)
-        self._running = ""
+        self._ended[self._running], self._running = text, ""
 
     # --- files
 
@@ -255,6 +264,10 @@ class Connect(Overlay):
         self.problem.setVisible(bool(problem))
         self.open()
 
+    def _place(self) -> None:
+        self.pages.setFixedHeight(min(PAGE, max(self._window.height() - 330, 330)))
+        super()._place()
+
     def _lay_out(self) -> None:
         head = QHBoxLayout()
         head.addWidget(label("Connect instruments", "big"))
@@ -274,7 +287,6 @@ class Connect(Overlay):
         whole.addWidget(self.pages, 1)
         whole.addWidget(self.problem)
         whole.addLayout(foot)
-        self.pages.setMinimumHeight(400)
         self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
 

@@ -110,19 +110,17 @@ class Wiring(QWidget):
             )
             sign.setPixmap(pixmap(name, colour, 18))
             sign.setAccessibleName(_word(verdict.ok))
-            text = label(f"{_word(verdict.ok)}: {verdict.text}", wrap=True)
+            also = "".join(f"; {more}" for more in self._more(verdict.signal))
+            text = label(f"{_word(verdict.ok)}: {verdict.text}{also}", wrap=True)
             if not verdict.ok:
                 set_role(text, "error")
             top = Qt.AlignmentFlag.AlignTop
             self._verdicts.addWidget(sign, row, 0, top)
             self._verdicts.addWidget(label(verdict.signal, "strong"), row, 1, top)
             self._verdicts.addWidget(text, row, 2)
-        named = tuple(
-            f"{v.signal}: {'as wired' if v.ok else 'WRONG'}" for v in verdicts
-        )
-        rest = [
-            s for s in (found.statements if found else ()) if not s.startswith(named)
-        ]
+        signals = tuple(f"{verdict.signal}:" for verdict in verdicts)
+        statements = found.statements if found else ()
+        rest = [text for text in statements if not text.startswith(signals)]
         self._also.setText("\n".join(rest))
         self._also.setVisible(bool(rest))
         wrong = sum(not verdict.ok for verdict in verdicts)
@@ -135,6 +133,16 @@ class Wiring(QWidget):
             if wrong
             else f"all {len(verdicts)} channels as wired"
         )
+
+    def _more(self, signal: str) -> list[str]:
+        """What else the check says of a channel, such as its hum."""
+        said = self._concluded.statements if self._concluded else ()
+        begin = f"{signal}: "
+        return [
+            text.removeprefix(begin).rstrip(".")
+            for text in said
+            if text.startswith(begin) and "as wired" not in text and "WRONG" not in text
+        ]
 
     def _lay_out(self) -> None:
         run = QHBoxLayout()

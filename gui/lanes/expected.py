@@ -12,12 +12,30 @@ from tactile_lab.waveform import Waveform
 
 @dataclass(frozen=True)
 class Hold:
-    """A stretch of the run that has a name, such as "120 mN", in run time, s."""
+    """A stretch of the run that has a name, such as "120 mN", in run time, s.
+
+    Attributes:
+        start, end: of the whole stretch.
+        label: its name.
+        pause: whether it is neither streamed nor stored.
+        held: (start, end) of the part in which the force stands still, if it does.
+    """
 
     start: float
     end: float
     label: str
     pause: bool = False
+    held: tuple[float, float] | None = None
+
+
+def settled(times: FloatArray, holds: list[Hold]) -> np.ndarray:
+    """Which of `times`, ascending, lie where the force stands still."""
+    inside = np.zeros(times.size, dtype=bool)
+    for hold in holds:
+        if hold.held is not None and not hold.pause:
+            first, last = np.searchsorted(times, hold.held)
+            inside[first:last] = True
+    return inside
 
 
 @dataclass(eq=False)

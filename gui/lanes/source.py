@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.expected import Aligned, Hold, Preview
+from gui.lanes.expected import Aligned, Hold, Preview, settled
 from gui.lanes.history import SlowTrack, Track
 from gui.lanes.twinned import TwinTracks, joined
 from tactile_lab.acquisition.live import Live
@@ -78,7 +78,7 @@ class LiveSource:
         self.holds: list[Hold] = []
         self._live = live
         self._gain = newtons_per_ampere
-        self._loop: list[tuple[float, float]] = []
+        self._loop: list[tuple[float, float, float]] = []
         self._seen = 0
         self._tracks: dict[str, Track] = {}
         self._slow = {name: SlowTrack() for name in ("force", "field")}
@@ -140,12 +140,13 @@ class LiveSource:
         self._slow["field"].add(time, tesla)
         force = self._slow["force"].last
         if force is not None and len(self._loop) < 50_000:
-            self._loop.append((force / self._gain, tesla))
+            self._loop.append((time, force / self._gain, tesla))
 
     @property
     def loop(self) -> FloatArray:
-        """Shape (n, 2): coil current, A, and the field read then, T."""
-        return np.array(self._loop, dtype=np.float64).reshape(-1, 2)
+        """Shape (n, 2): coil current, A, and the field read then, T; on steps only."""
+        found = np.array(self._loop, dtype=np.float64).reshape(-1, 3)
+        return found[settled(found[:, 0], self.holds), 1:]
 
     def begin_trial(self, index: int, hold: Hold) -> None:
         """A trial starts; the preview is moved to where it really starts."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gui.lanes.decimate import Drawn, FloatArray, columns, line_between
-from gui.lanes.expected import Hold
+from gui.lanes.expected import Hold, settled
 from gui.lanes.twinned import TwinSlice, TwinTracks
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Run
@@ -104,7 +104,11 @@ class RunSource:
         self.trials = run.trials
         self.holds = [
             Hold(
-                float(t["start"]), float(t["end"]), _text(t["label"]), bool(t["pause"])
+                float(t["start"]),
+                float(t["end"]),
+                _text(t["label"]),
+                bool(t["pause"]),
+                _held(t),
             )
             for t in self.trials
         ]
@@ -130,10 +134,12 @@ class RunSource:
 
     @property
     def loop(self) -> FloatArray:
-        """Shape (n, 2): coil current, A, and the field read then, T."""
+        """Shape (n, 2): coil current, A, and the field read then, T; on steps only."""
         (at, force), (time, field) = self._slow["force"], self._slow["field"]
         if not (at.size and time.size):
             return np.empty((0, 2))
+        inside = settled(time, self.holds)
+        time, field = time[inside], field[inside]
         return np.column_stack([np.interp(time, at, force) / self._gain, field])
 
     def add_twin(self, parts: list[TwinSlice]) -> None:
@@ -241,6 +247,11 @@ def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:
         "force": (current["time"].copy(), measured * gain),
         "field": (field["time"].copy(), field["field"].copy()),
     }
+
+
+def _held(trial: Any) -> tuple[float, float] | None:
+    start, begin, end = (float(trial[k]) for k in ("start", "hold_start", "hold_end"))
+    return None if begin != begin else (start + begin, start + end)
 
 
 def _text(raw: bytes) -> str:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
     QHeaderView,
+    QSizePolicy,
     QTableWidget,
     QTableWidgetItem,
     QWidget,
@@ -47,15 +48,25 @@ class RatePlot(QWidget):
             self._points = points
             self.update()
 
+    @property
+    def has_points(self) -> bool:
+        """Whether there is anything to draw."""
+        return bool(self._points)
+
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw axes, both rates and their legend."""
         painter = QPainter(self)
         tokens = self._theme.tokens
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(sized(11))
-        if not self._points:
+        silent = not any(peak or final for _, peak, final in self._points)
+        if silent:
             painter.setPen(QColor(tokens.muted))
-            text = "The rate of each step appears here."
+            text = (
+                "No step has fired."
+                if self._points
+                else "The rate of each step appears here."
+            )
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
             return
         rows = np.array(self._points)
@@ -101,6 +112,7 @@ class ResultsView(QWidget):
         self._title = label("Rate against force", "title")
         self._mark = label("", "pill")
         self._mark.hide()
+        self._mark.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.plot = RatePlot(theme)
         self.loop = LoopPlot(theme)
         self.loop.hide()
@@ -155,11 +167,13 @@ class ResultsView(QWidget):
             set_role(self._mark, "pill-ok")
 
     def show_loop(self, loop: FloatArray) -> None:
-        """Show the field against the current where it was read, else the rates."""
-        wanted = loop.shape[0] > 2
+        """Show the field against the current where a calibration reads it."""
+        steps = np.unique(np.round(loop[:, 0], 2)).size
+        wanted = steps > 4 and not self.plot.has_points
         self.loop.show_loop(loop)
         self.loop.setVisible(wanted)
         self.plot.setVisible(not wanted)
+        self.table.setVisible(not wanted)
         self._title.setText("Field against current" if wanted else "Rate against force")
 
     def show_facts(self, text: str, *, report: bool) -> None:

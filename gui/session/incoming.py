@@ -115,7 +115,11 @@ class Incoming(Core):
     def _trial_started(self, told: events.TrialStarted) -> None:
         trial = told.trial
         self.trial = (told.index, trial.label)
-        hold = Hold(told.start, told.start + trial.length, trial.label, trial.pause)
+        held = None
+        if trial.hold is not None:
+            held = told.start + trial.hold[0], told.start + trial.hold[1]
+        end = told.start + trial.length
+        hold = Hold(told.start, end, trial.label, trial.pause, held)
         if self.source is not None:
             self.source.begin_trial(told.index, hold)
         what = "recovery" if trial.pause else trial.label

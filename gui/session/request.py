@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 
@@ -42,3 +44,16 @@ class Request:
         if self.bench is not None:
             words.append(f"--bench {shlex.quote(self.bench)}")
         return " ".join(words)
+
+
+def bench_request(bench: str, spec: BenchSpec) -> Request:
+    """A request that needs every instrument of a bench, and next to no force of it."""
+    channels = () if spec.scope is None else spec.scope.channels
+    signals = [channel.signal for channel in channels]
+    signals += ["force"] if spec.coil is not None else []
+    signals += ["field"] if spec.field_meter is not None else []
+    return Request(
+        "demo",
+        ('protocol.levels=["1 mN"]', f"record.signals={json.dumps(signals)}"),
+        bench,
+    )

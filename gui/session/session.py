@@ -14,12 +14,13 @@ from gui.session.core import Core, Queued
 from gui.session.incoming import Incoming
 from gui.session.manual import ManualCoil
 from gui.session.messages import Level
-from gui.session.request import Request
+from gui.session.request import Request, bench_request
 from gui.session.threads import check_in_background, plan_in_background
 from gui.state import Fault, Snapshot, State
 from tactile_lab.bench import OffReport
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import open_bench
+from tactile_lab.scene.load import load_bench
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.execution import Execution
@@ -37,12 +38,12 @@ class Session(Incoming):
         if self.state not in (State.DISCONNECTED, State.READY) or self.manual:
             return
         self.bench_choice = choice
-        self._check_request = Request("demo", (), choice)
         try:
-            self.spec = self._check_request.load().bench
+            self.spec = load_bench(choice)
         except (TactileLabError, OSError) as error:
             self._set_fault(Fault("The bench cannot be used.", str(error)))
             return
+        self._check_request = bench_request(choice, self.spec)
         self.coil.use(None)
         self.bench = None
         self._enter(State.CONNECTING)

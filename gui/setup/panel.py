@@ -231,7 +231,7 @@ class SetupPanel(QFrame):
     def _describe(self) -> None:
         kind = self.form.protocol
         first = ((kind.__doc__ or "") if kind else "").strip().split("\n\n")[0]
-        self.about.setText(" ".join(first.split()))
+        self.about.setText(" ".join(first.replace("`", "").split()))
         name = "demo" if self._path is None else Path(self._path).name
         elided(self.source, f"scene: {name}")
 

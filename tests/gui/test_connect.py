@@ -1,15 +1,20 @@
 """The connect dialog: discovery through the real look-up, a bench file that loads."""
 
+import json
 import tomllib
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QLabel
 
-from gui.dialogs.bench_text import bench_text, save_bench, start_choice
+from gui.dialogs.bench_text import bench_text, save_bench, show_bench, start_choice
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import rows_of
-from gui.state import State
-from tactile_lab.errors import SceneError
+from gui.review.conclusion import conclusion_of
+from gui.session.request import Request
+from gui.state import Fault, State
+from tactile_lab.errors import RunFolderError, SceneError
+from tactile_lab.scene.load import load_bench
 
 
 def test_bench_file_reads_back_as_chosen(tmp_path: Path) -> None:
@@ -60,9 +65,99 @@ def test_look_does_not_block_and_tells_what_it_found(lab) -> None:
     assert not dialog.instruments.scan.isEnabled()
     lab.until(lambda: dialog.instruments.scan.isEnabled())
     assert dialog.instruments.listing.text() != "Looking …"
-    dialog.wiring.check.click()
+    dialog.calibration.force.click()
     assert not dialog.isVisible()
-    assert window.setup.kind_name == "wiring_check"
+    assert window.setup.kind_name == "force_check"
+
+
+def concluded(folder: Path, protocol: str, **more: object) -> Path:
+    """A run's folder with a report that concludes so."""
+    folder.mkdir(exist_ok=True)
+    text = json.dumps({"protocol": protocol, "conclusion": {}, **more})
+    (folder / "results.json").write_text(text)
+    return folder
+
+
+def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
+    lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window, session = lab.window, lab.session
+    asked: list[Request] = []
+    monkeypatch.setattr(session, "start", lambda request, title: asked.append(request))
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    dialog.show_page(1)
+    dialog.wiring.check.click()
+    assert window.setup.kind_name == "wiring_check", "the form shows what is run"
+    assert not dialog.wiring.check.isEnabled()
+    lab.until(lambda: asked)
+    assert asked[0].path == "wiring_check" and asked[0].bench == "sim"
+    session.trial = (0, "rest")
+    session._enter(State.RUNNING)
+    assert dialog.wiring.progress.text().startswith("Step 1: rest")
+    session.fault = Fault("The coil source is gone.", "Coil off.")
+    session._enter(State.FAULT)
+    assert dialog.wiring.progress.text() == "The coil source is gone."
+    session.acknowledge()
+    assert dialog.wiring.check.isEnabled()
+    said = {"V_C1": {"ok": True, "text": "4.35 V at rest"},
+            "V_C2": {"ok": False, "text": "0 V at rest: open probe"}}  # fmt: skip
+    made = concluded(
+        lab.folder / "checked", "wiring_check", conclusion={"channels": said},
+        statements=["V_C1: as wired, 4.35 V at rest.", "V_C1: 3 mV of 50 Hz hum."],
+    )  # fmt: skip
+    session.reported.emit(made)
+    assert dialog.wiring.verdicts == [
+        "V_C1 as wired: 4.35 V at rest",
+        "V_C2 WRONG: 0 V at rest: open probe",
+    ]
+    assert dialog.wiring.mark.text() == "1 of 2 channels WRONG"
+    texts = [one.text() for one in dialog.wiring.findChildren(QLabel)]
+    assert any("3 mV of 50 Hz hum" in text for text in texts)
+    dialog.hide()
+
+
+def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:
+    window, session = lab.window, lab.session
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    session.reported.emit(
+        concluded(lab.folder / "none", "calibrate_field", statements=["No."])
+    )
+    assert dialog.calibration.use.isHidden(), "without a file there is nothing to use"
+    made = concluded(lab.folder / "field", "calibrate_field", statements=["Good."])
+    (made / "calibration.csv").write_text(
+        "current_A,field_T\n-1,-0.009\n0,0\n1,0.009\n"
+    )
+    session.reported.emit(made)
+    assert not dialog.calibration.use.isHidden()
+    assert dialog.use_calibration(made / "calibration.csv", lab.folder / "own.toml")
+    lab.until(lambda: session.state is State.READY)
+    magnet = session.spec.magnet
+    assert magnet.calibration is not None and abs(magnet.calibration.most - 1) < 1e-9
+    assert "own-field.csv" in dialog.calibration.named.text()
+    dialog.hide()
+    session.disconnect_bench()
+
+
+def test_damaged_results_are_refused_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="tactile-lab report"):
+        conclusion_of(tmp_path)
+    (tmp_path / "results.json").write_text("[]")
+    with pytest.raises(RunFolderError, match=r"results\.json"):
+        conclusion_of(tmp_path)
+
+
+def test_dialog_keeps_what_it_does_not_show(tmp_path: Path) -> None:
+    text = bench_text(start_choice()) + "[hand_set]\nV_GS = '1.3 V'\n"
+    text = text.replace('input = "C"', 'input = "C"\ncoupling = "AC"\nscale = 10.0')
+    (tmp_path / "before.toml").write_text(text)
+    choice = start_choice()
+    show_bench(choice, load_bench(tmp_path / "before.toml"))
+    spec = save_bench(choice, tmp_path / "after.toml")
+    assert spec.hand_set == {"V_GS": 1.3}
+    (channel,) = [c for c in spec.scope.channels if c.signal == "V_K"]
+    assert (channel.coupling, channel.scale) == ("AC", 10.0)
 
 
 def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
