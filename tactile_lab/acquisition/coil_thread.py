@@ -110,6 +110,7 @@ class CoilThread(InstrumentThread):
                 )
             if self._energise:
                 self.coil.energise()
+                self.settings.update(self.coil.settings())
                 self._energise, self.live = False, True
                 self.clock.notify()
             now = self.clock.now()
@@ -122,6 +123,8 @@ class CoilThread(InstrumentThread):
         self.off = self.coil.safe_off()
         self.live = False
         try:
+            if self.off.verified and self.opened:
+                self.settings_after = self.coil.settings()
             self.coil.close()
         except InstrumentError as failure:
             self.failure = self.failure or failure

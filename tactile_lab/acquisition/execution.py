@@ -21,12 +21,13 @@ from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.environment import environment
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import Ask
+from tactile_lab.acquisition.provenance import changed, keep_scene, temperature
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.acquisition.task import Ending, Task
 from tactile_lab.bench import Bench, OffReport, Stream
-from tactile_lab.errors import RecordingError, SceneError, TactileLabError
+from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.plan.calibrated import check_coil
 from tactile_lab.plan.limited import limited
 from tactile_lab.plan.plan import plan
@@ -124,7 +125,7 @@ class Execution:
         self._check_somebody_is_there()
         self.stop = StopRequest(self.bench.clock)
         self._emit = emit
-        self._notes = dict(notes or {})
+        self._notes = {**scene.conditions.notes, **(notes or {})}
         self._live = Live()
         on = self.needs.detect_on
         self._search = SpikeSearch(scene, on) if on is not None else None
@@ -162,7 +163,7 @@ class Execution:
         """
         began = time.monotonic()
         self._emit(events.FolderMade(self.folder.path))
-        self._write_scene()
+        keep_scene(self.folder, self.scene)
         runner = Runner(
             self._task(),
             self.bench,
@@ -210,13 +211,18 @@ class Execution:
     def _close(self, runner: Runner, ending: Ending, took: float) -> None:
         """Complete the record and say in it how the run ended."""
         status = STATUS[ending.state]
+        before = runner.instruments.settings
+        after = runner.instruments.settings_after
         entries = {
             "reason": ending.reason,
             "coil": ending.off.text,
             "coil_verified_off": ending.off.verified,
             "duration_s": runner.duration,
             "took_s": took,
-            "instruments": runner.instruments.settings,
+            "temperature": temperature(self.scene, before),
+            "instruments": before,
+            "instruments_after": after,
+            "instruments_changed": list(changed(before, after)),
             "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
             "overrange": sorted(runner.intake.overrange),
         }
@@ -273,17 +279,6 @@ class Execution:
             magnet = self.scene.bench.magnet
             wanted = magnet.current_for(trial.force, coil.limits.current)
         return limited(wanted, coil.limits.slew, update_interval, before)[0]
-
-    def _write_scene(self) -> None:
-        self.folder.write_text("scene.toml", self.scene.to_toml())
-        for path in self.scene.files:
-            try:
-                text = path.read_text(encoding="utf-8")
-            except OSError as error:
-                raise RecordingError(
-                    f"{path} cannot be copied into the run: {error.strerror}."
-                ) from error
-            self.folder.write_text(path.name, text)
 
     def _info(self) -> dict[str, Any]:
         scene = self.scene

@@ -14,6 +14,10 @@ class InstrumentThread(ABC):
 
     Whatever goes wrong there is kept in `failure` for the deciding loop to raise; the
     instrument is closed on every way out.
+
+    Attributes:
+        settings: identity and settings read back as the run began.
+        settings_after: settings read back as it ended; empty where that failed.
     """
 
     def __init__(self, name: str, clock: Clock) -> None:
@@ -22,6 +26,7 @@ class InstrumentThread(ABC):
         self.failure: BaseException | None = None
         self.opened = False
         self.settings: dict[str, str] = {}
+        self.settings_after: dict[str, str] = {}
         self._leaving = False
         self._thread = threading.Thread(target=self._main, name=name, daemon=True)
         self.ended = False

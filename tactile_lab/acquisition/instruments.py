@@ -56,8 +56,13 @@ class Instruments:
 
     @property
     def settings(self) -> dict[str, dict[str, str]]:
-        """Identity and settings read back, by instrument."""
+        """Identity and settings read back as the run began, by instrument."""
         return {thread.name: thread.settings for thread in self.threads}
+
+    @property
+    def settings_after(self) -> dict[str, dict[str, str]]:
+        """Settings read back as the run ended, by instrument."""
+        return {thread.name: thread.settings_after for thread in self.threads}
 
     @property
     def failed(self) -> bool:

@@ -39,6 +39,8 @@ class MeterThread(InstrumentThread):
     def make_safe_and_close(self) -> None:
         """Close the meter."""
         try:
+            if self.opened and self.failure is None:
+                self.settings_after = self.meter.settings()
             self.meter.close()
         except InstrumentError as failure:
             self.failure = self.failure or failure

@@ -18,6 +18,7 @@ from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import PLACES, Errand
+from tactile_lab.acquisition.provenance import changed
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.acquisition.search import REST, SpikeSearch
 from tactile_lab.acquisition.stop import Lease, StopRequest
@@ -97,6 +98,7 @@ class Runner:
             self._account.state(events.RunState.STOPPING, "making the coil safe")
             self._lease.end()
             off = self.instruments.close()
+            self._tell_changes()
             self._last_words()
             self._account.state(state, reason or off.text)
         return Ending(state, off, reason, failure, self._stop.signal)
@@ -337,6 +339,13 @@ class Runner:
             if self.intake.reached - self._told >= PULSE:
                 self._told = self.intake.reached
                 self._emit(events.Progress(self._told, self._task.expected))
+
+    def _tell_changes(self) -> None:
+        """Say which settings are not as they were when the run began."""
+        found = self.instruments
+        for text in changed(found.settings, found.settings_after):
+            self._account.note("warning", text)
+            self._emit(events.Message("warning", text))
 
     def _last_words(self) -> None:
         """Store what the instruments still delivered while they were closed."""

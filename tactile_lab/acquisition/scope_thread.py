@@ -85,6 +85,7 @@ class ScopeThread(InstrumentThread):
                 self._end_stream()
             if self._wanted is not None and self.stream is None:
                 self.stream = self.scope.start(*self._wanted)
+                self.settings.update(self.scope.settings())
                 self._wanted = None
                 self.clock.notify()
                 poll = self.clock.now() + self.scope.poll_interval
@@ -101,6 +102,8 @@ class ScopeThread(InstrumentThread):
         """Stop the stream and close."""
         try:
             self.scope.stop()
+            if self.opened and self.failure is None:
+                self.settings_after = self.scope.settings()
             self.scope.close()
         except InstrumentError as failure:
             self.failure = self.failure or failure

@@ -53,6 +53,11 @@ SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     help='Kept with the run, such as --note operator="A. Petaru".',
 )
 @click.option(
+    "--temperature",
+    metavar="VALUE",
+    help='Of the room, kept with the run, such as "23.5 °C"; see [conditions].',
+)
+@click.option(
     "--transcript",
     "transcripts",
     type=click.Path(path_type=Path, file_okay=False),
@@ -74,6 +79,7 @@ def command(
     realtime: bool,
     out: Path,
     notes: tuple[str, ...],
+    temperature: str | None,
     transcripts: Path | None,
     again: Path | None,
     no_report: bool,
@@ -89,6 +95,8 @@ def command(
     with refusing():
         from tactile_lab.acquisition.execution import Execution
 
+        if temperature is not None:
+            overrides = (*overrides, f"conditions.temperature={temperature}")
         loaded = _scene(scene, overrides, bench, again)
         narrator = Narrator(loaded.name)
         execution = Execution(

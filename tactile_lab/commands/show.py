@@ -47,6 +47,14 @@ def describe(path: Path) -> dict[str, Any]:
         "bench": info.get("bench"),
         "simulated": info.get("simulated"),
         "notes": info.get("notes") or {},
+        "temperature_K": (info.get("temperature") or {}).get("K"),
+        "detection": info.get("detection"),
+        "instruments": {
+            name: found.get("identity")
+            for name, found in (info.get("instruments") or {}).items()
+        },
+        "instruments_changed": info.get("instruments_changed") or [],
+        "inputs": info.get("files") or {},
         "loss": info.get("loss"),
         "duration_s": None,
         "signals": {},
@@ -93,6 +101,7 @@ def describe(path: Path) -> dict[str, Any]:
 
 def _print(summary: dict[str, Any]) -> None:
     from tactile_lab.quantity import show
+    from tactile_lab.scene.tables import ZERO_CELSIUS
 
     kind = "simulated" if summary["simulated"] else "measured"
     click.echo(f"{summary['run']}: {summary['status']}, {kind}")
@@ -101,6 +110,18 @@ def _print(summary: dict[str, Any]) -> None:
             click.echo(f"{key:<11} {summary[key]}")
     for key, text in summary["notes"].items():
         click.echo(f"{key:<11} {text}")
+    if summary["temperature_K"] is not None:
+        click.echo(f"temperature {summary['temperature_K'] - ZERO_CELSIUS:.4g} °C")
+    for name, identity in summary["instruments"].items():
+        click.echo(f"{name:<11} {identity}")
+    for line in summary["instruments_changed"]:
+        click.echo(f"changed     {line}")
+    if found := summary["detection"]:
+        why = ", from the noise" if found["from"] == "noise" else ""
+        threshold = show(found["threshold_V"], "V", 3)
+        click.echo(
+            f"detection   {found['signal']}, {found['kind']} at {threshold}{why}"
+        )
     if summary["duration_s"] is not None:
         click.echo(f"duration    {show(summary['duration_s'], 's')}")
     for name, signal in summary["signals"].items():
@@ -118,5 +139,7 @@ def _print(summary: dict[str, Any]) -> None:
         click.echo(f"over range  in {summary['overrange_blocks']} blocks")
     if summary["loss"]:
         click.echo(summary["loss"]["text"])
+    for name, digest in summary["inputs"].items():
+        click.echo(f"kept        {name}  sha256 {digest[:16]}")
     for figure in summary["figures"]:
         click.echo(f"figure      {figure}")

@@ -17,6 +17,7 @@ from tactile_lab.quantity import show
 from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.store.run import Records, Run
 from tactile_lab.waveform import Waveform
 
@@ -39,7 +40,8 @@ def read(folder: Path) -> RunData:
         before = float(getattr(scene.protocol, "before", 0.0))
         started = _for_people(str(info.get("started", "")))
         settings: Mapping[str, Mapping[str, str]] = info.get("instruments") or {}
-        warnings = tuple(info.get("warnings") or ())
+        changed = tuple(info.get("instruments_changed") or ())
+        warnings = (*(info.get("warnings") or ()), *changed)
         segments = run.records("segments")
         return RunData(
             title=str(info.get("title", scene.protocol.title)),
@@ -71,8 +73,26 @@ def read(folder: Path) -> RunData:
             sensor=_texts(scene, "sensor"),
             settings=settings,
             calibration=_calibration(scene),
+            conditions=_conditions(info),
             environment=info.get("environment") or {},
         )
+
+
+def _conditions(info: Mapping[str, Any]) -> dict[str, str]:
+    """Under which the run was made, and what its protocol's source was."""
+    found = {str(name): str(text) for name, text in (info.get("notes") or {}).items()}
+    temperature = info.get("temperature") or {}
+    if temperature.get("K") is not None:
+        value = f"{temperature['K'] - ZERO_CELSIUS:.4g} {CELSIUS}"
+        found["temperature"] = f"{value} ({temperature['from']})"
+    detection = info.get("detection") or {}
+    if detection:
+        origin = "estimated from noise" if detection["from"] == "noise" else "as given"
+        value = show(detection["threshold_V"], "V", 3)
+        found["spike threshold"] = f"{value} on {detection['signal']}, {origin}"
+    for name, digest in (info.get("files") or {}).items():
+        found[name] = f"SHA-256 {digest[:16]}…"
+    return found
 
 
 def _trial(

@@ -246,6 +246,7 @@ def _settings(findings: Findings) -> str:
         ("Sensor", run.sensor),
         ("Calibration", run.calibration),
         *((name.capitalize(), values) for name, values in run.settings.items()),
+        ("Conditions", run.conditions),
         ("Environment", run.environment),
     ]
     blocks = "".join(

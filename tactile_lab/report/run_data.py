@@ -141,6 +141,7 @@ class RunData:
         sensor: the sensor's parameters as text by name.
         settings: settings read back, by instrument, then by name.
         calibration: calibration of force and field, as text by name.
+        conditions: temperature, operator, sensor and notes, as text by name.
         environment: versions and machine, as text by name.
     """
 
@@ -173,6 +174,7 @@ class RunData:
     sensor: Mapping[str, str] = dataclasses.field(default_factory=dict)
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
     calibration: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    conditions: Mapping[str, str] = dataclasses.field(default_factory=dict)
     environment: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def field_between(self, start: float, end: float) -> FloatArray:

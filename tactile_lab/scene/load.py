@@ -23,10 +23,13 @@ from tactile_lab.scene.columns import read_text
 from tactile_lab.scene.complaint import Blame, complaint, validated, written
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.sensor import SensorTable
-from tactile_lab.scene.tables import CoilUse, Detect, Record, Simulated
+from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.trial import Protocol
 
-TABLES = ("protocol", "bench", "sensor", "record", "detect", "coil", "simulated")
+TABLES = (
+    "protocol", "bench", "sensor", "record", "detect", "coil", "simulated",
+    "conditions",
+)  # fmt: skip
 DEMO = "demo"
 SIMULATED = "sim"
 """Name of the built-in simulated bench."""
@@ -111,6 +114,9 @@ def resolve(
             {"noise": {}, **frozen.get("simulated", {})},
             ("simulated",),
             blame,
+        ),
+        conditions=validated(
+            Conditions, frozen.get("conditions", {}), ("conditions",), blame
         ),
         coil=validated(CoilUse, frozen.get("coil", {}), ("coil",), blame),
         sensor=sensor,
@@ -259,16 +265,30 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
             raise complaint(
                 ("bench", "simulated"), f"{file} is a simulated bench.", blame
             )
-    merged = _merged(_lists_to_tuples(under), inline)
+    merged = _merged(_lists_to_tuples(under), _placed(inline, folder))
     spec = validated(BenchTable, merged, ("bench",), blame)
     try:
-        # a calibration named by the scene lies beside the scene, else beside the bench
-        own = "calibration" in inline.get("magnet", {}) or path is None
-        return BenchSpec.of(spec, path, folder if own else path.parent)  # type: ignore[union-attr]
+        return BenchSpec.of(spec, path, folder if path is None else path.parent)
     except SceneError as reason:
         raise complaint(
             ("bench", "magnet", "calibration"), str(reason), blame
         ) from reason
+
+
+def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A scene's own bench keys; files they name lie beside the scene."""
+    placed = dict(inline)
+    for table, key in (
+        ("magnet", "calibration"),
+        ("coil", "dialect"),
+        ("scope", "dialect"),
+        ("field_meter", "dialect"),
+    ):
+        values = inline.get(table)
+        name = values.get(key) if isinstance(values, dict) else None
+        if isinstance(name, str) and (key != "dialect" or name.endswith(".toml")):
+            placed[table] = {**values, key: str((folder / name).resolve())}  # type: ignore[dict-item]
+    return placed
 
 
 def _merged(under: Any, over: Any) -> Any:

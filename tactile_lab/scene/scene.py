@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.sensor import SensorTable, StartVoltages
-from tactile_lab.scene.tables import CoilUse, Detect, Record, Simulated
+from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.scene.toml_text import to_toml
 from tactile_lab.trial import Protocol
 
@@ -30,6 +31,7 @@ class Scene:
         detect: how spikes are found on V_K.
         simulated: physics of a simulated bench.
         coil: how to treat a force the coil cannot follow.
+        conditions: under which the run is made.
         sensor: the ``[sensor]`` table as written.
     """
 
@@ -44,6 +46,7 @@ class Scene:
     detect: Detect
     simulated: Simulated
     coil: CoilUse
+    conditions: Conditions
     sensor: SensorTable
 
     @property
@@ -52,6 +55,9 @@ class Scene:
         named = [self.bench.path, self.protocol_source]
         if self.bench.magnet.calibration is not None:
             named.append(self.bench.magnet.calibration.path)
+        for spec in (self.bench.coil, self.bench.scope, self.bench.field_meter):
+            if spec is not None and (spec.dialect or "").endswith(".toml"):
+                named.append(Path(str(spec.dialect)))
         file = getattr(self.protocol, "file", None)
         if isinstance(file, str):
             named.append(Path(file))
@@ -72,12 +78,23 @@ class Scene:
             "sensor": self._sensor(),
             "coil": _dump(self.coil),
             "simulated": _dump(self.simulated),
+            "conditions": _dump(self.conditions),
             "bench": bench,
         }
 
-    def to_toml(self) -> str:
-        """The resolved scene: loading it gives this scene again."""
-        return to_toml(self.to_dict())
+    def to_toml(self, copies: Mapping[Path, str] | None = None) -> str:
+        """The resolved scene: loading it gives this scene again.
+
+        Args:
+            copies: for a scene that is kept with a run: names of the copies of its
+                files, relative to it. The conditions are then left out, for they were
+                those of that one run.
+        """
+        data = self.to_dict()
+        if copies is not None:
+            del data["conditions"]
+            data = _renamed(data, {str(path): name for path, name in copies.items()})
+        return to_toml(data)
 
     def _sensor(self) -> dict[str, Any]:
         own = {
@@ -92,3 +109,10 @@ class Scene:
 def _dump(table: Any) -> dict[str, Any]:
     dumped: dict[str, Any] = table.model_dump(by_alias=True, exclude_none=True)
     return dumped
+
+
+def _renamed(data: Any, names: Mapping[str, str]) -> Any:
+    """`data` with the texts in `names` replaced, at any depth."""
+    if isinstance(data, dict):
+        return {key: _renamed(value, names) for key, value in data.items()}
+    return names.get(data, data) if isinstance(data, str) else data

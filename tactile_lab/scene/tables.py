@@ -15,12 +15,15 @@ from pydantic import (
 )
 
 from tactile_lab.plugins import nearest
-from tactile_lab.quantity import Current, Pause, SampleRate, Unit, Voltage
+from tactile_lab.quantity import Current, Pause, SampleRate, Unit, Voltage, parse
 from tactile_lab.signals import SIGNALS
 
 Noise = Annotated[float, Unit("V", least=0.0)]
 HalfWidth = Annotated[float, Unit("A", least=0.0)]
 Pull = Annotated[float, Unit("N", least=0.0)]
+
+CELSIUS, ZERO_CELSIUS = "°C", 273.15
+"""Unit, and its zero in K."""
 
 AUTO: Literal["auto"] = "auto"
 """Instead of a quantity: to be found from what is measured."""
@@ -112,6 +115,44 @@ class Detect(Table):
                 f"{self.threshold:g} V, or V_K could never re-arm the detector."
             )
         return self
+
+
+@dataclass(frozen=True)
+class RoomTemperature(Unit):
+    """A temperature in K; written in K or °C."""
+
+    def validate(self, value: Any, info: ValidationInfo) -> float:
+        """The value in K."""
+        if isinstance(value, str):
+            text = value.replace("degC", CELSIUS)
+            if text.rstrip().endswith(CELSIUS):
+                value = f"{parse(text, CELSIUS) + ZERO_CELSIUS!r} K"
+        return super().validate(value, info)
+
+
+Temperature = Annotated[
+    float, RoomTemperature("K", least=ZERO_CELSIUS - 40, most=ZERO_CELSIUS + 100)
+]
+
+
+class Conditions(Table):
+    """``[conditions]``: under which a run is made; noted with it, changing nothing.
+
+    Attributes:
+        temperature: of the room at the sensor, K.
+        operator: who runs it.
+        sensor: which specimen it is; `runs --sensor` finds it.
+    """
+
+    temperature: Temperature | None = None
+    operator: str = ""
+    sensor: str = ""
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """The texts that are not empty, by name."""
+        texts = {"operator": self.operator, "sensor": self.sensor}
+        return {name: text for name, text in texts.items() if text}
 
 
 class Simulated(Table):

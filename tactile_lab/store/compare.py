@@ -53,9 +53,29 @@ def differences(old: Path, new: Path) -> Differences:
 
 
 def _environment(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:
-    keys = ("bench", "simulated", "seed", "instruments", "notes")
+    keys = ("bench", "simulated", "seed", "notes", "temperature")
     yield from _values({k: old.get(k) for k in keys}, {k: new.get(k) for k in keys})
     yield from _values(old.get("environment") or {}, new.get("environment") or {})
+    yield from _values(_instruments(old), _instruments(new))
+    yield from _files(old.get("files") or {}, new.get("files") or {})
+
+
+def _instruments(info: dict[str, Any]) -> dict[str, Any]:
+    """Settings read back; the port of a simulated instrument is a serial number."""
+    hidden = {"port"} if info.get("simulated") else set()
+    return {
+        instrument: {key: value for key, value in found.items() if key not in hidden}
+        for instrument, found in (info.get("instruments") or {}).items()
+    }
+
+
+def _files(old: dict[str, str], new: dict[str, str]) -> Iterator[str]:
+    """Copies of protocol, bench and calibration that differ, by their SHA-256."""
+    for name in sorted({*old, *new} - {SCENE}):
+        if name not in old or name not in new:
+            yield f"{name} is kept with the {'new' if name in new else 'old'} run only"
+        elif old[name] != new[name]:
+            yield f"{name} is not the same"
 
 
 def _values(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:

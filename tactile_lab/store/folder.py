@@ -22,6 +22,9 @@ SCHEMA = 1
 
 INFO, DATA, LOG = "run.json", "data.h5", "log.jsonl"
 
+INPUTS = "inputs"
+"""Folder within a run for copies of what it was made from."""
+
 RESERVE = 200_000_000
 """Bytes that must stay free on the disk while a run is written."""
 
@@ -104,13 +107,14 @@ class RunFolder:
             ) from error
 
     def write_text(self, name: str, text: str) -> Path:
-        """Put a text file into the folder (scene, calibration, protocol).
+        """Put a text file into the folder, such as "inputs/calibration.csv".
 
         Its SHA-256 goes into `run.json`, so that a later change shows.
         """
         path = self.path / name
         data = text.encode()
         try:
+            path.parent.mkdir(exist_ok=True)
             path.write_bytes(data)
         except OSError as error:
             raise RecordingError(

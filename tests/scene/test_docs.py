@@ -11,7 +11,7 @@ from tactile_lab.scene.bench_file import BenchTable
 from tactile_lab.scene.complaint import known_keys
 from tactile_lab.scene.load import load, load_bench
 from tactile_lab.scene.sensor import SensorTable, StartTable
-from tactile_lab.scene.tables import CoilUse, Detect, Record, Simulated
+from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.signals import SIGNALS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -38,7 +38,9 @@ def test_an_example_loads(number, tmp_path):
         assert [c.scale for c in bench.scope.channels] == [1.0, 1.0, 10.0]
 
 
-@pytest.mark.parametrize("table", [Record, Detect, Simulated, CoilUse, SensorTable])
+@pytest.mark.parametrize(
+    "table", [Record, Detect, Simulated, CoilUse, Conditions, SensorTable]
+)
 def test_every_key_of_a_table_is_documented(table):
     assert [key for key in known_keys(table, ()) if f"`{key}`" not in SCENES] == []
 

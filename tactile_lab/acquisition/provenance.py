@@ -1,0 +1,83 @@
+"""What a run keeps of where it came from, so that its folder needs nothing outside."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from tactile_lab.errors import RecordingError
+from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.tables import ZERO_CELSIUS
+from tactile_lab.store.folder import INPUTS, RunFolder
+
+Settings = Mapping[str, Mapping[str, str]]
+
+MOVED = frozenset({"output", "setpoint_A"})
+"""Settings that a run itself moves; the recorded current tells of them."""
+
+
+def keep_scene(folder: RunFolder, scene: Scene) -> None:
+    """Put the resolved scene, and every file it was made from, into the run.
+
+    The scene names the copies, so that the run can be read and repeated wherever its
+    folder lies. The protocol's source is kept for the record even where it ships.
+
+    Raises:
+        RecordingError: a file cannot be read any more, or the folder not be written.
+    """
+    copies = _names(scene.files)
+    folder.write_text("scene.toml", scene.to_toml(copies))
+    sources = {path: f"{INPUTS}/{path.name}" for path in _shipped(scene)}
+    for path, name in {**sources, **copies}.items():
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise RecordingError(
+                f"{path} cannot be copied into the run: "
+                f"{getattr(error, 'strerror', None) or error}."
+            ) from error
+        folder.write_text(name, text)
+
+
+def temperature(scene: Scene, read_back: Settings) -> dict[str, object]:
+    """Temperature of the run, K, and who says so; both None where nobody does."""
+    if scene.conditions.temperature is not None:
+        return {"K": scene.conditions.temperature, "from": "entered"}
+    for instrument, found in read_back.items():
+        try:
+            celsius = float(found["temperature"])
+        except (KeyError, ValueError):
+            continue
+        return {"K": celsius + ZERO_CELSIUS, "from": instrument}
+    return {"K": None, "from": None}
+
+
+def changed(before: Settings, after: Settings) -> Iterator[str]:
+    """Settings read back at the end that are not as at the beginning, one line each.
+
+    What was not read at both times is passed over, and so is what the run moves.
+    """
+    for instrument, found in after.items():
+        for name, value in found.items():
+            was = before.get(instrument, {}).get(name, value)
+            if was != value and name not in MOVED:
+                yield f"{instrument}: {name} was {was} at the start, {value} at the end"
+
+
+def _names(files: tuple[Path, ...]) -> dict[Path, str]:
+    """A name of its own in the run for each file."""
+    found: dict[Path, str] = {}
+    for path in dict.fromkeys(files):
+        name, number = f"{INPUTS}/{path.name}", 2
+        while name in found.values():
+            name, number = f"{INPUTS}/{path.stem}_{number}{path.suffix}", number + 1
+        found[path] = name
+    return found
+
+
+def _shipped(scene: Scene) -> Iterator[Path]:
+    """Source files of a protocol that ships, those it builds on included."""
+    for kind in type(scene.protocol).__mro__:
+        if kind.__module__.partition(".")[0] == "protocols":
+            yield Path(inspect.getfile(kind))
