@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from drivers.coil_source import CoilSource
 from drivers.dialect import coil_dialect, meter_dialect
@@ -61,13 +62,13 @@ class WiredPlant:
     ) -> tuple[Codes, tuple[bool, ...]]:
         """Codes and over-range flags, as the scope is set and the plant is wired."""
         channels = [
-            Channel(
+            replace(
+                self._wiring.get(one.name, Channel(signal="", input="", range=1.0)),
                 signal=self._touches(one.name),
                 input=one.name,
                 range=one.range,
                 offset=one.offset,
                 coupling=one.coupling,
-                scale=self._wiring[one.name].scale if one.name in self._wiring else 1.0,
             )
             for one in acquisition.inputs
         ]

@@ -130,7 +130,7 @@ def scope_inputs(
             ScopeInput(
                 signal=signal,
                 gain=steps / scale,
-                level=offset * steps / scale + channel.offset * steps,
+                level=(offset / scale + channel.offset + channel.zero) * steps,
                 noise=options.noise_at(signal) * steps,
                 hum=(options.pickup if loose else options.hum) * steps,
                 mains=options.mains,

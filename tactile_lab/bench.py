@@ -133,6 +133,7 @@ class Channel:
         offset: analogue offset added before digitising, V.
         coupling: "DC" or "AC".
         scale: signal unit per volt at the input (10 for a 10:1 probe, 1/R for a shunt).
+        zero: what lies at the input where the signal is 0, V.
     """
 
     signal: str
@@ -141,6 +142,17 @@ class Channel:
     offset: float = 0.0
     coupling: str = "DC"
     scale: float = 1.0
+    zero: float = 0.0
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Lowest and highest value the input can see, in the signal's unit."""
+        ends = (
+            (end - self.offset - self.zero) * self.scale
+            for end in (-self.range, self.range)
+        )
+        low, high = sorted(ends)
+        return low, high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,7 +178,8 @@ class ScopeCapability:
 class Stream:
     """How a running stream is scaled.
 
-    A code c of channel k means ``(c / full_scale * range_k - offset_k) * scale_k``.
+    A code c of channel k means
+    ``(c / full_scale * range_k - offset_k - zero_k) * scale_k``.
 
     Attributes:
         channels: in the order of the rows of each block.
@@ -188,7 +201,7 @@ class Stream:
         """(gain, offset) with signal = gain * code + offset, in the signal's unit."""
         channel = self.channels[row]
         gain = channel.range / self.full_scale * channel.scale
-        return gain, -channel.offset * channel.scale
+        return gain, -(channel.offset + channel.zero) * channel.scale
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,9 +113,13 @@ class Account:
                 self.emit(events.CoilCurrent(*row))
         if meter is not None:
             for reading in meter.take_readings():
-                time = self.axis(reading.time)
-                self.journal.field(time, reading.value)
-                self.emit(events.FieldRead(time, reading.value))
+                self.field(self.axis(reading.time), reading.value)
+
+    def field(self, time: float, tesla: float) -> None:
+        """The field was read at run time `time` s."""
+        if self.journal is not None:
+            self.journal.field(time, tesla)
+        self.emit(events.FieldRead(time, tesla))
 
     def note_edges(self, shunt: Bins) -> None:
         """Find the newest set-points' edges in the binned coil current."""

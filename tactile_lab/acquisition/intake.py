@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.acquisition.field_mean import FieldMean
 from tactile_lab.acquisition.live import Live
-from tactile_lab.bench import Block, Stream
+from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import SamplesLostError
 
 
@@ -55,6 +56,8 @@ class Intake:
         self._sink: Sink | None = None
         self._detector: OnlineDetector | None = None
         self._stream: Stream | None = None
+        self._field: FieldMean | None = None
+        self._field_readings: list[Reading] = []
         self._start = 0.0
         self._expected = 0
         self.spikes = 0
@@ -93,6 +96,7 @@ class Intake:
         self._row = row
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._sink = detector, sink
+        self._field = FieldMean(stream, start)
         self._live.begin(stream, start)
         sink.segment(stream, start)
 
@@ -116,9 +120,16 @@ class Intake:
                 self.overrange.add(channel.signal)
         self._sink.append(block)
         self._live.add(block)
+        if self._field is not None:
+            self._field_readings += self._field.feed(block)
         if self._detector is None:
             return ()
         return self._keep(self._detector.feed(block.first, block.codes[self._row]))
+
+    def take_field(self) -> list[Reading]:
+        """Readings of a field channel since last asked; times on the run's axis."""
+        taken, self._field_readings = self._field_readings, []
+        return taken
 
     def spikes_between(self, start: float, end: float) -> NDArray[np.float64]:
         """Times of remembered spikes in [start, end) s on the run's axis."""

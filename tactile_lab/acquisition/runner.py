@@ -335,6 +335,8 @@ class Runner:
             return
         while scope is not None and (block := scope.take()) is not None:
             self._account.spikes(self.intake.add(block))
+            for reading in self.intake.take_field():
+                self._account.field(reading.time, reading.value)
             self._lease.renew()
             if self.intake.reached - self._told >= PULSE:
                 self._told = self.intake.reached

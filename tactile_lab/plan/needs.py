@@ -23,6 +23,9 @@ SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
 NODES = ("V_C1", "V_C2", "V_K")
 """Voltages of the circuit between 0 V and its supply."""
 
+AVERAGED = "field"
+"""Kept as readings, one for many samples, where a scope channel carries it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Needs:
@@ -75,11 +78,14 @@ def needs(scene: Scene) -> Needs:
             f"scope channel (wired: {', '.join(wired) or 'nothing'}). Add it to "
             "[[scope.channels]] or record less."
         )
-    if "field" in asked and scene.bench.field_meter is None:
-        raise SceneError(
-            f"{scene.name} records the field, but bench {scene.bench.name} has no "
-            "[field_meter]."
-        )
+    if "field" in asked:
+        if "field" in wired:
+            streamed.add("field")
+        elif scene.bench.field_meter is None:
+            raise SceneError(
+                f"{scene.name} records the field, but bench {scene.bench.name} has "
+                "neither [field_meter] nor a scope channel with the signal field."
+            )
     channels = tuple(c for name, c in wired.items() if name in streamed)
     if scene.protocol.sees_supply and scope is not None:
         ranges = scope_capability(scope).ranges
@@ -100,12 +106,12 @@ def needs(scene: Scene) -> Needs:
     recorded = set(scene.record.signals)
     return Needs(
         coil=timeline(scene, through_coil=True).drives,
-        field_meter="field" in asked,
+        field_meter="field" in asked and "field" not in wired,
         channels=channels,
         stored=tuple(
             name
             for name in wired
-            if name in recorded
+            if (name in recorded and name != AVERAGED)
             or (name == "V_C1" and "I_DS" in recorded and "I_DS" not in wired)
         ),
         detect_on=detect_on,
@@ -132,8 +138,7 @@ def _check_threshold(scene: Scene, channel: Channel) -> None:
     threshold, hysteresis = scene.detect.threshold, scene.detect.hysteresis
     if isinstance(threshold, str) or isinstance(hysteresis, str):
         return
-    top = (channel.range - channel.offset) * channel.scale
-    bottom = (-channel.range - channel.offset) * channel.scale
+    bottom, top = channel.span
     if threshold >= top or threshold - hysteresis <= bottom:
         raise SceneError(
             f"[detect] threshold {threshold:g} V less hysteresis "

@@ -150,8 +150,8 @@ def _clipped(scene: Scene, needed: Needs, result: Result) -> tuple[str, ...]:
             continue
         if channel.signal not in scene.record.signals:
             continue
-        values = result.sample(channel.signal, times) / channel.scale
-        low, high = -channel.range - channel.offset, channel.range - channel.offset
+        values = result.sample(channel.signal, times)
+        low, high = channel.span
         if channel.coupling == "DC" and (values.min() < low or values.max() > high):
             lines.append(
                 f"{channel.signal} will leave its channel's range, {show(low, 'V')} "

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from tactile_lab.plan.needs import Needs
+from tactile_lab.acquisition.field_mean import AVERAGING
+from tactile_lab.plan.needs import AVERAGED, Needs
 from tactile_lab.plan.timeline import Timeline
 from tactile_lab.plan.warn import threshold_of
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
 from tactile_lab.signals import SIGNALS
+
+NOT_RECORDED = "field is not recorded"
 
 Reasons = tuple[tuple[str, str], ...]
 
@@ -25,6 +28,8 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
     for channel in needed.channels:
         name = channel.signal
         why = "stored" if name in stored else "streamed, not stored"
+        if name == AVERAGED:
+            why = f"kept as means of {show(AVERAGING, 's')}"
         if name == needed.detect_on:
             why += f"; spikes are detected on it{_threshold(scene, name)}"
         if name == "V_C1" and name not in scene.record.signals:
@@ -58,15 +63,16 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
         found.append(("coil source", "no trial asks for a force"))
     if not needed.channels:
         found.append(("scope", "no recorded signal comes from it"))
-    if not needed.field_meter:
-        found.append(("teslameter", "field is not recorded"))
     enabled = {channel.signal for channel in needed.channels}
+    if not needed.field_meter:
+        why = "a scope channel has the field" if AVERAGED in enabled else NOT_RECORDED
+        found.append(("teslameter", why))
     for channel in bench.scope.channels if bench.scope is not None else ():
         if channel.signal not in enabled:
             found.append(
                 (f"channel {channel.input}: {channel.signal}", "nothing needs it")
             )
-        elif channel.signal not in needed.stored:
+        elif channel.signal not in (*needed.stored, AVERAGED):
             found.append(
                 (f"samples of {channel.signal}", "needed as they stream, not recorded")
             )

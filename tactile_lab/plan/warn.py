@@ -16,6 +16,9 @@ from tactile_lab.scene.scene import Scene
 SAMPLES_PER_DECAY = 6
 """Samples per time constant of a spike from which its amplitude can be read."""
 
+FINE = 0.01
+"""Largest part of the expected field that one code of its channel should be."""
+
 
 def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
     """Everything worth a person's attention before the run."""
@@ -24,6 +27,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *_spike_sampling(scene, needed),
         *_noise(scene, needed, drive.streamed),
         *_scope(scene, needed),
+        *_field(scene, needed, drive),
         *_magnet(scene),
     )
 
@@ -109,6 +113,27 @@ def _scope(scene: Scene, needed: Needs) -> Iterator[str]:
             f"{show(rate, 'S/s')} on {len(needed.channels)} channels is beyond the "
             f"{show(needed.guaranteed_rate, 'S/s')} guaranteed on any USB port; the "
             "run ends as faulted if samples are lost."
+        )
+
+
+def _field(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:
+    channel = next((c for c in needed.channels if c.signal == "field"), None)
+    if channel is None or drive.current is None:
+        return
+    peak = drive.current.peak
+    field = float(abs(scene.bench.magnet.field([-peak, peak])).max())
+    low, high = channel.span
+    if min(-low, high) < field:
+        yield (
+            f"the field is expected to reach {show(field, 'T')}, scope input "
+            f"{channel.input} sees {show(low, 'T')} to {show(high, 'T')}; the run ends "
+            "as faulted where it is exceeded. Choose a larger range."
+        )
+    elif (step := resolution(channel)) > FINE * field:
+        yield (
+            f"one code of the field channel is {show(step, 'T')}, more than "
+            f"{FINE:.0%} of the {show(field, 'T')} expected. Choose a smaller range of "
+            f"input {channel.input}, or of the teslameter."
         )
 
 

@@ -31,7 +31,9 @@ Heat = Annotated[float, Unit("A^2 s", above=0.0)]
 Positive = Annotated[float, Unit("s", above=0.0)]
 AnyVoltage = Annotated[float, Unit("V")]
 
-WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS")
+FieldPerVoltage = Annotated[float, Unit("T/V")]
+
+WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field")
 """Signals a scope channel can carry."""
 
 
@@ -82,6 +84,9 @@ class ChannelTable(Table):
         coupling: "DC" or "AC".
         scale: signal unit per volt; 10 for a 10:1 probe.
         shunt: instead of `scale` for coil_current: the shunt's resistance, Ohm.
+        tesla_per_volt: instead of `scale` for field: what the analogue output of a
+            teslameter means, T/V.
+        zero: voltage at the input where the signal is 0, V.
     """
 
     signal: str
@@ -91,6 +96,8 @@ class ChannelTable(Table):
     coupling: Literal["DC", "AC"] = "DC"
     scale: float = 1.0
     shunt: Resistance | None = None
+    tesla_per_volt: FieldPerVoltage | None = None
+    zero: AnyVoltage = 0.0
 
     @field_validator("signal")
     @classmethod
@@ -111,7 +118,25 @@ class ChannelTable(Table):
             raise ValueError("shunt belongs to the signal coil_current")
         if self.shunt is not None and self.scale != 1.0:
             raise ValueError("give either shunt or scale, not both")
+        self._check_field()
         return self
+
+    def _check_field(self) -> None:
+        given = self.tesla_per_volt
+        if self.signal != "field":
+            if given is not None:
+                raise ValueError("tesla_per_volt belongs to the signal field")
+            return
+        if not given:
+            raise ValueError(
+                "field needs tesla_per_volt, what the teslameter's analogue output "
+                'means at the range its knob shows, such as "0.02 T/V"; compare two '
+                "fields with its display"
+            )
+        if self.scale != 1.0:
+            raise ValueError("give either tesla_per_volt or scale, not both")
+        if self.coupling != "DC":
+            raise ValueError('field needs coupling = "DC"')
 
     def channel(self) -> Channel:
         """The channel as drivers take it, SI."""
@@ -121,8 +146,14 @@ class ChannelTable(Table):
             range=self.range,
             offset=self.offset,
             coupling=self.coupling,
-            scale=self.scale if self.shunt is None else 1 / self.shunt,
+            scale=self._scale(),
+            zero=self.zero,
         )
+
+    def _scale(self) -> float:
+        if self.tesla_per_volt is not None:
+            return self.tesla_per_volt
+        return self.scale if self.shunt is None else 1 / self.shunt
 
 
 class ScopeSpec(Table):
@@ -233,6 +264,12 @@ class BenchTable(Table):
                     f"[{name}] port is missing: real instruments need one, such as "
                     '"/dev/ttyUSB0" or "COM3"; simulated = true needs none'
                 )
+        wired = self.scope.wiring if self.scope is not None else ()
+        if self.field_meter is not None and "field" in {one.signal for one in wired}:
+            raise ValueError(
+                "the field is measured twice, by [field_meter] and on a scope channel; "
+                "leave one of them out"
+            )
         coil, meter = self.coil, self.field_meter
         if coil is not None and meter is not None and coil.port == meter.port:
             raise ValueError(

@@ -47,7 +47,7 @@ def test_every_key_of_a_table_is_documented(table):
 
 def test_every_key_of_a_bench_file_is_in_the_example():
     bench = next(text for kind, text in BLOCKS if kind == "bench")
-    named = set(re.findall(r"^\[*([a-z_.A-Z0-9]+)", bench, re.MULTILINE))
+    named = set(re.findall(r"^(?:# )?\[*([a-z_.A-Z0-9]+)", bench, re.MULTILINE))
     parts = {part for name in named for part in name.split(".")}
     for at in (
         (),

@@ -1,0 +1,75 @@
+"""Readings of a teslameter whose analogue output is wired to a scope channel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.bench import Block, Reading, Stream
+from tactile_lab.errors import LimitError
+from tactile_lab.quantity import show
+
+AVERAGING = 0.2
+"""Time one reading is averaged over, s: whole periods of 50 Hz and of 60 Hz mains."""
+
+FULL = 0.95
+"""Part of the channel's range beyond which a mean is no reading any more."""
+
+
+class FieldMean:
+    """Means of the field channel of one stream, each over `AVERAGING`.
+
+    Args:
+        stream: as it runs.
+        start: of its first sample on the run's axis, s.
+    """
+
+    def __init__(self, stream: Stream, start: float) -> None:
+        signals = [channel.signal for channel in stream.channels]
+        self._row = signals.index("field") if "field" in signals else None
+        self._stream = stream
+        self._start = start
+        self._span = max(1, round(AVERAGING / stream.interval))
+        self._sum = 0
+        self._count = 0
+        self._ended = 0
+
+    def feed(self, block: Block) -> list[Reading]:
+        """Readings completed by `block`, each at the middle of its time, T.
+
+        Raises:
+            LimitError: the teslameter's output leaves, or nearly fills, the range.
+        """
+        if self._row is None:
+            return []
+        if block.overrange[self._row]:
+            raise self._beyond()
+        readings = []
+        codes = block.codes[self._row]
+        while codes.size:
+            part = codes[: self._span - self._count]
+            codes = codes[part.size :]
+            self._sum += int(part.sum(dtype=np.int64))
+            self._count += part.size
+            if self._count == self._span:
+                readings.append(self._reading(self._sum / self._span))
+                self._ended += self._span
+                self._sum = self._count = 0
+        return readings
+
+    def _reading(self, code: float) -> Reading:
+        if abs(code) > FULL * self._stream.full_scale:
+            raise self._beyond()
+        gain, offset = self._stream.volts_per_code(self._row or 0)
+        middle = self._ended + (self._span - 1) / 2
+        time = self._start + middle * self._stream.interval
+        return Reading(time, gain * code + offset)
+
+    def _beyond(self) -> LimitError:
+        channel = self._stream.channels[self._row or 0]
+        low, high = channel.span
+        return LimitError(
+            f"The teslameter's analogue output fills the range of scope input "
+            f"{channel.input}, {show(low, 'T')} to {show(high, 'T')}. Choose a larger "
+            "range of the channel in the bench file, or of the teslameter; the latter "
+            "changes tesla_per_volt."
+        )
