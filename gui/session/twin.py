@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
 
 import numpy as np
 
 from gui.lanes.twinned import TwinSlice
 from tactile_lab.acquisition.live import Bins
+from tactile_lab.analysis.follow import Follower
 from tactile_lab.errors import TactileLabError
-from tactile_lab.model.advance import advance, rest
-from tactile_lab.model.state import State
 from tactile_lab.scene.scene import Scene
-from tactile_lab.waveform import Waveform
 
 EVERY = 0.3
 """Seconds between slices."""
@@ -22,31 +19,18 @@ EVERY = 0.3
 STEP = 1e-3
 """Length of a bin of the twin, s."""
 
-TOLERANCE = 1e-6
 KEPT = ("V_C1", "V_C2")
 
 
 class LiveTwin:
-    """The scene's circuit under the force that the applied current gives.
-
-    Each set-point holds until the next, as in the report.
-    """
+    """The scene's circuit under the force that the applied current gives."""
 
     def __init__(self, scene: Scene) -> None:
-        self._circuit = scene.circuit
-        self._magnet = scene.bench.magnet
-        self._points: SimpleQueue[tuple[float, float]] = SimpleQueue()
-        start = scene.start
-        self._state = rest(scene.circuit)
-        if start is not None:
-            self._state = State(
-                time=0.0, force=0.0, V_P=start.V_P, V_C1=start.V_C1, V_C2=start.V_C2
-            )
-        self._force = 0.0
+        self._follower = Follower.of(scene)
 
     def add(self, at: float, amperes: float) -> None:
         """A set-point was applied at run time `at` s."""
-        self._points.put((at, amperes))
+        self._follower.add(at, amperes)
 
     def run(
         self, reach: Callable[[], float | None], tell: Callable[[TwinSlice], None]
@@ -60,32 +44,11 @@ class LiveTwin:
 
     def until(self, end: float) -> TwinSlice | None:
         """Advance to `end` s; None where there is nothing new or no answer."""
-        begin = self._state.time
+        begin = self._follower.reached
         if end - begin < 2 * STEP:
             return None
-        times, forces = [begin], [self._force]
-        while True:
-            try:
-                at, amperes = self._points.get_nowait()
-            except Empty:
-                break
-            at = min(max(at, times[-1]), end)
-            force = float(self._magnet.force(amperes))
-            if at > times[-1]:
-                times.append(at)
-                forces.append(forces[-1])
-            elif len(times) > 1 and times[-2] == at:
-                forces[-1] = force
-                continue
-            times.append(at)
-            forces.append(force)
-        self._force = forces[-1]
-        wave = Waveform(np.array(times), np.array(forces))
-        keep = (*KEPT, "spikes")
         try:
-            self._state, out = advance(
-                self._circuit, self._state, wave, end, keep=keep, tolerance=TOLERANCE
-            )
+            out = self._follower.until(end)
         except TactileLabError:
             return None
         count = max(2, round((end - begin) / STEP))

@@ -13,6 +13,7 @@ import time
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -261,7 +262,7 @@ class Execution:
         scene = self.scene
         if not isinstance(scene.protocol, ForceProtocol):
             return None
-        force_for = scene.bench.magnet.force_for
+        force_for = partial(scene.bench.magnet.force_for, beyond="hold")
         return Drift(scene.circuit, force_for, scene.protocol.drift_limit)
 
     def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:

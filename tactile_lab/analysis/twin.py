@@ -17,6 +17,9 @@ FloatArray = NDArray[np.float64]
 
 WITHIN = 0.5
 """A pair of spikes may lie apart by this part of the interval around it."""
+PART = 0.05
+"""Of the force's band by which it is moved: so little that each spike is known again;
+what it does is taken to grow in proportion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +30,13 @@ class Measured:
         signal: "V_C1" or "V_C2".
         time: shape (n,), middle of each bin, s.
         value: shape (n,), mean of each bin, V.
+        resolution: one code of the channel, V; what its mean may be off by.
     """
 
     signal: str
     time: FloatArray
     value: FloatArray
+    resolution: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,27 +48,44 @@ class Residual:
         time: shape (n,), s.
         predicted: shape (n,), V.
         difference: shape (n,), V; not a number where a spike falls into the bin.
+        tolerance: shape (n,), V: what the channel's resolution and the uncertainty of
+            the force leave open, either sign.
     """
 
     signal: str
     time: FloatArray
     predicted: FloatArray
     difference: FloatArray
+    tolerance: FloatArray
+
+    @property
+    def within(self) -> float:
+        """Part of the bins whose difference lies within the tolerance, 0 to 1."""
+        told = np.isfinite(self.difference)
+        inside = np.abs(self.difference[told]) <= self.tolerance[told]
+        return float(np.mean(inside)) if inside.size else float("nan")
 
     @property
     def offset(self) -> float:
         """Mean difference, V."""
-        return float(np.nanmean(self.difference))
+        return float(np.mean(self._told)) if self._told.size else float("nan")
 
     @property
     def rms(self) -> float:
         """Root mean square of the difference, V."""
-        return float(np.sqrt(np.nanmean(self.difference**2)))
+        return float(np.sqrt(np.mean(self._told**2))) if self._told.size else np.nan
 
     @property
     def band(self) -> float:
         """95 % of the differences are smaller in magnitude than this, V."""
-        return float(np.nanpercentile(np.abs(self.difference), 95))
+        if not self._told.size:
+            return float("nan")
+        return float(np.percentile(np.abs(self._told), 95))
+
+    @property
+    def _told(self) -> FloatArray:
+        told: FloatArray = self.difference[np.isfinite(self.difference)]
+        return told
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +99,10 @@ class Matched:
         extra: measured spikes without a predicted one.
         rate_error: shape (j,), relative error of 1/ISI where two neighbours on both
             sides are paired: measured over predicted less 1.
+        rated: shape (j,), times of the later of those neighbours, s.
+        tolerance: shape (k,), s: what the clocks and the uncertainty of the force leave
+            open, either sign; not a number where another force has no such spike.
+        rate_tolerance: shape (j,), the same for the rate error.
     """
 
     measured: FloatArray
@@ -84,6 +110,16 @@ class Matched:
     missed: int
     extra: int
     rate_error: FloatArray
+    rated: FloatArray
+    tolerance: FloatArray
+    rate_tolerance: FloatArray
+
+    @property
+    def within(self) -> float:
+        """Part of the pairs whose offset lies within the tolerance, 0 to 1."""
+        told = np.isfinite(self.tolerance)
+        inside = np.abs(self.offsets[told]) <= self.tolerance[told]
+        return float(np.mean(inside)) if inside.size else float("nan")
 
     @property
     def sentence(self) -> str:
@@ -130,6 +166,8 @@ def twin(
     spike_times: ArrayLike | None = None,
     pauses: Sequence[tuple[float, float]] = (),
     start: Start | None = None,
+    displaced: Sequence[Waveform] = (),
+    clock: float = 0.0,
 ) -> Twin:
     """Run the model beside measured data.
 
@@ -143,6 +181,9 @@ def twin(
         pauses: (start, end) in which nothing was streamed, s: spikes the model has
             there are not missed.
         start: voltages at time 0; equilibrium if None.
+        displaced: the force moved by `PART` of its 95 % band, one for each independent
+            cause of its uncertainty: what the model makes of them is the tolerance.
+        clock: how far spike times may lie from the force's, s.
 
     Raises:
         ParameterError: nothing to compare with, or times beyond the run.
@@ -152,21 +193,40 @@ def twin(
         keep.append("spikes")
     if not keep:
         raise ParameterError("A twin needs a measured voltage or spikes to compare.")
-    result = simulate(circuit, force, keep=tuple(keep), until=duration, start=start)
+    result, *others = (
+        simulate(circuit, each, keep=tuple(keep), until=duration, start=start)
+        for each in (force, *displaced)
+    )
     predicted = result.spike_times
     matched = None
     if spike_times is not None and predicted is not None:
-        seen = predicted
-        for begin, end in pauses:
-            seen = seen[(seen < begin) | (seen >= end)]
-        matched = match(spike_times, seen)
+        matched = match(
+            spike_times,
+            _streamed(predicted, pauses),
+            [_streamed(o.spike_times, pauses) for o in others],
+            clock,
+        )
     measured_spikes = np.empty(0) if spike_times is None else np.asarray(spike_times)
     jumps = measured_spikes if predicted is None else np.r_[measured_spikes, predicted]
-    residuals = tuple(_residual(result, trace, np.sort(jumps)) for trace in voltages)
+    residuals = tuple(
+        _residual(result, others, trace, np.sort(jumps)) for trace in voltages
+    )
     return Twin(result, residuals, matched)
 
 
-def _residual(result: Result, trace: Measured, jumps: FloatArray) -> Residual:
+def _streamed(
+    spikes: FloatArray | None, pauses: Sequence[tuple[float, float]]
+) -> FloatArray:
+    """The spikes outside the pauses."""
+    seen = np.empty(0) if spikes is None else spikes
+    for begin, end in pauses:
+        seen = seen[(seen < begin) | (seen >= end)]
+    return seen
+
+
+def _residual(
+    result: Result, others: Sequence[Result], trace: Measured, jumps: FloatArray
+) -> Residual:
     inside = (trace.time >= 0) & (trace.time <= result.duration)
     time, value = trace.time[inside], trace.value[inside]
     predicted = result.sample(trace.signal, time)
@@ -177,20 +237,37 @@ def _residual(result: Result, trace: Measured, jumps: FloatArray) -> Residual:
         near = np.minimum(after, jumps.size - 1)
         hit = (after < jumps.size) & (jumps[near] <= time + half)
         difference = np.where(hit, np.nan, difference)
-    return Residual(trace.signal, time, predicted, difference)
+    square = np.full(time.size, trace.resolution**2)
+    for other in others:
+        square += ((other.sample(trace.signal, time) - predicted) / PART) ** 2
+    return Residual(trace.signal, time, predicted, difference, np.sqrt(square))
 
 
-def match(measured: ArrayLike, predicted: ArrayLike) -> Matched:
+def match(
+    measured: ArrayLike,
+    predicted: ArrayLike,
+    displaced: Sequence[ArrayLike] = (),
+    clock: float = 0.0,
+) -> Matched:
     """Pair spikes that are each other's nearest and near enough.
 
     Near enough is half the shorter of the intervals around either spike, so that a
     pair never reaches across a neighbour.
+
+    Args:
+        measured: s, ascending.
+        predicted: s, ascending.
+        displaced: predicted under forces moved by `PART` of their band, for the
+            tolerance.
+        clock: how far measured times may lie from the force's, s.
     """
     ours = np.asarray(measured, dtype=np.float64)
     theirs = np.asarray(predicted, dtype=np.float64)
     if ours.size == 0 or theirs.size == 0:
         nothing = np.empty(0)
-        return Matched(nothing, nothing, theirs.size, ours.size, nothing)
+        return Matched(
+            nothing, nothing, theirs.size, ours.size, *(nothing for _ in range(4))
+        )
     to_theirs = _nearest(ours, theirs)
     to_ours = _nearest(theirs, ours)
     mutual = to_ours[to_theirs] == np.arange(ours.size)
@@ -200,13 +277,32 @@ def match(measured: ArrayLike, predicted: ArrayLike) -> Matched:
     index = np.flatnonzero(paired)
     both = paired[1:] & paired[:-1] & (np.diff(to_theirs) == 1)
     rate_error = np.diff(theirs[to_theirs])[both] / np.diff(ours)[both] - 1
+    shifts = [_shift(theirs, np.asarray(d, np.float64)) for d in displaced]
+    spread = np.sqrt(sum((s**2 for s in shifts), np.full(theirs.size, clock**2)))
+    bend = sum(
+        ((np.diff(s) / np.diff(theirs)) ** 2 for s in shifts),
+        np.zeros(max(theirs.size - 1, 0)),
+    )
     return Matched(
         ours[index],
         offsets[index],
         int(theirs.size - index.size),
         int(ours.size - index.size),
         rate_error,
+        ours[1:][both],
+        spread[to_theirs[index]],
+        np.sqrt(bend)[to_theirs[:-1][both]],
     )
+
+
+def _shift(spikes: FloatArray, displaced: FloatArray) -> FloatArray:
+    """How far each spike moves under the whole band; NaN where it has no other."""
+    moved = np.full(spikes.size, np.nan)
+    if spikes.size and displaced.size:
+        there = _nearest(spikes, displaced)
+        mutual = _nearest(displaced, spikes)[there] == np.arange(spikes.size)
+        moved[mutual] = (displaced[there] - spikes)[mutual] / PART
+    return moved
 
 
 def _nearest(of: FloatArray, among: FloatArray) -> NDArray[np.intp]:

@@ -26,6 +26,7 @@ from tactile_lab.commands.terminal import (
 if TYPE_CHECKING:
     from tactile_lab.acquisition.events import Event
     from tactile_lab.acquisition.execution import Executed, Execution
+    from tactile_lab.analysis.beside import Beside
     from tactile_lab.bench import Bench
     from tactile_lab.report.write import Report
     from tactile_lab.scene.scene import Scene
@@ -111,7 +112,7 @@ def command(
             record(execution.bench, transcripts)
         for text in execution.plan.warnings:
             warn(text)
-    narrator.expect(execution.plan.estimate.duration)
+    narrator.expect(execution)
     done, error = run_guarded(execution)
     narrator.close()
     if done is None:
@@ -158,10 +159,16 @@ class Narrator:
         self._trial = ""
         self._spikes = 0
         self._rate = 0.0
+        self._model: Beside | None = None
 
-    def expect(self, duration: float) -> None:
-        """The run will take `duration` s of its own time."""
-        self._progress = Progress(duration, self._label)
+    def expect(self, execution: Execution) -> None:
+        """This is about to run; the model will run beside it."""
+        self._progress = Progress(execution.plan.estimate.duration, self._label)
+        searched = execution.needs.detect_on is not None
+        if searched or "V_C1" in execution.needs.stored:
+            from tactile_lab.analysis.beside import Beside
+
+            self._model = Beside(execution.scene, searched=searched)
 
     def __call__(self, event: Event) -> None:
         """Take an event of the run."""
@@ -171,6 +178,13 @@ class Narrator:
         if progress is None:
             return
         match event:
+            case events.CoilCurrent(time=at, setpoint=sent, measured=read):
+                if self._model is not None:
+                    self._model.add(at, sent if read is None else read)
+            case events.TrialEnded(outcome=outcome):
+                told = "" if self._model is None else self._model.ended(outcome)
+                if told:
+                    progress.note(told)
             case events.TrialStarted(trial=trial):
                 self._trial = trial.label
             case events.SpikesSeen(times=times, rates=rates):

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.analysis.applied import AppliedCurrent, applied_current
 from tactile_lab.analysis.drain_current import Divider
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
+from tactile_lab.model.simulate import Start
 from tactile_lab.quantity import show
 from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
 from tactile_lab.scene.load import load
@@ -21,8 +23,12 @@ from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.store.run import Records, Run
 from tactile_lab.waveform import Waveform
 
+FloatArray = NDArray[np.float64]
+
 CELLS = 4000
 """Cells of a trace over the whole run."""
+FINE = 512
+"""Samples of the shunt in one bin, to find edges: what the run's pyramid holds."""
 
 
 def read(folder: Path) -> RunData:
@@ -35,7 +41,8 @@ def read(folder: Path) -> RunData:
     scene = load(folder / "scene.toml")
     with Run.load(folder) as run:
         info = run.info
-        current = _current(run)
+        applied = _applied(run)
+        current = applied.steps
         spikes = run.spikes["time"]
         before = float(getattr(scene.protocol, "before", 0.0))
         started = _for_people(str(info.get("started", "")))
@@ -64,11 +71,12 @@ def read(folder: Path) -> RunData:
             traces=tuple(_trace(run, name) for name in run.signals),
             circuit=scene.circuit,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
+            start=_start(scene),
             divider=_divider(scene),
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
             warnings=(*warnings, *_doubts(scene, started, settings, warnings)),
-            assumptions=tuple(info.get("assumptions") or ()),
+            assumptions=(*(info.get("assumptions") or ()), *_told(applied)),
             parameters=_texts(scene, "protocol"),
             sensor=_texts(scene, "sensor"),
             settings=settings,
@@ -146,12 +154,45 @@ def _trace(run: Run, name: str) -> Trace:
     )
 
 
-def _current(run: Run) -> NDArray[np.float64]:
-    """Applied current, shape (n, 2), s and A: read back where it was, else as sent."""
-    rows = run.current
-    read_back = rows["measured"]
-    amperes = np.where(np.isnan(read_back), rows["setpoint"], read_back)
-    return np.column_stack([rows["time"], amperes])
+def _applied(run: Run) -> AppliedCurrent:
+    """The coil current: levels as read back, edges where the shunt saw them."""
+    rows, shunt = run.current, None
+    if "coil_current" in run.signals:
+        signal = run.signal("coil_current")
+
+        def shunt(start: float, end: float) -> tuple[FloatArray, FloatArray]:
+            part = signal.between(start, end)
+            cells = max(1, (part.stop - part.start) // FINE)
+            seen = signal.envelope(part.start, part.stop, cells=cells)
+            step = np.diff(seen.time[-2:]) if seen.time.size > 1 else 0.0
+            return seen.time[:-1] + step / 2, seen.mean[:-1]  # the last may be short
+
+    return applied_current(rows["time"], rows["setpoint"], rows["measured"], shunt)
+
+
+def _told(applied: AppliedCurrent) -> tuple[str, ...]:
+    """Where the coil current came from, and whether shunt and source agree."""
+    steps = len(applied.steps)
+    if steps < 2:
+        return ()
+    said = (
+        f"coil current: levels as the source read them back, {applied.edges} of "
+        f"{steps - 1} steps timed by the shunt"
+    )
+    ratio = applied.shunt_over_source
+    if ratio is not None:
+        said += (
+            f"; averaged over each level the shunt reads {ratio.value:.4g} "
+            f"({ratio.low:.4g} to {ratio.high:.4g}) of the source"
+        )
+    return (said,)
+
+
+def _start(scene: Scene) -> Start | None:
+    given = scene.start
+    if given is None:
+        return None
+    return Start(V_P=given.V_P, V_C1=given.V_C1, V_C2=given.V_C2)
 
 
 def _field_per_ampere(scene: Scene) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from html import escape
 
 from tactile_lab.quantity import show
-from tactile_lab.report import palette
+from tactile_lab.report import palette, twin_figure
 from tactile_lab.report.canvas import HEAD_HEIGHT, HEADING
 from tactile_lab.report.findings import Findings
 from tactile_lab.report.style import STYLE
@@ -27,13 +27,16 @@ CAPTION = (
 )
 
 
-def page(findings: Findings, svg: str, summary: str | None = None) -> str:
+def page(
+    findings: Findings, svg: str, summary: str | None = None, twin: str | None = None
+) -> str:
     """The report as one HTML page.
 
     Args:
         findings: what to say.
         svg: the figure, as matplotlib wrote it in the light palette.
         summary: a second figure likewise, or None.
+        twin: the figure of the model beside the run likewise, or None.
     """
     run = findings.run
     mark = (
@@ -57,6 +60,7 @@ def page(findings: Findings, svg: str, summary: str | None = None) -> str:
         "" if summary is None else _figure(findings, summary, _caption(findings)),
         _figure(findings, svg, CAPTION),
         _beside(findings),
+        "" if twin is None else _figure(findings, twin, twin_figure.CAPTION),
         _drift(findings),
         _fits(findings.trials),
         _certificate(findings),
@@ -145,7 +149,7 @@ def _beside(findings: Findings) -> str:
         return ""
     return _list(
         "twin", "Beside the model (driven by the applied current)",
-        sentences(findings.twin),
+        sentences(findings.run, findings.twin),
     )  # fmt: skip
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
+
 from tactile_lab.analysis.adaptation import Adaptation
 from tactile_lab.analysis.twin import Twin
 from tactile_lab.report.findings import Findings
@@ -98,7 +100,13 @@ def _twin(twin: Twin) -> dict[str, Any]:
     matched = twin.spikes
     return {
         "voltages": {
-            r.signal: {"offset_V": r.offset, "rms_V": r.rms, "band_95_V": r.band}
+            r.signal: {
+                "offset_V": _finite(r.offset),
+                "rms_V": _finite(r.rms),
+                "band_95_V": _finite(r.band),
+                "tolerance_V_95": _finite(np.median(r.tolerance)),
+                "within_tolerance": _finite(r.within),
+            }
             for r in twin.residuals
         },
         "spikes": None
@@ -108,8 +116,16 @@ def _twin(twin: Twin) -> dict[str, Any]:
             "missed": matched.missed,
             "extra": matched.extra,
             "offsets_s": [float(o) for o in matched.offsets],
+            "offset_tolerances_s_95": [_finite(t) for t in matched.tolerance],
+            "within_tolerance": _finite(matched.within),
+            "rate_errors": [float(e) for e in matched.rate_error],
+            "rate_error_tolerances_95": [_finite(t) for t in matched.rate_tolerance],
         },
     }
+
+
+def _finite(value: float | np.floating[Any]) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _adaptation(fit: Adaptation) -> dict[str, Any]:

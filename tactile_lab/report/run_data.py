@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tactile_lab.analysis.drain_current import Divider
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import Start
 from tactile_lab.signals import Source
 from tactile_lab.waveform import Waveform
 
@@ -131,6 +132,7 @@ class RunData:
         field: teslameter readings, shape (m, 2), s and T, or None.
         traces: decimated signals; I_DS is derived from V_C1 where it is missing.
         circuit: the sensor as it is believed to be, to compare with, or None.
+        start: voltages the circuit began with; None for the equilibrium.
         searched: V_K was searched for spikes.
         divider: parts around node A that I_DS is derived with.
         loss: counters, or None where nothing was acquired.
@@ -164,6 +166,7 @@ class RunData:
     field: FloatArray | None = None
     traces: tuple[Trace, ...] = ()
     circuit: Circuit | None = None
+    start: Start | None = None
     searched: bool = True
     divider: Divider = dataclasses.field(default_factory=Divider)
     loss: Loss | None = None

@@ -13,6 +13,7 @@ from tactile_lab.report.html import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.summary import summary
+from tactile_lab.report.twin_figure import twin_figure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,7 +31,8 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
     """Write figure.png, figure.svg, report.html and results.json into `folder`.
 
     A field calibration also gets calibration.csv, for a bench file to name.
-    Protocols whose answer is not a trace also get summary.png and summary.svg.
+    Protocols whose answer is not a trace also get summary.png and summary.svg, runs
+    with a model beside them twin.png and twin.svg.
 
     Args:
         folder: exists; files of these names are replaced.
@@ -49,7 +51,9 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
     html = folder / "report.html"
     second = summary(findings)
     other = None if second is None else save(second, folder / "summary", pdf=pdf)[1]
-    html.write_text(page(findings, svg, other), encoding="utf-8")
+    third = twin_figure(findings)
+    beside = None if third is None else save(third, folder / "twin", pdf=pdf)[1]
+    html.write_text(page(findings, svg, other, beside), encoding="utf-8")
     return Report(
         findings=findings,
         png=png,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactile_lab.analysis.twin import Measured, match, twin
+from tactile_lab.analysis.twin import PART, Measured, match, twin
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -69,6 +69,29 @@ def test_the_firing_stage_is_left_out_where_nothing_needs_it():
 def test_a_twin_needs_something_to_compare():
     with pytest.raises(ParameterError, match="measured voltage or spikes"):
         twin(Circuit(), FORCE, FORCE.end)
+
+
+def test_the_tolerance_is_what_another_force_within_its_band_would_do():
+    trace, _ = measured(Circuit())
+    stronger = FORCE.scaled(1.003)
+    found = simulate(Circuit(), stronger, keep=("V_C1", "spikes"))
+    there = Measured("V_C1", trace.time, found.sample("V_C1", trace.time), 1e-4)
+    beside = twin(
+        Circuit(), FORCE, FORCE.end, voltages=[there], spike_times=found.spike_times,
+        displaced=[FORCE.scaled(1 + 0.004 * PART)], clock=1e-4,
+    )  # fmt: skip
+    node_a = beside.residual("V_C1")
+    assert node_a.tolerance.min() >= 1e-4
+    assert node_a.within > 0.99
+    held = (node_a.time > 0.5) & (node_a.time < 3.0)
+    away = np.abs(node_a.difference[held])
+    assert np.all(node_a.tolerance[held] < 1.6 * away + 5e-4)
+    assert beside.spikes.within > 0.9
+    assert np.nanmedian(beside.spikes.rate_tolerance) == pytest.approx(
+        np.median(np.abs(beside.spikes.rate_error)) * 4 / 3, rel=0.2
+    )
+    alone = twin(Circuit(), FORCE, FORCE.end, spike_times=found.spike_times)
+    assert alone.spikes.within < 0.2, "without the force's band nothing is left open"
 
 
 TRAIN = st.lists(st.integers(100, 5000), min_size=2, max_size=40).map(

@@ -115,7 +115,8 @@ def test_rate_force_gets_a_second_figure_and_the_demo_does_not(
     assert summary(find(demo)) is None
     report = write(tmp_path, rate_force)
     assert (tmp_path / "summary.png").exists()
-    assert report.html.read_text(encoding="utf-8").count("<figure>") == 2
+    assert (tmp_path / "twin.png").exists()
+    assert report.html.read_text(encoding="utf-8").count("<figure>") == 3
 
 
 def test_repeat_tells_the_decrement():

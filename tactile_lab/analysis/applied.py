@@ -1,0 +1,129 @@
+"""The current the coil really carried, from what the run recorded of it.
+
+Levels come from the source's read-back. The shunt tells when each step came, which the
+host only knows to lie between sending a set-point and hearing that it was taken; and,
+averaged over each level, whether source and shunt agree. One scope code of a 0.1 Ohm
+shunt is 16 mA, so it gives no level by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_lab.analysis.estimate import Estimate
+
+FloatArray = NDArray[np.float64]
+Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
+"""The coil current between two times, s: its bins' middles, s, and means, A."""
+
+SAME = 2e-5
+"""Set-points nearer than this are one level, A."""
+VISIBLE = 0.03
+"""Smallest step an edge of which the shunt shows, A: two codes."""
+BEFORE, AFTER = 0.06, 0.004
+"""An edge is looked for so long before and after the host heard of the step, s."""
+LEVEL = 0.2
+"""Levels that last so long are averaged over the shunt, s."""
+SETTLING = 0.02
+"""Beginning of a level that is left out of the average: the coil's lag, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class AppliedCurrent:
+    """What the coil carried.
+
+    Attributes:
+        steps: shape (n, 2): from that time on, s, this current, A.
+        edges: number of steps whose time the shunt gave.
+        shunt_over_source: slope of the averaged shunt over the read-back; None where
+            fewer than 3 levels were held long enough.
+    """
+
+    steps: FloatArray
+    edges: int
+    shunt_over_source: Estimate | None
+
+
+def applied_current(
+    time: ArrayLike,
+    setpoint: ArrayLike,
+    measured: ArrayLike,
+    shunt: Shunt | None = None,
+) -> AppliedCurrent:
+    """Join what source and shunt tell.
+
+    Args:
+        time: when the host heard of each set-point or read-back, s, ascending.
+        setpoint: A.
+        measured: read back, A; not a number where it was not read.
+        shunt: the recorded coil current; None where the run has none.
+    """
+    t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
+    if not t.size:
+        return AppliedCurrent(np.empty((0, 2)), 0, None)
+    first = np.flatnonzero(np.abs(np.diff(sent, prepend=np.inf)) > SAME)
+    last = np.append(first[1:], t.size)
+    level = np.array(
+        [_level(sent[a], read[a:b]) for a, b in zip(first, last, strict=True)]
+    )
+    begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
+    edges = 0
+    if shunt is not None:
+        for i in range(1, begin.size):
+            at = _edge(shunt, begin[i - 1], begin[i], level[i - 1], level[i])
+            if at is not None:
+                begin[i], edges = at, edges + 1
+    steps = np.column_stack([begin, level])
+    ratio = None if shunt is None else _ratio(shunt, begin, ends, level)
+    return AppliedCurrent(steps, edges, ratio)
+
+
+def _level(sent: float, read: FloatArray) -> float:
+    known = read[np.isfinite(read)]
+    return float(known.mean()) if known.size else float(sent)
+
+
+def _edge(
+    shunt: Shunt, before: float, heard: float, old: float, new: float
+) -> float | None:
+    """When the shunt passed half the step to `new` A; None if it does not show it."""
+    if abs(new - old) < VISIBLE:
+        return None
+    time, value = shunt(max(heard - BEFORE, before), heard + AFTER)
+    if time.size < 3:
+        return None
+    done = (value - old) / (new - old)
+    past = np.flatnonzero(done >= 0.5)
+    if not past.size or past[0] == 0:
+        return None
+    i = int(past[0])
+    part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
+    return float(time[i - 1] + part * (time[i] - time[i - 1]))
+
+
+def _ratio(
+    shunt: Shunt, begin: FloatArray, ends: FloatArray, level: FloatArray
+) -> Estimate | None:
+    """Slope of the averaged shunt over the source's level; an offset is allowed for."""
+    held = np.flatnonzero(ends - begin >= LEVEL)
+    seen = []
+    for i in held:
+        _, value = shunt(float(begin[i]) + SETTLING, float(ends[i]) - BEFORE)
+        if value.size:
+            seen.append((level[i], float(value.mean())))
+    if len(seen) < 3:
+        return None
+    source, mean = np.array(seen).T
+    apart = source - source.mean()
+    spread = float(np.sum(apart**2))
+    if spread < VISIBLE**2:
+        return None
+    slope = float(np.sum(apart * mean) / spread)
+    left = mean - mean.mean() - slope * apart
+    freedom = source.size - 2
+    error = float(np.sqrt(np.sum(left**2) / freedom / spread))
+    return Estimate.of(slope, error, freedom)

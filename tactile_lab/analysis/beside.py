@@ -1,0 +1,83 @@
+"""What the model makes of each trial, told while the run goes on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.analysis.follow import Follower
+from tactile_lab.analysis.twin import match
+from tactile_lab.errors import TactileLabError
+from tactile_lab.scene.scene import Scene
+from tactile_lab.trial import Outcome
+
+
+class Beside:
+    """Compares each outcome with the model under the current that was applied.
+
+    The host's times of set-points are used as they are; the report puts each edge where
+    the shunt saw it.
+
+    Args:
+        scene: what is run.
+        searched: whether spikes are looked for.
+    """
+
+    def __init__(self, scene: Scene, *, searched: bool) -> None:
+        self._follower: Follower | None = Follower.of(scene)
+        self._searched = searched
+        self._follower.until(0.0)  # compiles, before the coil waits for anything
+
+    def add(self, at: float, amperes: float) -> None:
+        """The current `amperes` A was applied at run time `at` s."""
+        if self._follower is not None:
+            self._follower.add(at, amperes)
+
+    def ended(self, outcome: Outcome) -> str:
+        """One sentence on a trial; "" where there is nothing to compare.
+
+        After a force the model cannot follow it says so, once, and is silent then.
+        """
+        if self._follower is None:
+            return ""
+        trial, start = outcome.trial, outcome.start
+        end = max(start + trial.length, self._follower.reached)
+        try:
+            begin = self._follower.reached
+            out = self._follower.until(end)
+            if trial.pause or (trial.level is None and trial.hold is None):
+                return ""
+            trace = outcome.traces.get("V_C1", np.empty((0, 2)))
+            time = trace[:, 0] + start
+            inside = (time >= begin) & (time <= end)
+            told = []
+            if self._searched:
+                spikes = out.spike_times
+                told.append(_spikes(outcome, np.empty(0) if spikes is None else spikes))
+            if inside.any():
+                predicted = out.sample("V_C1", time[inside])
+                off = trace[inside, 1] - predicted
+                told.append(
+                    f"V_C1 {_signed(1e3 * float(off.mean()))} mV "
+                    f"({1e3 * float(np.sqrt(np.mean(off**2))):.2g} mV rms)"
+                )
+        except TactileLabError as reason:
+            self._follower = None
+            return f"the model cannot follow any more: {reason}"
+        if not told:
+            return ""
+        return f"{trial.label}: measured less model: {', '.join(told)}"
+
+
+def _spikes(outcome: Outcome, predicted: np.ndarray) -> str:
+    start, length = outcome.start, outcome.trial.length
+    mine = predicted[(predicted >= start) & (predicted < start + length)] - start
+    count = outcome.spike_times.size
+    text = f"{count} spikes (model {mine.size})"
+    offsets = match(outcome.spike_times, mine).offsets
+    if offsets.size:
+        text += f", {_signed(1e3 * float(np.median(offsets)))} ms (median)"
+    return text
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.2g}".replace("-", "−")

@@ -1,0 +1,89 @@
+"""The model advancing beside a run while it lasts, driven by the applied current."""
+
+from __future__ import annotations
+
+from queue import Empty, SimpleQueue
+
+import numpy as np
+
+from tactile_lab.magnetics import Magnet
+from tactile_lab.model.advance import Outputs, advance, rest
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.state import State
+from tactile_lab.scene.scene import Scene
+from tactile_lab.waveform import Waveform
+
+KEEP = ("V_C1", "V_C2", "spikes")
+TOLERANCE = 1e-6
+"""Error of spike times aimed at, s: far below what clocks and coil leave open."""
+
+
+class Follower:
+    """A circuit under the force that set-points give; each holds until the next.
+
+    `add` may be called from another thread than `until`.
+
+    Args:
+        circuit: the sensor as it is believed to be.
+        magnet: force per current.
+        start: voltages at run time 0 s; the equilibrium if None.
+    """
+
+    def __init__(
+        self, circuit: Circuit, magnet: Magnet, start: State | None = None
+    ) -> None:
+        self._circuit = circuit
+        self._magnet = magnet
+        self._points: SimpleQueue[tuple[float, float]] = SimpleQueue()
+        self._state = start or rest(circuit)
+        self._amperes = 0.0
+
+    @classmethod
+    def of(cls, scene: Scene) -> Follower:
+        """That of a scene's sensor on its bench."""
+        start = scene.start
+        state = None
+        if start is not None:
+            state = State(
+                time=0.0, force=0.0, V_P=start.V_P, V_C1=start.V_C1, V_C2=start.V_C2
+            )
+        return cls(scene.circuit, scene.bench.magnet, state)
+
+    @property
+    def reached(self) -> float:
+        """Run time the model has reached, s."""
+        return self._state.time
+
+    def add(self, at: float, amperes: float) -> None:
+        """The current `amperes` A was applied at run time `at` s."""
+        self._points.put((at, amperes))
+
+    def until(self, end: float) -> Outputs:
+        """Advance to `end` s, at least `reached`.
+
+        Raises:
+            ParameterError: `end` lies before what was reached.
+            SolverError: the model cannot follow this force.
+        """
+        times, amperes = [self.reached], [self._amperes]
+        while True:
+            try:
+                at, value = self._points.get_nowait()
+            except Empty:
+                break
+            at = min(max(at, times[-1]), end)
+            if at > times[-1]:
+                times.append(at)
+                amperes.append(amperes[-1])
+            elif len(times) > 1 and times[-2] == at:
+                amperes[-1] = value
+                continue
+            times.append(at)
+            amperes.append(value)
+        self._amperes = amperes[-1]
+        current = Waveform(np.array(times), np.array(amperes))
+        force = self._magnet.force_for(current, beyond="hold")
+        self._state, out = advance(
+            self._circuit, self._state, force, end, keep=KEEP, tolerance=TOLERANCE
+        )
+        return out

@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.applied import applied_current
+
+STEPS = np.array([0.0, 0.5, 1.0, 0.2])
+CAME = np.array([0.0, 1.0, 2.0, 3.0])
+
+
+def shunt(scale=1.0, late=0.0, noise=1e-3):
+    """The coil current as a scope sees it, in 1 ms bins."""
+    time = np.arange(0, 4, 1e-3) + 5e-4
+    value = scale * STEPS[np.searchsorted(CAME + late, time, side="right") - 1]
+    value = value + np.random.default_rng(0).normal(0, noise, time.size)
+
+    def seen(start, end):
+        inside = (time >= start) & (time < end)
+        return time[inside], value[inside]
+
+    return seen
+
+
+def rows():
+    """What the host heard: each step 30 ms late, a read-back in between."""
+    time = np.concatenate([CAME + 0.03, CAME + 0.5])
+    sent = np.concatenate([STEPS, STEPS])
+    read = np.concatenate([np.full(4, np.nan), STEPS + 1e-3])
+    order = np.argsort(time)
+    return time[order], sent[order], read[order]
+
+
+def test_levels_come_from_the_read_back_and_edges_from_the_shunt():
+    found = applied_current(*rows(), shunt())
+    assert found.steps[:, 1] == pytest.approx(STEPS + 1e-3)
+    assert found.edges == 3
+    assert found.steps[1:, 0] == pytest.approx(CAME[1:], abs=1.5e-3)
+
+
+def test_without_a_shunt_the_host_s_times_stand():
+    found = applied_current(*rows())
+    assert found.steps[:, 0] == pytest.approx(CAME + 0.03)
+    assert found.edges == 0
+    assert found.shunt_over_source is None
+
+
+def test_a_wrong_shunt_shows_in_the_averages():
+    found = applied_current(*rows(), shunt(scale=0.1, noise=1e-4))
+    assert found.shunt_over_source.value == pytest.approx(0.1, rel=0.01)
+    assert found.shunt_over_source.high < 0.11
+    assert found.edges == 0, "no edge of that size is believed"
+
+
+def test_steps_below_two_codes_keep_the_host_s_time():
+    time, sent, read = rows()
+    found = applied_current(time, sent * 0.02, read * np.nan, shunt(scale=0.02))
+    assert found.edges == 0
+    assert found.steps[:, 1] == pytest.approx(STEPS * 0.02)
+
+
+def test_nothing_applied_is_nothing():
+    found = applied_current([], [], [], shunt())
+    assert found.steps.shape == (0, 2)

@@ -1,0 +1,5 @@
+"""For every test."""
+
+# PySide6's import hook, which pytest-qt brings, reads the source of modules that are
+# only half imported; pydantic does not stand that unless its fields come first
+import pydantic.fields  # noqa: F401
