@@ -83,7 +83,7 @@ def advance(
             f"until = {until} s must be finite and not before the state's "
             f"{state.time:g} s."
         )
-    need = Need.of(keep)
+    need = Need.of(keep, circuit.saturation)
     started = wall.perf_counter()
     after, solution = solve(
         circuit, state, force, until, need, checked_tolerance(tolerance)

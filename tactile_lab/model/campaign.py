@@ -96,6 +96,16 @@ def random_case(seed: int) -> Case:
     return Case(seed, circuit, Waveform(time, value), until, start, tolerance)
 
 
+def saturated_case(seed: int) -> Case:
+    """The scene of `seed` with a T1 that saturates, short: each spike costs seconds."""
+    case = random_case(seed)
+    until = min(case.until, 0.25)
+    stretch = until / case.until
+    force = Waveform(case.force.time * stretch, case.force.value)
+    circuit = replace(case.circuit, saturation=True)
+    return replace(case, circuit=circuit, force=force, until=until)
+
+
 def compare(case: Case, samples: int = 40) -> Comparison:
     """Solve one case both ways; V_C1 is compared at `samples` random times."""
     c = case

@@ -25,9 +25,12 @@ _UNITS = {
     "I_S": "A", "V_GS": "V", "m": "", "V_T": "V", "g31": "V m/N", "h": "m", "L": "m",
     "d": "m", "a": "m", "b": "m", "tau": "s", "R1": "Ohm", "R2": "Ohm", "R3": "Ohm",
     "R_L": "Ohm", "R_k": "Ohm", "C1": "F", "C2": "F", "V_S": "V", "V_th": "V",
-    "I_T1s": "A", "V_fire": "V", "V_reset": "V", "t_eps": "s", "I_bias": "A",
+    "I_T1s": "A", "beta_F": "", "beta_R": "", "V_fire": "V", "V_reset": "V",
+    "t_eps": "s", "I_bias": "A",
 }  # fmt: skip
-_POSITIVE = frozenset("I_S m V_T h L a b tau R1 R2 R3 R_L C1 C2 V_S V_th I_T1s".split())
+_POSITIVE = frozenset(
+    "I_S m V_T h L a b tau R1 R2 R3 R_L C1 C2 V_S V_th I_T1s beta_F beta_R".split()
+)
 _PUT = {"V_fire": 3.56, "V_reset": 0.578, "t_eps": 8e-6}
 
 
@@ -62,7 +65,10 @@ class Circuit:
         t_eps: time of the reset, s, from 0; None: what `firing` sets.
         t1: "emitter_resistor" (R3 in the emitter) or "direct" (V_EB = V_S - V_C1).
         firing: "lif" (V_th, 0 V, 0 s) or "put" (3.56 V, 0.578 V, 8 us from ngspice).
-        saturation: let T1 saturate as a transistor does; not implemented yet.
+        saturation: let T1 saturate, by Ebers and Moll's equations instead of Eq. (17):
+            V_C2 above V_C1 turns its current from C2 into node A.
+        beta_F: forward current gain of T1; with `saturation` only.
+        beta_R: reverse current gain of T1; with `saturation` only.
         I_bias: current of a measuring follower's input into C2, A.
 
     Raises:
@@ -90,6 +96,8 @@ class Circuit:
     V_S: float = 5.0
     V_th: float = 3.213
     I_T1s: float = 1.41e-15
+    beta_F: float = 180.7
+    beta_R: float = 4.977
     V_fire: float | None = None
     V_reset: float | None = None
     t_eps: float | None = None
@@ -148,11 +156,6 @@ class Circuit:
         if not isinstance(self.saturation, bool):
             raise ParameterError(
                 f"saturation = {self.saturation!r} must be true or false."
-            )
-        if self.saturation:
-            raise ParameterError(
-                "saturation = true is not implemented yet; use false and heed the "
-                "warning where T1 would saturate."
             )
 
     @property

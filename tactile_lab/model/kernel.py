@@ -21,6 +21,8 @@ from tactile_lab.model.integrator import (
     Y_CRITICAL,
     Q_at,
     Q_gain,
+    carried,
+    missing,
     particular,
     series_at,
     to_series,
@@ -259,10 +261,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                 for i in range(ORDER):
                     part[i + 1] = W[i]
                 to_series(part, a)
-                # one coefficient may vanish by chance: three do not
-                left = max(
-                    abs(a[ORDER]), 0.3 * abs(a[ORDER - 1]), 0.1 * abs(a[ORDER - 2])
-                )
+                left = missing(a)
+                stays = carried(a, left)
                 layer = unresolved(s, h, y, V0, p, left, a, par)
                 tail = max(abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]), layer)
                 biggest = max(abs(y), abs(values[ORDER]))
@@ -281,7 +281,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 error = error_in + left + layer + floor
                 node[Y_LARGEST_ERROR] = max(node[Y_LARGEST_ERROR], error)
                 node[Y_ERROR] = (
-                    error_in * math.exp(-par[LAMBDA] * h) + 0.01 * left + layer + floor
+                    error_in * math.exp(-par[LAMBDA] * h) + stays + layer + floor
                 )
                 if keep_1:
                     step_rows = more_rows(step_rows, counts[ROWS_1])
@@ -295,7 +295,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if integrate:
                     above_threshold(a, s, h, V0, p, par, fires)
                     u, width = 0.0, 1.0
-                    Q_error_y = error_in + 0.05 * left + layer + floor
+                    Q_error_y = error_in + max(0.05 * left, stays) + layer + floor
                     while u < 1.0:
                         if width < 1.0:
                             x = 2.0 * u - 1.0
@@ -360,9 +360,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                             counts[ROWS_2] += 1
                         Q_error = (
                             Q_gain(Q_high, par) * Q_error_y
-                            + max(
-                                tail_q, 0.3 * abs(q[ORDER - 1]), 0.1 * abs(q[ORDER - 2])
-                            )
+                            + missing(q)
                             + 2.5e-16 * largest_Q
                         )
                         spikes = run_piece(

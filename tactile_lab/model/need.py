@@ -49,20 +49,25 @@ class Need:
         signals: kept signals and all they depend on.
         sampled: those that can be sampled; spikes alone store no waveform.
         left_out: signals that nothing kept depends on.
+        coupled: whether V_C2 acts back on V_C1.
     """
 
     signals: frozenset[str]
     sampled: frozenset[str]
     left_out: tuple[str, ...]
+    coupled: bool = False
 
     @classmethod
-    def of(cls, keep: Sequence[str]) -> Need:
+    def of(cls, keep: Sequence[str], coupled: bool = False) -> Need:
         """What `keep` needs.
+
+        Where T1 saturates V_C2 acts back on V_C1 (`coupled`): neither goes without the
+        other.
 
         Raises:
             ParameterError: a name that is no signal of the model.
         """
-        return _need((keep,) if isinstance(keep, str) else tuple(keep))
+        return _need((keep,) if isinstance(keep, str) else tuple(keep), coupled)
 
     @property
     def dense(self) -> bool:
@@ -70,9 +75,16 @@ class Need:
         return bool(self.sampled & {"V_P", "V_C1", "V_C2"})
 
     @property
+    def dense_V_C2(self) -> bool:
+        """Whether V_C2 is stored too."""
+        from_both = self.coupled and "I_C" in self.sampled
+        return self.dense and ("V_C2" in self.sampled or from_both)
+
+    @property
     def integrator(self) -> bool:
         """Whether V_C2 and its spikes must be solved."""
-        return bool(self.signals & {"V_C2", "spikes", "statistics"})
+        asked = bool(self.signals & {"V_C2", "spikes", "statistics"})
+        return asked or (self.coupled and self.node_a)
 
     @property
     def node_a(self) -> bool:
@@ -81,7 +93,7 @@ class Need:
 
 
 @lru_cache(maxsize=256)
-def _need(keep: tuple[str, ...]) -> Need:
+def _need(keep: tuple[str, ...], coupled: bool) -> Need:
     unknown = [name for name in keep if name not in DEPENDS]
     if unknown:
         raise ParameterError(
@@ -94,10 +106,12 @@ def _need(keep: tuple[str, ...]) -> Need:
     # spikes are found in V_C2, whether its waveform is kept or not
     counted = signals & {"spikes", "statistics"}
     solved = signals | {"V_C2"} if counted else signals
+    if coupled and "V_C1" in signals:
+        solved = solved | {"I_C", "V_C2", "spikes"}
     left_out = tuple(
         name for name in DEPENDS if name not in solved and name != "statistics"
     )
-    return Need(signals, sampled, left_out)
+    return Need(signals, sampled, left_out, coupled)
 
 
 SMALLEST_TOLERANCE = 1e-14

@@ -12,18 +12,15 @@ from dataclasses import dataclass
 from decimal import Decimal, localcontext
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.decimal_rule import NODES, ONE, ZERO, Numbers, rule, solved
 from tactile_lab.model.equations import rest_V_C1, wright_omega
 from tactile_lab.model.simulate import Start
-from tactile_lab.model.tableau import differentiation, radau_nodes
 from tactile_lab.waveform import Waveform
 
-DIGITS, NODES, TAIL = 40, 32, Decimal("1e-23")
-ONE, ZERO = Decimal(1), Decimal(0)
-Numbers = list[Decimal]
+DIGITS, TAIL = 40, Decimal("1e-23")
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ def reference(
     """
     with localcontext() as context:
         context.prec = DIGITS
-        return _Run(circuit, force, until, start, times).solve()
+        return run_of(circuit, force, until, start, times).solve()
 
 
 def constant_firing(circuit: Circuit) -> Decimal:
@@ -64,77 +61,29 @@ def constant_firing(circuit: Circuit) -> Decimal:
 
     The circuit must fire at rest (see `fires_at_rest`).
     """
-    run = _Run(circuit, Waveform.constant(0.0), 1.0, None, ())
+    run = run_of(circuit, Waveform.constant(0.0), 1.0, None, ())
     Q = run.Q(run.y)
     return run.t_eps - run.tau_L * ((Q - run.V_f) / (Q - run.V_r)).ln()
 
 
-class _Rule:
-    """Nodes, derivatives and interpolation weights, refined to all digits."""
+def run_of(
+    circuit: Circuit,
+    force: Waveform,
+    until: float,
+    start: Start | None,
+    times: Sequence[float],
+) -> Run:
+    """What solves this circuit."""
+    if circuit.saturation:
+        from tactile_lab.model.reference_pair import PairRun
 
-    def __init__(self) -> None:
-        rough = radau_nodes(NODES)
-        self.u = [ZERO, *(_refined(Decimal(float(c))) for c in rough[:-1]), ONE]
-        n = len(self.u)
-        self.weight = []
-        for i in range(n):
-            product = ONE
-            for j in range(n):
-                if j != i:
-                    product *= self.u[i] - self.u[j]
-            self.weight.append(ONE / product)
-        self.D = [
-            [
-                ZERO if i == j
-                else self.weight[j] / self.weight[i] / (self.u[i] - self.u[j])
-                for j in range(n)
-            ]
-            for i in range(n)
-        ]  # fmt: skip
-        for i in range(n):
-            self.D[i][i] = -sum(self.D[i], ZERO)
-        self.D_float = differentiation(np.array([float(u) for u in self.u]))[1:, 1:]
-        grid = np.linspace(0.0, 1.0, 161)[1:]
-        w = np.array([float(x) for x in self.weight])
-        rows = w / (grid[:-1, None] - np.array([float(u) for u in self.u])[None, :])
-        self.grid, self.to_grid = grid, np.zeros((grid.size, w.size))
-        self.to_grid[:-1] = rows / rows.sum(axis=1, keepdims=True)
-        self.to_grid[-1, -1] = 1.0
-
-    def at(self, values: Numbers, u: Decimal) -> Decimal:
-        """The polynomial through `values` at u (barycentric)."""
-        above = below = ZERO
-        for x, w, value in zip(self.u, self.weight, values, strict=True):
-            if x == u:
-                return value
-            part = w / (u - x)
-            above += part * value
-            below += part
-        return above / below
-
-    def tail(self, values: Numbers) -> Decimal:
-        """Size of the last Chebyshev coefficient."""
-        total = sum((w * v for w, v in zip(self.weight, values, strict=True)), ZERO)
-        return abs(total) / Decimal(2) ** (2 * NODES - 1)
+        return PairRun(circuit, force, until, start, times)
+    return Run(circuit, force, until, start, times)
 
 
-def _refined(c: Decimal) -> Decimal:
-    """A root of P_(n-1) - P_n at x = 2c - 1 by Newton's method."""
-    x = 2 * c - 1
-    for _ in range(5):
-        p, q, dp, dq = ONE, x, ZERO, ONE
-        for k in range(1, NODES):
-            p, q, dp, dq = (
-                q,
-                ((2 * k + 1) * x * q - k * p) / (k + 1),
-                dq,
-                ((2 * k + 1) * (q + x * dq) - k * dp) / (k + 1),
-            )
-        x -= (p - q) / (dp - dq)
-    return (x + 1) / 2
+class Run:
+    """One solution in the making."""
 
-
-class _Run:
     def __init__(
         self,
         circuit: Circuit,
@@ -146,7 +95,8 @@ class _Run:
         c = circuit
         self.c, self.force, self.until = c, force, Decimal(until)
         d = {name: Decimal(getattr(c, name)) for name in (
-            "I_S V_GS m V_T g31 h L d a b tau R1 R2 R3 R_L C1 C2 V_S I_T1s I_bias"
+            "I_S V_GS m V_T g31 h L d a b tau R1 R2 R3 R_L C1 C2 V_S I_T1s I_bias "
+            "beta_F beta_R"
         ).split()}  # fmt: skip
         self.d = d
         self.k_F = 6 * d["g31"] * d["h"] * (d["L"] - d["d"]) / (d["a"] * d["b"] ** 2)
@@ -154,11 +104,10 @@ class _Run:
         self.tau_L = d["R_L"] * d["C2"]
         self.V_f, self.V_r = Decimal(c.fire_voltage), Decimal(c.reset_voltage)
         self.t_eps = Decimal(c.reset_time)
-        self.rule = _rule()
+        self.rule = rule()
         self.V_P = ZERO
         if start is None:
-            self.y = self._rest()
-            self.V2 = self.Q(self.y)
+            self.y, self.V2 = self.rest()
             if self.V2 >= self.V_f:
                 self.V2 = self.V_r
         else:
@@ -170,14 +119,15 @@ class _Run:
         self.spikes: Numbers = []
         self.held: Decimal | None = None
 
-    def _rest(self) -> Decimal:
+    def rest(self) -> tuple[Decimal, Decimal]:
+        """V_C1 and V_C2 at equilibrium."""
         d, y = self.d, Decimal(rest_V_C1(self.c))
         B = d["I_S"] * (d["V_GS"] / (d["m"] * d["V_T"])).exp()
         for _ in range(6):
             q = (-y / d["V_T"]).exp()
             f = (d["V_S"] - y) / d["R1"] - y / d["R2"] - B * (1 - q)
             y += f / (self.G + B * q / d["V_T"])
-        return y
+        return y, self.Q(y)
 
     def Q(self, y: Decimal) -> Decimal:
         """R_L (I_C + I_bias), Eq. (17)."""
@@ -194,6 +144,7 @@ class _Run:
         return d["R_L"] * (d["V_T"] / d["R3"] * w - d["I_T1s"] + d["I_bias"])
 
     def solve(self) -> Reference:
+        """From time 0 to the end, segment by segment."""
         t = ZERO
         points = [
             (Decimal(float(x)), Decimal(float(F)))
@@ -219,7 +170,8 @@ class _Run:
             self.found_2.append(self.V_f if self.held is not None else self.V2)
         return Reference(tuple(self.spikes), tuple(self.found_1), tuple(self.found_2))
 
-    def _V_P(self, V0: Decimal, p: Decimal, s: Decimal) -> Decimal:
+    def V_P_at(self, V0: Decimal, p: Decimal, s: Decimal) -> Decimal:
+        """Closed form of Eq. (7) at s after V0 under a slope p."""
         tau = self.d["tau"]
         x = s / tau
         if x < Decimal("1e-8"):
@@ -237,19 +189,15 @@ class _Run:
             h = min(size, T - s)
             if self.held is not None and t0 + s + h > self.held:
                 h = self.held - t0 - s
-            ys = self._step(V0, p, s, h) if h > 0 else [self.y]
-            if ys is None or (h > 0 and self.rule.tail(ys) > TAIL):
+            both = self.both(V0, p, s, h) if h > 0 else ([self.y], None)
+            if both is None:
                 size, fails = h / 3, fails + 1
                 if fails > 2000:
                     raise SolverError("The reference does not converge.")
                 continue
+            ys, leak = both
             done, end = h, False
-            leak: Numbers | None = None
-            if h > 0 and self.held is None:
-                leak = self._integrate([self.Q(y) for y in ys], h)
-                if self.rule.tail(leak) > TAIL:
-                    size = h / 2
-                    continue
+            if leak is not None:
                 u = self._fires(leak)
                 if u is not None:
                     done, end = u * h, True
@@ -268,14 +216,26 @@ class _Run:
                     self.held = t0 + s + self.t_eps
             if done == size:
                 size *= 2
-        self.V_P = self._V_P(V0, p, T)
+        self.V_P = self.V_P_at(V0, p, T)
+
+    def both(
+        self, V0: Decimal, p: Decimal, s: Decimal, h: Decimal
+    ) -> tuple[Numbers, Numbers | None] | None:
+        """V_C1, and V_C2 unless held, at the nodes of one step; None: too long."""
+        ys = self._step(V0, p, s, h)
+        if ys is None or self.rule.tail(ys) > TAIL:
+            return None
+        if self.held is not None:
+            return ys, None
+        leak = self._integrate([self.Q(y) for y in ys], h)
+        return None if self.rule.tail(leak) > TAIL else (ys, leak)
 
     def _step(self, V0: Decimal, p: Decimal, s: Decimal, h: Decimal) -> Numbers | None:
         d, rule, n = self.d, self.rule, NODES
         V_T = d["V_T"]
         B = [
             d["I_S"] / d["C1"]
-            * ((d["V_GS"] + self._V_P(V0, p, s + h * u)) / (d["m"] * V_T)).exp()
+            * ((d["V_GS"] + self.V_P_at(V0, p, s + h * u)) / (d["m"] * V_T)).exp()
             for u in rule.u[1:]
         ]  # fmt: skip
         W = [ZERO] * n
@@ -299,7 +259,7 @@ class _Run:
             scale = np.array([1 / (1 + float(r)) for r in rates])
             matrix = rule.D_float + np.diag([float(r) for r in rates])
             right = [r / (1 + k) for r, k in zip(residual, rates, strict=True)]
-            change = _solved(matrix * scale[:, None], right)
+            change = solved(matrix * scale[:, None], right)
             if change is None:
                 return None
             largest = max(abs(x) for x in change)
@@ -324,7 +284,7 @@ class _Run:
                 for j in range(n):
                     total -= row[j + 1] * W[j]
                 residual.append(total)
-            change = _solved(matrix, residual)
+            change = solved(matrix, residual)
             assert change is not None
             W = [w + x for w, x in zip(W, change, strict=True)]
             if max(abs(x) for x in change) < Decimal("1e-30"):
@@ -363,25 +323,3 @@ class _Run:
                 return
             self.found_1.append(self.rule.at(ys, u))
             self.found_2.append(self.V_f if leak is None else self.rule.at(leak, u))
-
-
-def _solved(matrix: NDArray[np.float64], right: Numbers) -> Numbers | None:
-    """A correction good to some ten digits of itself; iterating gives all."""
-    largest = max(abs(x) for x in right)
-    if largest == 0:
-        return [ZERO] * len(right)
-    if not largest.is_finite():
-        return None
-    x = np.linalg.solve(matrix, np.array([float(r / largest) for r in right]))
-    if not np.all(np.isfinite(x)):
-        return None
-    return [Decimal(float(v)) * largest for v in x]
-
-
-_RULES: list[_Rule] = []
-
-
-def _rule() -> _Rule:
-    if not _RULES:
-        _RULES.append(_Rule())
-    return _RULES[0]

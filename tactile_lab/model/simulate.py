@@ -112,7 +112,7 @@ def simulate(
             f"The force starts at {force.start:g} s; a simulation starts at 0 s. "
             "Shift the waveform."
         )
-    need = Need.of(keep)
+    need = Need.of(keep, circuit.saturation)
     tolerance = checked_tolerance(tolerance)
     began = wall.perf_counter()
     first = rest(circuit, force=float(force.value[0]))

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.errors import ParameterError
 from tactile_lab.model import sampling
 from tactile_lab.model.circuit import Circuit, FloatArray
-from tactile_lab.model.equations import I_C, I_DS
+from tactile_lab.model.equations import I_C, I_DS, T1_currents
 from tactile_lab.model.need import Need
 from tactile_lab.waveform import Waveform
 
@@ -90,7 +90,10 @@ class Solution:
         if signal == "I_DS":
             return I_DS(self.circuit, self._values("V_P", t), self._values("V_C1", t))
         if signal == "I_C":
-            return I_C(self.circuit, self._values("V_C1", t))
+            V_C1 = self._values("V_C1", t)
+            if self.circuit.saturation:
+                return T1_currents(self.circuit, V_C1, self._values("V_C2", t))[0]
+            return I_C(self.circuit, V_C1)
         kind = ("V_P", "V_C1", "V_C2").index(signal)
         rows = (self.segments, self.steps, self.pieces)[kind]
         if rows.shape[0] == 0:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError, SolverError
-from tactile_lab.model import integrator, kernel, node_a, spiking
+from tactile_lab.model import integrator, kernel, node_a, spiking, transistor
 from tactile_lab.model.circuit import (
     LARGEST_VOLTAGE,
     SATURATION_HEADROOM,
@@ -25,6 +25,8 @@ from tactile_lab.waveform import Waveform
 
 MOST_SPIKES = 1e8
 """Most spikes in one slice: beyond, refuse instead of hanging."""
+MOST_COUPLED = 1e6
+"""The same where T1 saturates and a spike takes a hundred times as long."""
 
 
 @lru_cache(maxsize=64)
@@ -33,7 +35,7 @@ def parameters(circuit: Circuit) -> FloatArray:
     c = circuit
     direct = c.t1 == "direct"
     drop = c.I_T1s * c.R3
-    par = np.empty(integrator.PARAMETERS)
+    par = np.empty(transistor.ALL_PARAMETERS)
     par[node_a.V_T] = c.V_T
     par[node_a.LAMBDA] = 1 / c.tau_A
     par[node_a.DIVIDER] = c.V_S * c.R2 / (c.R1 + c.R2)
@@ -56,6 +58,12 @@ def parameters(circuit: Circuit) -> FloatArray:
     par[integrator.T_EPS] = c.reset_time
     par[integrator.Y_CRITICAL] = c.critical_V_C1
     par[integrator.Y_SATURATED] = c.fire_voltage - SATURATION_HEADROOM
+    a = 1 + 1 / c.beta_F
+    par[transistor.I_S1], par[transistor.T1_BIAS] = c.I_T1s, c.I_bias
+    par[transistor.R_E], par[transistor.E_DROP] = c.R3, a * drop
+    par[transistor.E_LOG] = math.log(a) + par[integrator.T1_LOG]
+    par[transistor.PER_F], par[transistor.PER_R] = 1 / c.beta_F, 1 / c.beta_R
+    par[transistor.T1_C1], par[transistor.T1_C2] = c.C1, c.C2
     par.setflags(write=False)
     return par
 
@@ -87,15 +95,28 @@ def solve(
     S = _memory(state)
     counts = np.zeros(kernel.COUNTS, dtype=np.int64)
     keep_spikes = bool(need.signals & {"spikes"})
-    most = MOST_SPIKES
-    status, segments, steps, pieces, spikes = kernel.run(
-        time, value, circuit.k_F, par, node, S, counts, tolerance,
-        need.node_a, need.integrator, keep_spikes,
-        need.dense, need.dense and "V_C2" in need.sampled, most,
-    )  # fmt: skip
+    if circuit.saturation and need.node_a:
+        from tactile_lab.model import coupled
+
+        most = MOST_COUPLED
+        E = np.array([state.error_V_C1**2, state.errors_together, state.error_V_C2**2])
+        status, segments, steps, pieces, spikes = coupled.run(
+            time, value, circuit.k_F, par, node, E, S, counts, tolerance,
+            keep_spikes, need.dense, need.dense_V_C2, most,
+        )  # fmt: skip
+        node[kernel.Y_ERROR] = math.sqrt(E[coupled.E_11])
+        S[spiking.ERROR] = math.sqrt(E[coupled.E_22])
+        together = float(E[coupled.E_12])
+    else:
+        most, together = MOST_SPIKES, 0.0
+        status, segments, steps, pieces, spikes = kernel.run(
+            time, value, circuit.k_F, par, node, S, counts, tolerance,
+            need.node_a, need.integrator, keep_spikes,
+            need.dense, need.dense_V_C2, most,
+        )  # fmt: skip
     if status != kernel.DONE:
         raise SolverError(_refusal(status, float(S[spiking.COUNT]), most))
-    after = _after(state, until, float(value[-1]), node, S, need)
+    after = _after(state, until, float(value[-1]), node, S, need, together)
     return after, Solution(
         circuit=circuit,
         need=need,
@@ -184,6 +205,7 @@ def _after(
     node: FloatArray,
     S: FloatArray,
     need: Need,
+    together: float,
 ) -> State:
     resume = None
     V_C2 = float(S[spiking.VOLTAGE])
@@ -209,6 +231,7 @@ def _after(
         spikes=state.spikes + int(S[spiking.COUNT]),
         error_V_C1=float(node[kernel.Y_ERROR]),
         error_V_C2=float(S[spiking.ERROR]),
+        errors_together=together,
         left_out=left_out,
     )
 

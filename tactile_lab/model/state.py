@@ -20,7 +20,10 @@ class State:
         previous_spike: time of the one before, s.
         spikes: number of spikes so far.
         error_V_C1: estimated error of V_C1 so far, V.
-        error_V_C2: estimated error of V_C2 so far, V.
+        error_V_C2: estimated error of V_C2 so far, V; during a reset with
+            ``saturation`` that of `resume`, s.
+        errors_together: how far the two go together, the product of both units; 0
+            without ``saturation``.
         left_out: stages not advanced up to `time`; their values are older.
     """
 
@@ -35,4 +38,5 @@ class State:
     spikes: int = 0
     error_V_C1: float = 0.0
     error_V_C2: float = 0.0
+    errors_together: float = 0.0
     left_out: tuple[str, ...] = ()

@@ -79,6 +79,8 @@ class SensorTable(Table):
     V_S: Volt | None = None
     V_th: Volt | None = None
     I_T1s: Ampere | None = None
+    beta_F: float | None = None
+    beta_R: float | None = None
     V_fire: Volt | None = None
     V_reset: Volt | None = None
     t_eps: Second | None = None

@@ -37,7 +37,7 @@ SCENES = {
     "empty": ("", "empty"),
     "nested too deeply": ("a=" + "[" * 9000 + "]" * 9000, "deeply"),
     "no such option": (PULSES + '[sensor]\nt1 = "emiter"\n', "emitter_resistor"),
-    "saturation": (PULSES + "[sensor]\nsaturation = true\n", "saturation"),
+    "saturation": (PULSES + '[sensor]\nsaturation = "yes"\n', "saturation"),
     "reset above fire": (PULSES + '[sensor]\nV_reset = "4 V"\n', "V_reset"),
     "start above fire": (
         PULSES + '[sensor.start]\nV_P = "0 V"\nV_C1 = "0 V"\nV_C2 = "3.213 V"\n',

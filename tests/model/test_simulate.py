@@ -52,7 +52,7 @@ def test_stages_nothing_asks_for_are_left_out():
     "wrong",
     [
         {"C1": 0.0}, {"C1": float("nan")}, {"R3": -1.0}, {"V_GS": float("inf")},
-        {"V_reset": 4.0}, {"t1": "base"}, {"firing": "x"}, {"saturation": True},
+        {"V_reset": 4.0}, {"t1": "base"}, {"firing": "x"}, {"saturation": 1},
         {"t_eps": -1.0}, {"R_k": -1.0}, {"d": 1.0}, {"C2": 1e-200}, {"m": True},
     ],
 )  # fmt: skip

@@ -1,0 +1,373 @@
+"""The solver's loop where T1 saturates: V_C2 acts back on V_C1, both are one system.
+
+Each step is collocated for both voltages at once and ends at a spike at the latest:
+the step that passes V_fire is repeated to end there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.integrator import (
+    MOST_TERMS,
+    T_EPS,
+    V_FIRE,
+    V_RESET,
+    V_S,
+    carried,
+    missing,
+    series_at,
+    to_series,
+)
+from tactile_lab.model.kernel import (
+    DONE,
+    EXPANSIONS,
+    FAST,
+    ITERATIONS,
+    NOT_FINITE,
+    PIECE_ROW,
+    PIECES,
+    REJECTED,
+    ROWS_0,
+    ROWS_1,
+    ROWS_2,
+    SEGMENT_ROW,
+    SEGMENTS,
+    SHORTEST_SEGMENT,
+    STEP_ROW,
+    STEPS,
+    STUCK,
+    V_P,
+    V_P_HIGHEST,
+    Y_LARGEST_ERROR,
+    Y,
+    more_rows,
+)
+from tactile_lab.model.node_a import (
+    DIVIDER,
+    LAMBDA,
+    TAU,
+    V_T,
+    B_at,
+    V_P_at,
+    equilibrium,
+)
+from tactile_lab.model.pair import (
+    COLUMNS,
+    collocate_pair,
+    first_crossing,
+    flow,
+    unseen,
+)
+from tactile_lab.model.spiking import (
+    COUNT,
+    DOUBT,
+    EPS,
+    LAST,
+    RESUME,
+    SEARCHES,
+    SHORTEST_INTERVAL,
+    TOO_FAST,
+    VOLTAGE,
+    fire,
+    grown,
+)
+from tactile_lab.model.tableau import ORDER
+from tactile_lab.model.transistor import (
+    A_BY_1,
+    A_BY_2,
+    C2_BY_1,
+    C2_BY_2,
+    TO_A,
+    TO_C2,
+    reach,
+)
+
+E_11, E_12, E_22 = range(3)
+"""The ellipse of possible errors of V_C1 (1) and V_C2 (2), V^2: e' E^-1 e <= 1. During
+a reset the second axis is the time at which it ends, s."""
+
+
+@inner
+def transform(E: FloatArray, a: float, b: float, c: float, d: float) -> None:
+    """The ellipse after e := [[a, b], [c, d]] e."""
+    p, q, r = E[E_11], E[E_12], E[E_22]
+    E[E_11] = a * a * p + 2.0 * a * b * q + b * b * r
+    E[E_12] = a * c * p + (a * d + b * c) * q + b * d * r
+    E[E_22] = c * c * p + 2.0 * c * d * q + d * d * r
+
+
+@inner
+def widen(E: FloatArray, one: float, two: float) -> None:
+    """An ellipse that holds the sum of any error in it and one of +-one, +-two."""
+    old, new = math.sqrt(E[E_11] + E[E_22]), math.sqrt(2.0 * (one * one + two * two))
+    if new == 0.0:
+        return
+    grow = 1.0 + new / old if old > 0.0 else 1.0
+    add = 2.0 * (1.0 + old / new)
+    E[E_11] = E[E_11] * grow + add * one * one
+    E[E_12] *= grow
+    E[E_22] = E[E_22] * grow + add * two * two
+
+
+@inner
+def series_of(start: float, W: FloatArray, first: int, a: FloatArray) -> None:
+    """Series of start + W[first:first + ORDER], its last digits kept."""
+    part = np.empty(ORDER + 1)
+    part[0] = 0.0
+    for i in range(ORDER):
+        part[i + 1] = W[first + i]
+    to_series(part, a)
+    a[0] += start
+
+
+@inner
+def restart(
+    B: float, y: float, par: FloatArray, E: FloatArray, S: FloatArray,
+    f: FloatArray, g: FloatArray,
+) -> float:  # fmt: skip
+    """End the reset: V_C2 = V_reset; an error in its time becomes one of voltages."""
+    v: float = par[V_RESET]
+    flow(B, y, v, True, par, g)
+    flow(B, y, v, False, par, f)
+    transform(E, 1.0, g[TO_A] - f[TO_A], 0.0, -f[TO_C2])
+    S[RESUME] = -1.0
+    return v
+
+
+def _build(stamp: int) -> Callable[..., Any]:
+    @entry
+    def run(
+        time: FloatArray,
+        force: FloatArray,
+        k_F: float,
+        par: FloatArray,
+        node: FloatArray,
+        E: FloatArray,
+        S: FloatArray,
+        counts: Any,
+        tolerance: float,
+        keep_spikes: bool,
+        keep_1: bool,
+        keep_2: bool,
+        most: float,
+    ) -> Any:
+        _ = stamp
+        status = DONE
+        seg_rows = np.empty((8, SEGMENT_ROW))
+        step_rows = np.empty((16, STEP_ROW))
+        piece_rows = np.empty((16, PIECE_ROW))
+        spikes = np.empty(64)
+        W = np.empty(2 * ORDER)
+        f = np.empty(6)
+        g = np.empty(6)
+        matrix = np.empty((2 * ORDER, 2 * ORDER))
+        right = np.empty((2 * ORDER, COLUMNS))
+        a = np.empty(ORDER + 1)
+        b = np.empty(ORDER + 1)
+        part = np.empty(ORDER + 1)
+        d = np.empty(ORDER + 1)
+        after_reset = 0.0
+        for k in range(time.size - 1):
+            T = time[k + 1] - time[k]
+            if T < SHORTEST_SEGMENT:
+                node[V_P] += k_F * (force[k + 1] - force[k])
+                node[V_P_HIGHEST] = max(node[V_P_HIGHEST], node[V_P])
+                continue
+            t, V0 = time[k], node[V_P]
+            p = k_F * (force[k + 1] - force[k]) / T
+            V1 = V_P_at(T, V0, p, par[TAU])
+            counts[SEGMENTS] += 1
+            if keep_1:
+                n = counts[ROWS_0]
+                seg_rows = more_rows(seg_rows, n)
+                seg_rows[n, 0], seg_rows[n, 1] = t, T
+                seg_rows[n, 2], seg_rows[n, 3] = V0, p
+                counts[ROWS_0] += 1
+            node[V_P] = V1
+            node[V_P_HIGHEST] = max(node[V_P_HIGHEST], V1)
+            B0, B1 = B_at(V0, par), B_at(V1, par)
+            y, v = node[Y], S[VOLTAGE]
+            y_a, y_b = equilibrium(B0, par), equilibrium(B1, par)
+            # leakage of T1 alone can pull node A down, by less than I_T1s
+            low = min(y, y_a, y_b, v) - 1e-3 * par[V_T]
+            high = max(y, par[V_S], v, par[V_RESET]) + par[V_T]
+            above = reach(low, max(B0, B1) + par[LAMBDA] * high, par)
+            s = carry = 0.0
+            if S[RESUME] == 0.0:
+                v = restart(B0, y, par, E, S, f, g)
+            held = S[RESUME] >= 0.0
+            if held:
+                v = par[V_FIRE]
+            flow(B0, y, v, held, par, f)
+            rate = -f[A_BY_1] - f[C2_BY_2] + abs(f[A_BY_2]) + abs(f[C2_BY_1])
+            h = T
+            moving = abs(f[TO_A]) > -1e-14 * f[A_BY_1] * high
+            if V1 != V0 or moving or abs(f[TO_C2]) > -1e-14 * f[C2_BY_2] * high:
+                h = min(h, max(2.0 / rate, 1e-280))
+            tries = 0
+            to_spike = fresh = False
+            while s < T:
+                held = S[RESUME] >= 0.0
+                if to_spike:
+                    pass
+                elif s + 1.0001 * h >= T:
+                    h = T - s
+                elif s + 1.8 * h > T:
+                    h = 0.5 * (T - s)
+                if held:
+                    h = min(h, S[RESUME])
+                tries += 1
+                if tries > 200000 or h <= 0.0:
+                    status = STUCK
+                    break
+                limit = max(above, v - y)
+                done = collocate_pair(
+                    s, h, y, v, held, V0, p, low, high, limit, par, W, f, matrix, right
+                )
+                if done < 0:
+                    h *= 0.2
+                    to_spike = False
+                    counts[REJECTED] += 1
+                    continue
+                counts[ITERATIONS] += done
+                series_of(y, W, 0, a)
+                series_of(v, W, ORDER, b)
+                y1, v1 = y + W[ORDER - 1], v + W[2 * ORDER - 1]
+                left_1, left_2 = missing(a), missing(b)
+                flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
+                layer_1 = unseen(f[TO_A], -f[A_BY_1], h, left_1, a)
+                layer_2 = 0.0
+                if not held:
+                    layer_2 = unseen(f[TO_C2], -f[C2_BY_2], h, left_2, b)
+                big_1, big_2 = max(abs(y), abs(y1)), max(abs(v), abs(v1))
+                wanted = max(1e-3 * tolerance, 6e-16 * max(big_1, big_2))
+                tail = max(
+                    abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]), layer_1,
+                    abs(b[ORDER]), 0.1 * abs(b[ORDER - 1]), layer_2,
+                )  # fmt: skip
+                growth = 0.85 * (wanted / max(tail, 1e-40)) ** (1.0 / ORDER)
+                if tail > wanted:
+                    h *= max(0.1, growth)
+                    to_spike = False
+                    counts[REJECTED] += 1
+                    continue
+                # B carries the rounding of its exponent: so does V_C1
+                depth = abs(par[DIVIDER] - min(y, y1))
+                floor_1 = 2.5e-16 * (big_1 + 12.0 * depth)
+                floor_2 = 5e-16 * (big_2 + abs(par[V_FIRE]))
+                error_2 = left_2 + layer_2 + floor_2
+                if not held and not to_spike:
+                    S[SEARCHES] += 1.0
+                    inside = error_2 + math.sqrt(E[E_22])
+                    u, doubt = first_crossing(b, par[V_FIRE], inside, part, d)
+                    if doubt:
+                        S[DOUBT] = 1.0
+                    if u < 1.0:
+                        h *= u
+                        to_spike = True
+                        continue
+                    to_spike = u == 1.0
+                counts[STEPS] += 1
+                counts[EXPANSIONS] += 1
+                node[Y_LARGEST_ERROR] = max(
+                    node[Y_LARGEST_ERROR],
+                    math.sqrt(E[E_11]) + left_1 + layer_1 + floor_1,
+                )
+                transform(
+                    E, 1.0 + right[ORDER - 1, 1], right[ORDER - 1, 2],
+                    right[2 * ORDER - 1, 1], 1.0 + right[2 * ORDER - 1, 2],
+                )  # fmt: skip
+                widen(
+                    E, carried(a, left_1) + layer_1 + floor_1,
+                    EPS * h if held else carried(b, left_2) + layer_2 + floor_2,
+                )  # fmt: skip
+                if keep_1:
+                    n = counts[ROWS_1]
+                    step_rows = more_rows(step_rows, n)
+                    step_rows[n, 0], step_rows[n, 1], step_rows[n, 2] = t, s, h
+                    for i in range(ORDER + 1):
+                        step_rows[n, 3 + i] = a[i]
+                    counts[ROWS_1] += 1
+                counts[PIECES] += 1
+                if keep_2:
+                    n = counts[ROWS_2]
+                    piece_rows = more_rows(piece_rows, n)
+                    piece_rows[n, 0], piece_rows[n, 1], piece_rows[n, 2] = t, s, h
+                    piece_rows[n, 3] = ORDER
+                    # the series is all: nothing is left for the exponential
+                    piece_rows[n, 4] = b[0] + series_at(b, ORDER, -1.0)
+                    piece_rows[n, 5] = 2.0 * h if held else -1.0
+                    for i in range(ORDER + 1):
+                        piece_rows[n, 6 + i] = b[i]
+                    for i in range(ORDER + 1, MOST_TERMS + 1):
+                        piece_rows[n, 6 + i] = 0.0
+                    counts[ROWS_2] += 1
+                y, v = y1, v1
+                h_next = h * min(
+                    max(growth, 0.2), 5.0 if tail > 1e-3 * wanted else 100.0
+                )
+                if fresh and not held and not to_spike:
+                    fresh, after_reset = False, h
+                if not (abs(y) < np.inf and abs(v) < np.inf):
+                    status = NOT_FINITE
+                    break
+                last = s + h >= T
+                following = s + (h + carry)
+                carry = (s - following) + (h + carry)
+                s = following
+                if held:
+                    S[RESUME] -= h
+                if to_spike:
+                    to_spike = False
+                    B = B_at(V_P_at(s, V0, p, par[TAU]), par)
+                    flow(B, y, v, False, par, f)
+                    flow(B, y, v, True, par, g)
+                    slope = max(f[TO_C2], 1e-300)
+                    late = (par[V_FIRE] - v) / slope
+                    error = math.sqrt(E[E_22]) / slope + EPS * (t + s)
+                    # does the series stay above V_fire by more than its error?
+                    x = 1.0 + 2.0 * min(max(2.0 * error / h, 1e-7), 0.02)
+                    beyond = b[0] + series_at(b, ORDER, x) - par[V_FIRE]
+                    if beyond <= 0.0:
+                        S[DOUBT] = 1.0
+                    at = t + (s + (carry + late))
+                    fire_before = S[LAST]
+                    fire(at, error, S)
+                    if keep_spikes:
+                        spikes = grown(spikes, int(S[COUNT]))
+                        spikes[int(S[COUNT]) - 1] = at
+                    closest = max(SHORTEST_INTERVAL, 4.0 * EPS * abs(at))
+                    if at - fire_before < closest or S[COUNT] >= most:
+                        S[TOO_FAST] = 1.0
+                        status = FAST
+                        break
+                    y += f[TO_A] * late
+                    carry += late
+                    transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
+                    S[RESUME], v = par[T_EPS], par[V_FIRE]
+                    last = False
+                if last:
+                    s = T
+                h = h_next
+                if S[RESUME] == 0.0:
+                    v = restart(
+                        B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f, g
+                    )
+                    fresh = True
+                    h = after_reset if after_reset > 0.0 else h
+            node[Y], S[VOLTAGE] = y, v
+            if status != DONE:
+                break
+        return status, seg_rows, step_rows, piece_rows, spikes
+
+    return run
+
+
+run = _build(source_stamp())

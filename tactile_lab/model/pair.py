@@ -1,0 +1,206 @@
+"""V_C1 and V_C2 together where T1 saturates: one step, and where V_C2 first fires."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import inner
+from tactile_lab.model.integrator import TAU_L, V_RESET, series_at, to_series
+from tactile_lab.model.node_a import LAMBDA, TAU, V_T, B_at, V_P_at, slope_at
+from tactile_lab.model.tableau import DIFFERENTIATE, NODES, ORDER, POINTS
+from tactile_lab.model.transistor import (
+    A_BY_1,
+    A_BY_2,
+    C2_BY_1,
+    C2_BY_2,
+    TO_A,
+    TO_C2,
+    currents,
+)
+
+MOST_ITERATIONS = 25
+COLUMNS = 3
+"""Right-hand sides: the correction, and the effect of either voltage at the start."""
+
+
+@inner
+def flow(
+    B: float, y: float, v: float, held: bool, par: FloatArray, f: FloatArray
+) -> None:
+    """Eqs. (16) and (18) with T1's currents: dV_C1/dt, dV_C2/dt and the Jacobian.
+
+    While the firing stage conducts (`held`), it keeps T1's collector at V_reset.
+    """
+    currents(y, par[V_RESET] if held else v, par, f)
+    q = math.exp(-y / par[V_T])
+    f[TO_A] += slope_at(B, y, par)
+    f[A_BY_1] -= par[LAMBDA] + B * q / par[V_T]
+    if held:
+        f[TO_C2] = f[A_BY_2] = f[C2_BY_1] = f[C2_BY_2] = 0.0
+    else:
+        f[TO_C2] -= v / par[TAU_L]
+        f[C2_BY_2] -= 1.0 / par[TAU_L]
+
+
+@inner
+def eliminate_all(matrix: FloatArray, right: FloatArray) -> None:
+    """Solve in place for every column of `right`, with partial pivoting."""
+    n = right.shape[0]
+    for k in range(n):
+        pivot, largest = k, abs(matrix[k, k])
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > largest:
+                pivot, largest = i, abs(matrix[i, k])
+        if pivot != k:
+            for j in range(k, n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            for j in range(COLUMNS):
+                right[k, j], right[pivot, j] = right[pivot, j], right[k, j]
+        reciprocal = 1.0 / matrix[k, k]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] * reciprocal
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    matrix[i, j] -= factor * matrix[k, j]
+                for j in range(COLUMNS):
+                    right[i, j] -= factor * right[k, j]
+    for k in range(n - 1, -1, -1):
+        for c in range(COLUMNS):
+            total = right[k, c]
+            for j in range(k + 1, n):
+                total -= matrix[k, j] * right[j, c]
+            right[k, c] = total / matrix[k, k]
+
+
+@inner
+def collocate_pair(
+    s: float,
+    h: float,
+    y0: float,
+    v0: float,
+    held: bool,
+    V0: float,
+    p: float,
+    low: float,
+    high: float,
+    most: float,
+    par: FloatArray,
+    W: FloatArray,
+    f: FloatArray,
+    matrix: FloatArray,
+    right: FloatArray,
+) -> int:
+    """One step from s to s + h: fill W with V_C1 - y0, then V_C2 - v0 at the nodes.
+
+    Newton's iterates keep V_C1 in [low, high] and V_C2 - V_C1 below `most`, as the
+    exact solution does. The last columns of `right` then hold the change of either
+    voltage by either at the start. Returns the iterations, or -1.
+    """
+    n = ORDER
+    enough = 4e-9 * math.sqrt(par[V_T])
+    for i in range(2 * n):
+        W[i] = 0.0
+    for iteration in range(MOST_ITERATIONS):
+        for i in range(n):
+            B = B_at(V_P_at(s + h * NODES[i], V0, p, par[TAU]), par)
+            flow(B, y0 + W[i], v0 + W[n + i], held, par, f)
+            up = 1.0 / (1.0 + h * (abs(f[A_BY_1]) + abs(f[A_BY_2])))
+            down = 1.0 / (1.0 + h * (abs(f[C2_BY_1]) + abs(f[C2_BY_2])))
+            one, two = h * f[TO_A], h * f[TO_C2]
+            for j in range(n):
+                d = DIFFERENTIATE[i, j]
+                one -= d * W[j]
+                two -= d * W[n + j]
+                matrix[i, j] = d * up
+                matrix[n + i, n + j] = d * down
+                matrix[i, n + j] = matrix[n + i, j] = 0.0
+            matrix[i, i] -= h * f[A_BY_1] * up
+            matrix[i, n + i] -= h * f[A_BY_2] * up
+            matrix[n + i, i] -= h * f[C2_BY_1] * down
+            matrix[n + i, n + i] -= h * f[C2_BY_2] * down
+            right[i, 0], right[n + i, 0] = one * up, two * down
+            right[i, 1], right[n + i, 1] = h * f[A_BY_1] * up, h * f[C2_BY_1] * down
+            right[i, 2], right[n + i, 2] = h * f[A_BY_2] * up, h * f[C2_BY_2] * down
+        eliminate_all(matrix, right)
+        largest = 0.0
+        for i in range(n):
+            change_y, change_v = right[i, 0], right[n + i, 0]
+            if not (abs(change_y) < np.inf and abs(change_v) < np.inf):
+                return -1
+            y = min(max(y0 + W[i] + change_y, low), high)
+            W[i] = y - y0 if y in (low, high) else W[i] + change_y
+            v = y0 + W[i] + most
+            clipped = not held and v0 + W[n + i] + change_v > v
+            W[n + i] = v - v0 if clipped else W[n + i] + change_v
+            largest = max(largest, abs(change_y), abs(change_v))
+        if largest < enough:
+            return iteration + 1
+    return -1
+
+
+@inner
+def unseen(slope: float, rate: float, h: float, left: float, a: FloatArray) -> float:
+    """Error of a change that is over before the first node; see `kernel.unresolved`."""
+    of_series = 0.0
+    sign = 2.0
+    for n in range(1, ORDER + 1):
+        of_series += sign * n * n * a[n]
+        sign = -sign
+    residual = max(abs(h * slope - of_series) - 100.0 * left, 0.0)
+    found: float = residual * min(NODES[0], 1.0 / (h * rate))
+    return found
+
+
+@inner
+def first_crossing(
+    a: FloatArray, level: float, error: float, part: FloatArray, d: FloatArray
+) -> tuple[float, bool]:
+    """Where the series a first reaches `level` from below, and whether in doubt.
+
+    An interval is left behind where the sum of its coefficients' sizes keeps it below;
+    it holds one crossing where its derivative's sum keeps one sign; else it is halved,
+    down to pieces flat to within `error`, where only that can decide (in doubt).
+    Returns u in (0, 1], or 2 where there is none.
+    """
+    u, width = 0.0, 1.0
+    doubt = False
+    while u < 1.0:
+        top = u + width if u + width < 1.0 else 1.0
+        for i in range(ORDER + 1):
+            x = 2.0 * (u + (top - u) * POINTS[i]) - 1.0
+            part[i] = (a[0] - level) + series_at(a, ORDER, x)
+        to_series(part, d)
+        size = steep = 0.0
+        for n in range(1, ORDER + 1):
+            size += abs(d[n])
+            if n > 1:
+                steep += n * n * abs(d[n])
+        if d[0] + size >= -error:
+            if steep < abs(d[1]):
+                if d[1] > 0.0 and part[ORDER] >= 0.0:
+                    low, high = u, top
+                    for _ in range(80):
+                        middle = 0.5 * (low + high)
+                        x = 2.0 * middle - 1.0
+                        if (a[0] - level) + series_at(a, ORDER, x) < 0.0:
+                            low = middle
+                        else:
+                            high = middle
+                        if high - low <= 1e-16 * high:
+                            break
+                    return high, doubt
+                if d[1] < 0.0 and part[0] >= -error:
+                    doubt = True
+            elif size > error and width > 1e-12:
+                width *= 0.5
+                continue
+            else:
+                doubt = True
+                if d[0] + size >= 0.0 and max(part[0], part[ORDER]) >= 0.0:
+                    return top, doubt
+        u = top
+        width = min(2.0 * width, 1.0 - u)
+    return 2.0, doubt

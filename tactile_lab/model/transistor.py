@@ -1,0 +1,73 @@
+"""T1 that saturates: Ebers and Moll's currents instead of Eq. (17).
+
+With J = I_T1s (exp((V_C2 - V_C1)/V_T) - 1) through its collector junction and
+I_F = I_T1s (exp(V_EB/V_T) - 1) through its emitter junction,
+
+    I_C = I_F - J (1 + 1/beta_R)                         into C2
+    I_B = I_F/beta_F + J/beta_R                          into node A
+    V_EB + R3 (I_F (1 + 1/beta_F) - J) = V_S - V_C1
+
+so once V_C2 is some 0.4 V above V_C1, T1's current goes to node A and not to C2.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import inner
+from tactile_lab.model.integrator import DIRECT, PARAMETERS, V_S, omega
+from tactile_lab.model.node_a import V_T
+
+I_S1, R_E, PER_F, PER_R, T1_C1, T1_C2, T1_BIAS, E_DROP, E_LOG = range(
+    PARAMETERS, PARAMETERS + 9
+)
+"""Where `par` holds I_T1s, R3, 1/beta_F, 1/beta_R, C1, C2, I_bias, and of the emitter's
+equation a R3 I_T1s and ln(a R3 I_T1s/V_T) with a = 1 + 1/beta_F."""
+ALL_PARAMETERS = PARAMETERS + 9
+EXPONENT_CAP = 230.0
+TO_A, TO_C2, A_BY_1, A_BY_2, C2_BY_1, C2_BY_2 = range(6)
+
+
+@inner
+def currents(y: float, v: float, par: FloatArray, out: FloatArray) -> None:
+    """Fill `out` at V_C1 = y, V_C2 = v.
+
+    I_B/C1 and (I_C + I_bias)/C2, V/s, then their derivatives by y and v, 1/s.
+    """
+    J = par[I_S1] * math.expm1(min((v - y) / par[V_T], EXPONENT_CAP))
+    J_v = (J + par[I_S1]) / par[V_T]
+    U = par[V_S] - y
+    a = 1.0 + par[PER_F]
+    if par[DIRECT] != 0.0:
+        I_F = par[I_S1] * math.expm1(min(U / par[V_T], 600.0))
+        F_y, F_v = -(I_F + par[I_S1]) / par[V_T], 0.0
+    else:
+        w = omega((U + par[R_E] * J + par[E_DROP]) / par[V_T] + par[E_LOG])
+        I_F = par[V_T] / (a * par[R_E]) * w - par[I_S1]
+        g = w / (1.0 + w) / (a * par[R_E])
+        F_v = g * par[R_E] * J_v
+        F_y = -g - F_v
+    r = 1.0 + par[PER_R]
+    out[TO_A] = (I_F * par[PER_F] + J * par[PER_R]) / par[T1_C1]
+    out[TO_C2] = (I_F - J * r + par[T1_BIAS]) / par[T1_C2]
+    out[A_BY_1] = (F_y * par[PER_F] - J_v * par[PER_R]) / par[T1_C1]
+    out[A_BY_2] = (F_v * par[PER_F] + J_v * par[PER_R]) / par[T1_C1]
+    out[C2_BY_1] = (F_y + J_v * r) / par[T1_C2]
+    out[C2_BY_2] = (F_v - J_v * r) / par[T1_C2]
+
+
+@inner
+def reach(low: float, fastest: float, par: FloatArray) -> float:
+    """What V_C2 - V_C1 cannot rise above, V: there C2 loses more than all that comes.
+
+    It loses J/beta_R at least, since R3 lets J leave through the emitter only as far as
+    I_F does not bring it back. `low` is the least V_C1, V, `fastest` its fall, V/s.
+    """
+    U = par[V_S] - low
+    if par[DIRECT] != 0.0:
+        most = par[I_S1] * math.exp(min(U / par[V_T], 600.0))
+    else:
+        most = U / par[R_E]
+    most += abs(par[T1_BIAS]) + fastest * par[T1_C2]
+    return float(par[V_T] * math.log1p(most / (par[I_S1] * par[PER_R])))

@@ -1,0 +1,137 @@
+"""T1 that saturates: V_C2 acts back on V_C1, and the circuit falls silent again."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactile_lab.errors import SolverError
+from tactile_lab.model.advance import advance, rest
+from tactile_lab.model.campaign import Case, compare, saturated_case
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import T1_currents, V_C1_slope, rest_point
+from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.waveform import Waveform
+
+SENSOR = Circuit(saturation=True)
+FORCE = Waveform.through([(0, 0), (0.05, 0), (0.05, 0.2), (0.2, 0.15), (0.3, 0.32)])
+CIRCUITS = (
+    SENSOR,
+    Circuit(saturation=True, firing="put"),
+    Circuit(saturation=True, t_eps=0.01, V_reset=1.0),
+)
+
+
+def step(level, at=0.02):
+    return Waveform.through([(0, 0), (at, 0), (at, level)])
+
+
+@pytest.mark.parametrize(
+    ("circuit", "force", "until", "start"),
+    [
+        (SENSOR, step(0.2), 0.12, None),
+        (SENSOR, step(0.35), 0.05, None),
+        (CIRCUITS[1], step(0.17), 0.12, None),
+        (SENSOR, step(0.1), 0.06, Start(V_P=0.0, V_C1=0.0, V_C2=0.8)),
+    ],
+    ids="saturates collapses put cold".split(),
+)
+def test_errors_are_below_the_estimate(circuit, force, until, start):
+    found = compare(Case(0, circuit, force, until, start, 1e-9), samples=8)
+    assert found.honest, found
+    assert found.V_C1_estimate < 1e-9
+    assert found.spike_time_estimate < 1e-9
+
+
+def test_a_random_scene_has_errors_below_the_estimate():
+    found = compare(saturated_case(3), samples=6)
+    assert found.honest, found
+
+
+def test_rest_is_an_equilibrium_of_both_voltages():
+    V_C1, V_C2 = rest_point(SENSOR)
+    I_C, I_B = T1_currents(SENSOR, V_C1, V_C2)
+    assert I_C == pytest.approx(V_C2 / SENSOR.R_L, rel=1e-12)
+    assert V_C1_slope(SENSOR, 0.0, V_C1) == pytest.approx(-I_B / SENSOR.C1, rel=1e-5)
+
+
+def test_the_rate_peaks_and_the_circuit_falls_silent_under_more_force():
+    calm = {"tau": 1e9}
+    rates = [
+        simulate(Circuit(saturation=True, **calm), step(F), until=0.6).spike_times.size
+        for F in (0.09, 0.13, 0.17, 0.2, 0.24, 0.4)
+    ]
+    assert rates[0] == 0 < rates[1] < rates[2] > rates[3] > rates[4] == rates[5] == 0
+    assert simulate(Circuit(**calm), step(0.4), until=0.6).spike_times.size > 40
+
+
+def test_far_from_saturation_it_is_the_cascade_with_a_base_current():
+    force, until = step(0.12), 0.5
+    ideal = Circuit(saturation=True, beta_F=1e12)
+    with_junction = simulate(ideal, force, until=until)
+    without = simulate(Circuit(), force, until=until)
+    # what remains is the collector junction's leakage, 2e-7 of the current
+    assert with_junction.spike_times == pytest.approx(without.spike_times, rel=1e-6)
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    st.sampled_from(CIRCUITS),
+    st.lists(st.floats(0, 0.4), max_size=8),
+)
+def test_any_slicing_gives_the_same_spikes_and_state(circuit, cuts):
+    whole = simulate(circuit, FORCE, until=0.4, keep=("spikes", "V_C1", "V_C2"))
+    state, spikes = rest(circuit), []
+    for until in [*sorted(cuts), 0.4]:
+        state = pickle.loads(pickle.dumps(state))
+        state, outputs = advance(circuit, state, FORCE, until)
+        spikes.extend(outputs.spike_times)
+    assert len(spikes) == whole.spike_times.size == state.spikes > 0
+    assert np.max(np.abs(np.array(spikes) - whole.spike_times)) < 1e-12
+    assert abs(state.V_C1 - whole.end.V_C1) < 1e-11
+    assert abs(state.V_C2 - whole.end.V_C2) < 1e-10
+
+
+@pytest.mark.parametrize("circuit", CIRCUITS)
+def test_waveforms_meet_at_spikes_and_give_the_currents(circuit):
+    keep = ("spikes", "V_C1", "V_C2", "I_C")
+    found = simulate(circuit, FORCE, until=0.4, keep=keep)
+    at = found.spike_times
+    assert found.sample("V_C2", at - 1e-9) == pytest.approx(
+        circuit.fire_voltage, abs=1e-5
+    )
+    after = at + circuit.reset_time
+    after = after[after < 0.399]
+    assert found.sample("V_C2", after + 1e-9) == pytest.approx(
+        circuit.reset_voltage, abs=1e-5
+    )
+    times = np.linspace(0, 0.4, 301)
+    V_C1, V_C2 = found.sample("V_C1", times), found.sample("V_C2", times)
+    assert found.sample("I_C", times) == pytest.approx(
+        T1_currents(circuit, V_C1, V_C2)[0]
+    )
+
+
+def test_v_c1_alone_still_needs_v_c2():
+    found = simulate(SENSOR, FORCE, until=0.2, keep=("V_C1",))
+    both = simulate(SENSOR, FORCE, until=0.2, keep=("V_C1", "V_C2"))
+    times = np.linspace(0, 0.2, 101)
+    assert np.array_equal(found.sample("V_C1", times), both.sample("V_C1", times))
+    assert "V_C2" not in found.left_out
+    assert found.stages["V_C2"] > 0
+    only_V_P = simulate(SENSOR, FORCE, until=0.2, keep=("V_P",))
+    assert only_V_P.stages["V_C1"] == only_V_P.stages["V_C2"] == 0
+
+
+def test_it_does_not_warn_of_what_it_shows():
+    assert not simulate(SENSOR, step(0.2), until=0.3).warnings
+    assert any(
+        "saturat" in text for text in simulate(Circuit(), step(0.3), until=0.3).warnings
+    )
+
+
+def test_spikes_too_fast_are_refused():
+    with pytest.raises(SolverError, match="Spikes follow"):
+        simulate(Circuit(saturation=True, V_reset=3.213 - 1e-12), step(0.15), until=0.4)
