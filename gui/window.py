@@ -19,6 +19,7 @@ from gui.banner import Banner
 from gui.centre import Centre
 from gui.dialogs.choosing import ask_scene
 from gui.dialogs.closing import Closing
+from gui.dialogs.errand import ErrandCard
 from gui.frames import Frames
 from gui.header.header import Header
 from gui.lanes.lane import lanes_for
@@ -64,6 +65,7 @@ class Window(QMainWindow):
         self.columns = QSplitter(Qt.Orientation.Horizontal)
         self._lay_out()
         self.closing = Closing(self, theme)
+        self.errand = ErrandCard(self, session, theme)
         self.opening = Opening(self)
         self.frames = Frames(self)
         self.actions_ = Actions(self)

@@ -15,6 +15,7 @@ from gui.session.coil import CoilWatch
 from gui.session.manual import ManualCoil
 from gui.session.messages import (
     Checked,
+    Errand,
     Level,
     Line,
     Told,
@@ -74,6 +75,7 @@ class Core(QObject):
         self.trial: tuple[int, str] | None = None
         self.queue: list[Queued] = []
         self.manual: ManualCoil | None = None
+        self.errand: Errand | None = None
         self.readings: dict[str, float] = {}
         self.elapsed = 0.0
         self.expected: float | None = None
@@ -169,4 +171,6 @@ class Core(QObject):
 
     def _enter(self, state: State) -> None:
         self.state = state
+        if state is not State.RUNNING:
+            self.errand = None
         self.changed.emit()

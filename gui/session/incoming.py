@@ -15,6 +15,7 @@ from gui.session.messages import (
     Broken,
     Checked,
     Ended,
+    Errand,
     Level,
     Line,
     Planned,
@@ -100,6 +101,10 @@ class Incoming(Core):
             case Twinned(execution=execution, part=part):
                 if execution is self._twinned and self.source is not None:
                     self.source.tracks.add(part)
+            case Errand():
+                self.errand = told
+                self.log(Level.WARNING, "runner", told.text)
+                self.changed.emit()
             case Line():
                 self.lines.append(told)
                 self.logged.emit(told)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
@@ -123,6 +124,14 @@ class Reported:
 
 
 @dataclass(frozen=True, eq=False)
+class Errand:
+    """A person is asked to do something at the bench; `done` lets the run go on."""
+
+    text: str
+    done: threading.Event
+
+
+@dataclass(frozen=True, eq=False)
 class Twinned:
     """The twin of a run has come further."""
 
@@ -139,6 +148,7 @@ Told = (
     | Ended
     | Broken
     | Reported
+    | Errand
     | Twinned
     | Line
 )

@@ -87,6 +87,14 @@ class Session(Incoming):
             known = self.bench is not None
             self._enter(State.READY if known else State.DISCONNECTED)
 
+    def errand_done(self) -> None:
+        """The person has done what the run waits for."""
+        if self.errand is not None:
+            self.log(Level.INFO, "runner", f"Done: {self.errand.text}")
+            self.errand.done.set()
+            self.errand = None
+            self.changed.emit()
+
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""
         if self.state is not State.READY or self.manual or not self._check_request:

@@ -13,6 +13,7 @@ from gui.session.messages import (
     Broken,
     Checked,
     Ended,
+    Errand,
     Identified,
     Planned,
     Refused,
@@ -100,6 +101,7 @@ class RunThread:
                 realtime=True,
                 emit=self._inbox.put,
                 notes=self._notes,
+                ask=self._ask,
             )
         except (TactileLabError, OSError) as error:
             self._inbox.put(Refused(Fault("The run was refused.", str(error))))
@@ -124,6 +126,13 @@ class RunThread:
         self._inbox.put(Ended(done))
         if self._wants_report:
             start(lambda: self._report(done.folder), "report")
+
+    def _ask(self, text: str) -> None:
+        """Have the window ask a person; returns when it is done, or nobody cares."""
+        done = threading.Event()
+        self._inbox.put(Errand(text, done))
+        while self.alive and not done.wait(0.2):
+            pass
 
     def _report(self, folder: Path) -> None:
         from gui.session.reports import write_report

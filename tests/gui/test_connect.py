@@ -1,6 +1,7 @@
 """The connect dialog: discovery through the real look-up, a bench file that loads."""
 
 import json
+import threading
 import tomllib
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from gui.dialogs.bench_text import bench_text, save_bench, show_bench, start_cho
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import rows_of
 from gui.review.conclusion import conclusion_of
+from gui.session.messages import Errand
 from gui.session.request import Request
 from gui.state import Fault, State
 from tactile_lab.errors import RunFolderError, SceneError
@@ -115,6 +117,21 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     texts = [one.text() for one in dialog.wiring.findChildren(QLabel)]
     assert any("3 mV of 50 Hz hum" in text for text in texts)
     dialog.hide()
+
+
+def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
+    window, session = lab.window, lab.session
+    errand = Errand("Put the probes on 0 V.", threading.Event())
+    session._enter(State.RUNNING)
+    session.inbox.put(errand)
+    lab.until(window.errand.isVisible)
+    assert "0 V" in window.errand.text.text()
+    window.errand.done.click()
+    assert errand.done.is_set() and not window.errand.isVisible()
+    session.inbox.put(Errand("Put them on V_S.", threading.Event()))
+    lab.until(window.errand.isVisible)
+    session._enter(State.READY)
+    assert not window.errand.isVisible(), "a run that ended waits for nobody"
 
 
 def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:
