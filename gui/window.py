@@ -81,7 +81,7 @@ class Window(QMainWindow):
         self.header.render_snapshot(snapshot)
         self.banner.show_fault(snapshot.fault)
         self.setup.render_snapshot(snapshot)
-        self.review.manual.render_snapshot(snapshot, self.session.readings.get("field"))
+        self._render_manual(snapshot)
         if self._bench_changed():
             self.review.manual.show_bench(self.session.spec)
         self.centre.show_empty(
@@ -99,8 +99,14 @@ class Window(QMainWindow):
     def render_clock(self, snapshot: Snapshot) -> None:
         """Render what changes all the time: header, STOP, manual."""
         self.header.render_snapshot(snapshot)
-        self.review.manual.render_snapshot(snapshot, self.session.readings.get("field"))
+        self._render_manual(snapshot)
         self._close_when_off()
+
+    def _render_manual(self, snapshot: Snapshot) -> None:
+        session = self.session
+        self.review.manual.render_snapshot(
+            snapshot, session.readings.get("field"), reading=session.reading_field
+        )
 
     def show_lanes(self) -> None:
         """Show the lanes of what is on screen; what is left out has none."""
@@ -247,11 +253,19 @@ class Window(QMainWindow):
         self.setup.scene_wanted.connect(lambda: ask_scene(self))
         manual = self.review.manual
         manual.begun.connect(session.begin_manual)
+        manual.field_asked.connect(session.read_field)
+        manual.inputs.asked.connect(self._set_inputs)
         manual.set_asked.connect(self._set_current)
         manual.off_asked.connect(lambda: session.stop("manual off"))
         manual.checked.connect(
             lambda: session.connect_bench(session.bench_choice or "sim")
         )
+
+    def _set_inputs(self, channels: str) -> None:
+        problem = self.session.set_inputs(channels)
+        self.review.manual.inputs.say(problem)
+        if not problem:
+            self.setup.plan_now()
 
     def _set_current(self, current: float) -> None:
         if self.session.manual is not None:

@@ -1,12 +1,13 @@
-"""The coil by hand, within its limits; the field and the scope's settings beside it."""
+"""The bench by hand: coil within its limits, field, settings of the oscilloscope."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QSlider, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSlider, QWidget
 
 from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
+from gui.review.scope_inputs import ScopeInputs
 from gui.state import CoilView, Snapshot, State, milliamperes
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse, show
@@ -14,17 +15,19 @@ from tactile_lab.scene.bench_file import BenchSpec
 
 
 class ManualView(QWidget):
-    """Set a current, see what is read back, see how the scope is wired."""
+    """Set a current, see what is read back, read the field, set the scope's inputs."""
 
     begun = Signal()
     set_asked = Signal(float)
     off_asked = Signal()
     checked = Signal()
+    field_asked = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._limit = 0.0
         self._gain = 0.0
+        self._has_meter = False
         self.begin = push("Take the coil by hand …")
         self.current = QLineEdit("0 mA")
         self.current.setAccessibleName("Coil current to set")
@@ -39,7 +42,8 @@ class ManualView(QWidget):
         self._force = label("", "muted")
         self._limits = label("", "muted", wrap=True)
         self._field = label("not read", "value")
-        self._wiring = QGridLayout()
+        self.read = push("Read")
+        self.inputs = ScopeInputs()
         self.check = push("Ask the instruments again")
         self._lay_out()
         self.begin.clicked.connect(self.begun)
@@ -47,14 +51,13 @@ class ManualView(QWidget):
         self.current.returnPressed.connect(self._set)
         self.off.clicked.connect(self.off_asked)
         self.check.clicked.connect(self.checked)
+        self.read.clicked.connect(self.field_asked)
         self.slider.sliderMoved.connect(self._slid)
 
     def show_bench(self, spec: BenchSpec | None) -> None:
-        """Show limits and wiring of another bench."""
-        while (item := self._wiring.takeAt(0)) is not None:
-            widget = item.widget()
-            if widget is not None:
-                widget.deleteLater()
+        """Show limits and inputs of another bench."""
+        self.inputs.show_bench(spec)
+        self._has_meter = spec is not None and spec.field_meter is not None
         if spec is None:
             return
         self._gain = spec.magnet.newtons_per_ampere
@@ -66,38 +69,32 @@ class ManualView(QWidget):
                 f"{show(limits.continuous, 'A')} for ever. "
                 f"{show(self._gain, 'N/A')} at this distance."
             )
-        channels = spec.scope.channels if spec.scope is not None else ()
-        for row, channel in enumerate(channels):
-            texts = (
-                channel.input,
-                channel.signal,
-                f"±{show(channel.range, 'V')}"
-                + (f" at {show(-channel.offset, 'V')}" if channel.offset else ""),
-                channel.coupling,
-            )
-            for where, text in enumerate(texts):
-                role = "strong" if where == 0 else "" if where == 1 else "muted"
-                self._wiring.addWidget(label(text, role), row, where)
 
-    def render_snapshot(self, snapshot: Snapshot, field: float | None) -> None:
-        """Show read-backs; allow what the state allows."""
+    def render_snapshot(
+        self, snapshot: Snapshot, field: float | None, *, reading: bool = False
+    ) -> None:
+        """Show read-backs; allow what the state allows; `reading`: the meter is."""
         on = snapshot.manual
         idle = snapshot.state is State.READY
         self.begin.setVisible(not on)
         self.begin.setEnabled(idle and snapshot.coil is not None)
-        reason = (
-            ""
-            if idle
-            else "A run has the coil."
-            if snapshot.coil
-            else "No coil source."
-        )
+        reason = ""
+        if not idle:
+            reason = "A run has the bench." if snapshot.bench else "No bench."
+        elif snapshot.coil is None:
+            reason = "No coil source."
         self.begin.setToolTip(reason)
+        self.read.setEnabled(idle and self._has_meter and not reading)
+        self.read.setToolTip(
+            "" if self._has_meter else "This bench has no teslameter of its own."
+        )
+        self.inputs.allow(idle and not on, reason)
         for widget in (self.current, self.slider, self.set, self.off):
             widget.setEnabled(on)
         self.check.setEnabled(idle and not on)
         self._show_coil(snapshot.coil)
-        self._field.setText("not read" if field is None else show(round(field, 6), "T"))
+        words = "not read" if field is None else show(round(field, 6), "T", 4)
+        self._field.setText("reading …" if reading else words)
 
     def _show_coil(self, coil: CoilView | None) -> None:
         self._now.setText("—" if coil is None else milliamperes(coil.current))
@@ -149,11 +146,13 @@ class ManualView(QWidget):
         whole.addWidget(self._limits)
         whole.addWidget(line())
         whole.addWidget(label("Field", "title"))
-        whole.addWidget(self._field)
+        meter = QHBoxLayout()
+        meter.addWidget(self._field, 1)
+        meter.addWidget(self.read)
+        whole.addLayout(meter)
         whole.addWidget(line())
         whole.addWidget(label("Oscilloscope inputs", "title"))
-        self._wiring.setHorizontalSpacing(12)
-        self._wiring.setVerticalSpacing(4)
-        whole.addLayout(self._wiring)
+        whole.addWidget(self.inputs)
+        whole.addWidget(line())
         whole.addWidget(self.check)
         whole.addStretch(1)

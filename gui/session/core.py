@@ -12,7 +12,6 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import LiveSource
 from gui.session.coil import CoilWatch
-from gui.session.manual import ManualCoil
 from gui.session.messages import (
     Checked,
     Errand,
@@ -24,6 +23,7 @@ from gui.session.monitor import Monitor
 from gui.session.request import Request
 from gui.session.threads import RunThread
 from gui.state import CoilView, Fault, State
+from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.trial import Outcome
 
@@ -49,6 +49,9 @@ class Core(QObject):
 
     Args:
         out: folder for run folders.
+
+    Attributes:
+        bench_overrides: ``bench.key=value`` texts that change the connected bench.
     """
 
     changed = Signal()
@@ -75,6 +78,8 @@ class Core(QObject):
         self.trial: tuple[int, str] | None = None
         self.queue: list[Queued] = []
         self.manual: ManualCoil | None = None
+        self.reading_field = False
+        self.bench_overrides: tuple[str, ...] = ()
         self.errand: Errand | None = None
         self.readings: dict[str, float] = {}
         self.elapsed = 0.0

@@ -9,13 +9,13 @@ from gui.lanes.expected import Hold
 from gui.lanes.source import LiveSource
 from gui.session import chips
 from gui.session.core import Core
-from gui.session.manual import ManualCoil
 from gui.session.messages import (
     Begun,
     Broken,
     Checked,
     Ended,
     Errand,
+    FieldByHand,
     Level,
     Line,
     Planned,
@@ -27,6 +27,7 @@ from gui.session.messages import (
 from gui.session.threads import start
 from gui.state import Fault, State, milliamperes
 from tactile_lab.acquisition import events
+from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.bench import OffReport
 from tactile_lab.trial import Outcome
 
@@ -104,6 +105,12 @@ class Incoming(Core):
             case Errand():
                 self.errand = told
                 self.log(Level.WARNING, "runner", told.text)
+                self.changed.emit()
+            case FieldByHand(mean=mean, text=text):
+                self.reading_field = False
+                if mean is not None:
+                    self.readings["field"] = mean
+                self.log(Level.INFO if mean is not None else Level.ERROR, "meter", text)
                 self.changed.emit()
             case Line():
                 self.lines.append(told)

@@ -123,6 +123,14 @@ class Reported:
     problem: str
 
 
+@dataclass(frozen=True)
+class FieldByHand:
+    """The field was read on request, or why not."""
+
+    mean: float | None
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class Errand:
     """A person is asked to do something at the bench; `done` lets the run go on."""
@@ -149,6 +157,7 @@ Told = (
     | Broken
     | Reported
     | Errand
+    | FieldByHand
     | Twinned
     | Line
 )

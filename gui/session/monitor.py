@@ -41,11 +41,13 @@ class Monitor:
         """Whether instruments may still be open."""
         return self._thread is not None and self._thread.alive
 
-    def start(self, bench: str) -> None:
+    def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Watch the sensor on a bench ("sim" or a bench file)."""
         self.source, self.problem = None, ""
         self._folder = tempfile.TemporaryDirectory(prefix="tactile-lab-monitor-")
-        request = Request("monitor", (f'protocol.duration="{LONGEST}"',), bench)
+        request = Request(
+            "monitor", (f'protocol.duration="{LONGEST}"', *overrides), bench
+        )
         self._inbox = SimpleQueue()
         out = Path(self._folder.name)
         self._thread = RunThread(request, out, self._inbox, {}, report=False)

@@ -46,7 +46,9 @@ class Request:
         return " ".join(words)
 
 
-def bench_request(bench: str, spec: BenchSpec) -> Request:
+def bench_request(
+    bench: str, spec: BenchSpec, overrides: tuple[str, ...] = ()
+) -> Request:
     """A request that needs every instrument of a bench, and next to no force of it."""
     channels = () if spec.scope is None else spec.scope.channels
     signals = [channel.signal for channel in channels]
@@ -54,6 +56,10 @@ def bench_request(bench: str, spec: BenchSpec) -> Request:
     signals += ["field"] if spec.field_meter is not None else []
     return Request(
         "demo",
-        ('protocol.levels=["1 mN"]', f"record.signals={json.dumps(signals)}"),
+        (
+            'protocol.levels=["1 mN"]',
+            f"record.signals={json.dumps(signals)}",
+            *overrides,
+        ),
         bench,
     )

@@ -12,14 +12,19 @@ from typing import TYPE_CHECKING
 from gui.session import chips
 from gui.session.core import Core, Queued
 from gui.session.incoming import Incoming
-from gui.session.manual import ManualCoil
 from gui.session.messages import Level
 from gui.session.request import Request, bench_request
-from gui.session.threads import check_in_background, plan_in_background
+from gui.session.threads import (
+    check_in_background,
+    plan_in_background,
+    read_field_in_background,
+)
 from gui.state import Fault, Snapshot, State
+from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.bench import OffReport
 from tactile_lab.errors import TactileLabError
-from tactile_lab.plugins import open_bench
+from tactile_lab.plugins import check_scope, open_bench
+from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
 
 if TYPE_CHECKING:
@@ -43,6 +48,7 @@ class Session(Incoming):
         except (TactileLabError, OSError) as error:
             self._set_fault(Fault("The bench cannot be used.", str(error)))
             return
+        self.bench_overrides = ()
         self._check_request = bench_request(choice, self.spec)
         self.coil.use(None)
         self.bench = None
@@ -110,13 +116,55 @@ class Session(Incoming):
         self.log(Level.WARNING, "coil", "Manual control on", safety=True)
         self.changed.emit()
 
+    def read_field(self) -> None:
+        """Read the field between runs, or while the coil is driven by hand."""
+        if self.reading_field or self.state is not State.READY:
+            return
+        try:
+            if self.manual is not None:
+                bench = self.manual.bench
+            elif self._check_request is not None:
+                bench = open_bench(self._check_request.load(), realtime=True)
+            else:
+                return
+        except (TactileLabError, OSError) as error:
+            self.log(Level.ERROR, "meter", f"The field was not read: {error}")
+            return
+        self.reading_field = True
+        self.changed.emit()
+        read_field_in_background(bench, self.inbox)
+
+    def set_inputs(self, channels: str) -> str:
+        """Set the scope's inputs for all that follows; why not, "" if it went well.
+
+        Args:
+            channels: ``[[scope.channels]]`` of a bench file as one TOML list.
+        """
+        if self.state is not State.READY or not self.bench_choice or not self.spec:
+            return "The scope's inputs are set between runs."
+        overrides = (f"bench.scope.channels={channels}",)
+        request = bench_request(self.bench_choice, self.spec, overrides)
+        try:
+            scene = request.load()
+            assert scene.bench.scope is not None
+            wired = scene.bench.scope.channels
+            check_scope(scene.bench.scope, wired, scene.record.sample_rate)
+        except (TactileLabError, OSError) as error:
+            return str(error)
+        self.spec, self.bench_overrides = scene.bench, overrides
+        self._check_request = request
+        words = (f"{one.signal} ±{show(one.range, 'V')}" for one in wired)
+        self.log(Level.INFO, "scope", f"Inputs set: {', '.join(words)}")
+        self.changed.emit()
+        return ""
+
     def watch(self, on: bool) -> None:
         """Show the sensor live between runs, coil off; or stop that."""
         if not on:
             self.monitor.stop()
         elif self.state is State.READY and self.manual is None and self.bench_choice:
             if not self.monitor.alive:
-                self.monitor.start(self.bench_choice)
+                self.monitor.start(self.bench_choice, self.bench_overrides)
 
     def note(self, text: str) -> None:
         """A note of the user, stamped with wall-clock and run time."""

@@ -14,6 +14,7 @@ from gui.session.messages import (
     Checked,
     Ended,
     Errand,
+    FieldByHand,
     Identified,
     Planned,
     Refused,
@@ -25,6 +26,7 @@ from gui.state import Fault
 from tactile_lab.bench import Bench, OffReport
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import open_bench
+from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -177,6 +179,23 @@ def check_in_background(request: Request, inbox: Inbox) -> None:
             inbox.put(Refused(Fault("Asking the instruments broke.", text)))
 
     start(work, "check")
+
+
+def read_field_in_background(bench: Bench, inbox: Inbox) -> None:
+    """Read the field a few times."""
+
+    def work() -> None:
+        from tactile_lab.acquisition.by_hand import read_field
+
+        try:
+            found = read_field(bench)
+        except (TactileLabError, OSError) as error:
+            inbox.put(FieldByHand(None, f"The field was not read: {error}"))
+        else:
+            text = f"{show(found.mean, 'T', 4)} ± {show(found.spread, 'T', 2)}"
+            inbox.put(FieldByHand(found.mean, f"Field {text}"))
+
+    start(work, "read field")
 
 
 def check(scene: Scene, bench: Bench) -> Checked:

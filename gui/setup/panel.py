@@ -109,9 +109,9 @@ class SetupPanel(QFrame):
         Raises:
             FieldError: a field cannot be used.
         """
-        return Request(
-            self._path, tuple(self.form.overrides()), self._session.bench_choice
-        )
+        session = self._session
+        overrides = (*self.form.overrides(), *session.bench_overrides)
+        return Request(self._path, overrides, session.bench_choice)
 
     # --- plan, run, queue -------------------------------------------------------------
 

@@ -1,7 +1,19 @@
-"""The coil by hand: the same thread, limits and safe ending as in a run."""
+"""The bench by hand, between runs: hold a current, read the field.
+
+The coil has the same thread, limits and safe ending as in a run::
+
+    bench = open_bench(load("demo", bench="my bench.toml"), realtime=True)
+    coil = ManualCoil(bench)
+    coil.start()
+    coil.hold(0.1)
+    print(read_field(bench))
+    coil.stop("done")
+"""
 
 from __future__ import annotations
 
+import statistics
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tactile_lab.acquisition.coil_thread import CoilThread
@@ -19,7 +31,8 @@ FOR_EVER = 1e9
 class ManualCoil:
     """Holds the coil at a current until told otherwise.
 
-    The window renews the lease; if the window hangs, the coil's thread switches off.
+    Whoever holds it calls `alive` at least every 2 s; else the coil's thread switches
+    off.
 
     Args:
         bench: with a coil; nothing of it is open yet.
@@ -31,6 +44,7 @@ class ManualCoil:
     def __init__(self, bench: Bench) -> None:
         if bench.coil is None:
             raise SceneError("This bench has no coil source to drive by hand.")
+        self.bench = bench
         self.coil: Coil = bench.coil
         self._clock = bench.clock
         self._stop = StopRequest(bench.clock)
@@ -81,3 +95,38 @@ class ManualCoil:
     def failure(self) -> str:
         """What went wrong, "" if nothing did."""
         return "" if self.thread.failure is None else str(self.thread.failure)
+
+
+READINGS = 5
+
+
+@dataclass(frozen=True)
+class FieldReading:
+    """The field as read a few times in a row.
+
+    Attributes:
+        mean: T.
+        spread: standard deviation of the readings, T.
+    """
+
+    mean: float
+    spread: float
+
+
+def read_field(bench: Bench) -> FieldReading:
+    """Open the teslameter, read the field a few times, close it; takes about 1 s.
+
+    Raises:
+        SceneError: the bench has no teslameter.
+        InstrumentError: it does not answer.
+    """
+    meter = bench.field_meter
+    if meter is None:
+        raise SceneError("This bench has no teslameter to read.")
+    with bench.clock.taking_part("field by hand"):
+        meter.open()
+        try:
+            values = [meter.read().value for _ in range(READINGS)]
+        finally:
+            meter.close()
+    return FieldReading(statistics.fmean(values), statistics.stdev(values))
