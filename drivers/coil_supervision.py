@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 
-from tactile_lab.bench import CoilLimits
+from tactile_lab.bench import COPPER, CoilLimits
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import show
 
@@ -25,9 +25,6 @@ DEVIATING_READINGS = 3
 
 THERMOMETER_CURRENT = 0.2
 """Smallest current at which voltage over current tells the temperature, A."""
-
-COPPER = 0.00393
-"""Temperature coefficient of copper's resistance at 20 C, 1/K."""
 
 WARM, HOT, LOOSE, SHORTED = 1.15, 1.24, 2.0, 0.7
 """Ratios to the cold resistance: warns, trips, open lead, shorted turns."""

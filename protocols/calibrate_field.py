@@ -13,8 +13,11 @@ from tactile_lab.stimulus.force import PushCurrent
 from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
-BEYOND = 1.2
-"""The current turns so far outside the range that both branches are settled in it."""
+BEYOND, LEAST_BEYOND = 0.2, 0.2
+"""The current turns outside the range by this part of it, at least by so many A: twice
+the half-width of a soft core's loop, so that both branches are settled in the range."""
+REPEATED = 3
+"""Steps of the falling branch that are read again at the end."""
 RAMP = 0.5
 """Time in which the current goes from one step to the next, s: it never overshoots."""
 
@@ -22,9 +25,10 @@ RAMP = 0.5
 class CalibrateField(Protocol):
     """Demagnetise, condition, then step the current down and up and read the field.
 
-    Take the NdFeB magnet away first: it adds 163 mT. Each step keeps the direction it
-    is approached from, because the two branches differ. `analysis.field_calibration`
-    makes the calibration file of the readings.
+    At the end the first steps are read again: the drift. The winding's resistance tells
+    how much it warmed. Take the NdFeB magnet away first: it adds 163 mT. Each step
+    keeps the direction it is approached from, because the two branches differ.
+    `analysis.field_calibration` makes the calibration file of the readings.
     """
 
     name: ClassVar[str] = "calibrate_field"
@@ -41,7 +45,7 @@ class CalibrateField(Protocol):
 
     def trials(self) -> Trials:
         """Pauses for preparation, then one trial per step."""
-        turn = BEYOND * self.most
+        turn = self.most + max(BEYOND * self.most, LEAST_BEYOND)
         yield demagnetising(turn)
         quarter = 2.0
         loop = Waveform(
@@ -59,6 +63,12 @@ class CalibrateField(Protocol):
             for level in levels.tolist():
                 yield self._step(last, level, branch)
                 last = level
+        # the first steps once more, by the same way: what differs is drift
+        yield self._move("turn", Waveform.through([(0.0, last), (2.0, turn)]))
+        last = turn
+        for level in up[::-1][:REPEATED].tolist():
+            yield self._step(last, level, "again")
+            last = level
         yield self._move("back to 0 A", Waveform.through([(0.0, last), (2.0, 0.0)]))
 
     def _move(self, label: str, current: Waveform) -> Trial:

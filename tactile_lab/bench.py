@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from tactile_lab.clock import Clock
 
+COPPER = 0.00393
+"""Temperature coefficient of copper's resistance at 20 C, 1/K."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class CoilLimits:
@@ -98,6 +101,11 @@ class Coil(Protocol):
 
     def read_voltage(self) -> Reading:
         """Measured output voltage, V."""
+        ...
+
+    @property
+    def resistance_ratio(self) -> float | None:
+        """Resistance over that of the cold coil, a thermometer; None if not known."""
         ...
 
     def beat(self) -> None:

@@ -178,7 +178,7 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def table_hash(body: str) -> str:
-    """SHA-256 of a calibration's header and rows, without its head."""
+    """SHA-256 of all of a calibration's file but the line that states it."""
     return hashlib.sha256(body.encode()).hexdigest()
 
 
@@ -191,5 +191,5 @@ def _head(text: str) -> tuple[dict[str, str], bool]:
         if line.startswith("# ")
         for name, _, value in [line[2:].partition(":")]
     }
-    body = "".join(line for line in lines if not line.startswith("#"))
+    body = "".join(line for line in lines if not line.startswith(f"# {HASH}:"))
     return head, head.get(HASH) == table_hash(body)

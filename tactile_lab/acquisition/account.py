@@ -109,7 +109,7 @@ class Account:
             for applied in coil.take_applied():
                 self._current.append(applied)
                 row = (self.axis(applied.time), applied.setpoint, applied.measured)
-                self.journal.current(*row)
+                self.journal.current(*row, applied.ratio)
                 self.emit(events.CoilCurrent(*row))
         if meter is not None:
             for reading in meter.take_readings():

@@ -31,12 +31,14 @@ class Applied:
         time: clock time at which it had acted, s.
         setpoint: A.
         measured: current read back, A; None where only the set-point was sent.
+        ratio: resistance over that of the cold coil, as last looked at, or None.
     """
 
     asked: float
     time: float
     setpoint: float
     measured: float | None
+    ratio: float | None = None
 
 
 class CoilThread(InstrumentThread):
@@ -146,10 +148,13 @@ class CoilThread(InstrumentThread):
             measured = None
             if now - self._read >= READ_BACK_AT_LEAST:
                 measured = self.coil.read_current().value
-            self._note(Applied(now, acted, commanded, measured))
+            self._note(
+                Applied(now, acted, commanded, measured, self.coil.resistance_ratio)
+            )
         elif now - last.time >= READ_BACK_EVERY:
             reading = self.coil.read_current()
-            self._note(Applied(now, reading.time, last.setpoint, reading.value))
+            ratio = self.coil.resistance_ratio
+            self._note(Applied(now, reading.time, last.setpoint, reading.value, ratio))
         interval = self.coil.update_interval
         late = int((self.clock.now() - self._next) / interval)
         self.skipped += max(0, late - 1)

@@ -11,8 +11,14 @@ from tactile_lab.trial import Outcome
 class Journal(Sink, Protocol):
     """The record of one run, written as it happens; times on the run's axis, s."""
 
-    def current(self, time: float, setpoint: float, measured: float | None) -> None:
-        """A set-point as applied, A, and the read-back where there was one."""
+    def current(
+        self,
+        time: float,
+        setpoint: float,
+        measured: float | None,
+        ratio: float | None = None,
+    ) -> None:
+        """A set-point as applied, A; read-back and resistance over cold, if known."""
         ...
 
     def field(self, time: float, field: float) -> None:

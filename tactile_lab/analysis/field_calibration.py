@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,10 @@ FloatArray = NDArray[np.float64]
 
 WIDEST_LOOP = 0.05
 """Half-width of the loop over the largest field that is accepted without asking."""
+DRIFT = 0.02
+"""Drift over the largest field beyond which there is no calibration."""
+WARMING = 30.0
+"""Warming of the winding beyond which a calibration is doubted, K."""
 HEADER = "current_A,field_T"
 
 
@@ -28,13 +33,13 @@ class FieldStep:
     """The field on one step of one branch.
 
     Attributes:
-        branch: "rising" or "falling".
+        branch: "rising" or "falling"; "again" repeats some of "falling" at the end.
         current: applied, as measured, A.
         field: mean of the readings, T.
         error: standard error of that mean, T.
     """
 
-    branch: Literal["rising", "falling"]
+    branch: Literal["rising", "falling", "again"]
     current: float
     field: float
     error: float
@@ -52,7 +57,11 @@ class FieldCalibration:
         slope: T/A.
         offset: of the straight line at 0 A, T.
         residual: standard deviation of the mean curve about the line, T.
-        uncertainty: half of the 95 % band of one field value, hysteresis included, T.
+        drift: of the field at the same current and history from the begin to the end,
+            T; None where no step was repeated.
+        warming: of the winding meanwhile, K; None where it is not known.
+        uncertainty: half of the 95 % band of one field value, hysteresis and drift
+            included, T.
         warnings: what to look at before it is used.
     """
 
@@ -63,16 +72,25 @@ class FieldCalibration:
     slope: Estimate
     offset: Estimate
     residual: float
+    drift: float | None
+    warming: float | None
     uncertainty: float
     warnings: tuple[str, ...]
 
 
-def fit_field(steps: Sequence[FieldStep]) -> FieldCalibration:
+def fit_field(
+    steps: Sequence[FieldStep], warming: float | None = None
+) -> FieldCalibration:
     """Fit both branches with one slope and a loop between them.
+
+    Args:
+        steps: in the order they were read.
+        warming: of the winding meanwhile, K, where it is known.
 
     Raises:
         NotIdentifiableError: a branch is missing or has fewer than 5 steps, the
-            branches do not cover 0 A, or the field does not follow the current.
+            branches do not cover 0 A, the field does not follow the current, or it
+            drifted by more than 2 % of the largest.
     """
     falling = _branch(steps, "falling")
     rising = _branch(steps, "rising")
@@ -100,6 +118,19 @@ def fit_field(steps: Sequence[FieldStep]) -> FieldCalibration:
     noise = float(np.sqrt(np.mean([step.error**2 for step in steps])))
     warnings = []
     full = float(np.max(np.abs(field)))
+    drift = _drift(steps, slope)
+    if drift is not None and abs(drift) > DRIFT * full:
+        raise NotIdentifiableError(
+            f"the field at the same current drifted by {show(drift, 'T', 3)} from "
+            f"begin to end ({100 * abs(drift) / full:.1f} % of full scale, limit "
+            f"{100 * DRIFT:g} %): clamp the probe, let meter and coil warm up, zero "
+            "the meter, and calibrate again"
+        )
+    if warming is not None and warming > WARMING:
+        warnings.append(
+            f"the winding became {warming:.0f} K warmer ({WARMING:g} K is much): let "
+            "the coil cool, and step faster or to less current"
+        )
     if half_width > WIDEST_LOOP * full:
         warnings.append(
             f"the loop is {show(half_width, 'T', 3)} wide to either side, "
@@ -118,9 +149,23 @@ def fit_field(steps: Sequence[FieldStep]) -> FieldCalibration:
             at_zero, residual * np.sqrt(1 / current.size + centre**2 / spread), freedom
         ),
         residual=residual,
-        uncertainty=float(np.hypot(2 * noise, half_width)),
+        drift=drift,
+        warming=warming,
+        uncertainty=math.hypot(2 * noise, half_width, drift or 0.0),
         warnings=tuple(warnings),
     )
+
+
+def _drift(steps: Sequence[FieldStep], slope: float) -> float | None:
+    """Mean change of the field on the repeated steps, T."""
+    first = [s for s in steps if s.branch == "falling"]
+    changes = []
+    for again in (s for s in steps if s.branch == "again"):
+        once = min(first, key=lambda s: abs(s.current - again.current))
+        changes.append(
+            again.field - once.field - slope * (again.current - once.current)
+        )
+    return float(np.mean(changes)) if changes else None
 
 
 def _branch(steps: Sequence[FieldStep], name: str) -> tuple[FloatArray, FloatArray]:
@@ -175,10 +220,12 @@ def write_calibration(
         "slope T/A": f"{calibration.slope.value:.6g} ({calibration.slope.low:.6g} to "
         f"{calibration.slope.high:.6g})",
         "loop half-width T": f"{calibration.half_width:.3g}",
+        "drift T": _known(calibration.drift),
+        "winding warmed by K": _known(calibration.warming),
         UNCERTAINTY["T"]: f"{calibration.uncertainty:.3g}",
-        HASH: table_hash(body),
     }
-    text = "".join(f"# {name}: {value}\n" for name, value in head.items()) + body
+    told = "".join(f"# {name}: {value}\n" for name, value in head.items()) + body
+    text = f"# {HASH}: {table_hash(told)}\n{told}"
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -193,3 +240,7 @@ def write_calibration(
             f"Calibration {path} cannot be written: {reason.strerror}."
         ) from reason
     return path
+
+
+def _known(value: float | None) -> str:
+    return "not known" if value is None else f"{value:.3g}"

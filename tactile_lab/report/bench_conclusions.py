@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.field_calibration import (
+    FieldCalibration,
     FieldStep,
     fit_field,
     write_calibration,
@@ -22,12 +23,15 @@ from tactile_lab.report.run_data import RunData, TrialData
 from tactile_lab.report.trial_finding import TrialFinding
 
 FloatArray = NDArray[np.float64]
+BRANCHES: dict[str, Literal["rising", "falling", "again"]] = {
+    "rising": "rising", "falling": "falling", "again": "again",
+}  # fmt: skip
 
 
 def calibrate_field(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """Slope, loop and uncertainty of B2(I)."""
     try:
-        found = fit_field(field_steps(run, [t.trial for t in trials]))
+        found = fit_field(field_steps(run, [t.trial for t in trials]), run.warming)
     except NotIdentifiableError as reason:
         return Conclusion((f"No calibration: {reason}.",))
     sentences = (
@@ -37,6 +41,7 @@ def calibrate_field(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         f"The loop is {show(found.half_width, 'T', 3)} or "
         f"{show(found.half_width_current, 'A', 3)} to either side; one field value is "
         f"known to ±{show(found.uncertainty, 'T', 3)} (95 %).",
+        *_steady(found),
         *(f"{warning[0].upper()}{warning[1:]}." for warning in found.warnings),
     )
     values = {
@@ -47,10 +52,23 @@ def calibrate_field(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         "half_width_T": found.half_width,
         "half_width_A": found.half_width_current,
         "uncertainty_T": found.uncertainty,
+        "drift_T": found.drift,
+        "warming_K": found.warming,
         "current_A": found.current.tolist(),
         "field_T": found.field.tolist(),
     }
     return Conclusion(sentences, values)
+
+
+def _steady(found: FieldCalibration) -> Iterator[str]:
+    """What the checks of drift and temperature gave."""
+    if found.drift is not None:
+        yield (
+            f"At the same current and history the field changed by "
+            f"{show(found.drift, 'T', 2)} from begin to end."
+        )
+    if found.warming is not None:
+        yield f"The winding became {found.warming:.0f} K warmer (by its resistance)."
 
 
 def write_calibration_file(folder: Path, run: RunData) -> Path | None:
@@ -62,7 +80,7 @@ def write_calibration_file(folder: Path, run: RunData) -> Path | None:
     if run.protocol != "calibrate_field" or path.exists():
         return None
     try:
-        found = fit_field(field_steps(run, run.trials))
+        found = fit_field(field_steps(run, run.trials), run.warming)
         date = datetime.date.fromisoformat(run.started[:10])
     except (NotIdentifiableError, ValueError):
         return None  # the report's own sentence says why
@@ -82,9 +100,9 @@ def field_steps(run: RunData, trials: Sequence[TrialData]) -> list[FieldStep]:
     for trial in trials:
         if trial.hold is None or trial.pause:
             continue
-        branch: Literal["rising", "falling"] = (
-            "rising" if trial.label.startswith("rising") else "falling"
-        )
+        branch = BRANCHES.get(trial.label.partition(" ")[0])
+        if branch is None:
+            continue
         start, end = trial.start + trial.hold[0], trial.start + trial.hold[1]
         time, value = run.field.T
         readings = value[(time >= start) & (time <= end)]
@@ -105,23 +123,34 @@ def field_steps(run: RunData, trials: Sequence[TrialData]) -> list[FieldStep]:
 
 
 def force_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
-    """Independent readings over Eq. (2)."""
+    """F(I) - F(0) by Eq. (2) from current and field, and independent readings."""
     levels = np.array([t.trial.level or 0.0 for t in trials])
+    by_field = [_force_by_field(run, t.trial) for t in trials]
+    sentences, values = [], {"F_minus_F0_by_field_N": by_field}
+    known = [
+        f"{t.trial.label} as {show(force, 'N', 3)}"
+        for t, force in zip(trials, by_field, strict=True)
+        if force is not None
+    ]
+    if known:
+        sentences.append(
+            f"F(I) − F(0) by Eq. (2) from the field read: {', '.join(known)}."
+        )
     text = run.parameters.get("readings", "")
     try:
         readings = np.array([parse(p, "N") for p in text.split(", ") if p])
     except QuantityError as reason:
-        return Conclusion((f"The readings cannot be used: {reason}",))
+        said = f"The readings cannot be used: {reason}"
+        return Conclusion((*sentences, said), values)
     if readings.size != levels.size:
-        return Conclusion(
-            (
-                "No independent readings: enter F(I) − F(0) of each level with "
-                '--set protocol.readings=["...", ...] to check Eq. (2).',
-            )
+        said = (
+            "No independent readings: enter F(I) − F(0) of each level with "
+            '--set protocol.readings=["...", ...] to check Eq. (2).'
         )
+        return Conclusion((*sentences, said), values)
     strength = float(np.sum(levels**2))
     if strength == 0:
-        return Conclusion(("All levels are 0 N: nothing to compare.",))
+        return Conclusion((*sentences, "All levels are 0 N: nothing to compare."))
     scale = float(np.sum(levels * readings) / strength)
     left = readings - scale * levels
     freedom = max(1, levels.size - 1)
@@ -132,7 +161,20 @@ def force_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
             " A factor near 0.1 is the area A2: Table 1 prints 2.25e-3 m², a core of "
             "15 mm x 15 mm has 2.25e-4 m²."
         )
-    return Conclusion((said,), {"read_over_eq2": scale, "standard_error": error})
+    found = {**values, "read_over_eq2": scale, "standard_error": error}
+    return Conclusion((*sentences, said), found)
+
+
+def _force_by_field(run: RunData, trial: TrialData) -> float | None:
+    """F(I) - F(0) of a trial from the field in its hold and before it, N."""
+    if trial.hold is None or run.newtons_per_tesla is None:
+        return None
+    start, end = trial.hold
+    held = run.field_between(trial.start + (start + end) / 2, trial.start + end)
+    before = run.field_between(trial.start - 1.0, trial.start)
+    if not (held.size and before.size):
+        return None
+    return float(held.mean() - before.mean()) * run.newtons_per_tesla
 
 
 def monitor(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.analysis.applied import AppliedCurrent, applied_current
 from tactile_lab.analysis.drain_current import Divider
+from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.model.simulate import Start
@@ -64,6 +65,7 @@ def read(folder: Path) -> RunData:
             trials=tuple(_trial(row, spikes, before, segments) for row in run.trials),
             force=_force(scene, current, run.duration),
             current=current,
+            warming=_warming(run),
             field=_field(run),
             force_uncertainty=scene.bench.magnet.force_uncertainty,
             field_per_ampere=_field_per_ampere(scene),
@@ -193,6 +195,16 @@ def _start(scene: Scene) -> Start | None:
     if given is None:
         return None
     return Start(V_P=given.V_P, V_C1=given.V_C1, V_C2=given.V_C2)
+
+
+def _warming(run: Run) -> float | None:
+    """Temperature the winding gained between two looks at its resistance, K."""
+    rows = run.current
+    if "resistance_ratio" not in (rows.dtype.names or ()):
+        return None
+    ratio = rows["resistance_ratio"]
+    ratio = ratio[np.isfinite(ratio)]
+    return float(ratio[-1] - ratio[0]) / COPPER if ratio.size > 1 else None
 
 
 def _field_per_ampere(scene: Scene) -> float:

@@ -125,6 +125,8 @@ class RunData:
         trials: in order.
         force: N on the run's time axis, as applied (limited and stepped).
         current: applied coil current as read back, shape (n, 2), s and A, or None.
+        warming: of the coil's winding from the first to the last look at its
+            resistance, K; None where it was not looked at twice.
         force_uncertainty: what calibration and geometry leave open; None where
             neither states any.
         field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
@@ -160,6 +162,7 @@ class RunData:
     started: str = ""
     took: float | None = None
     current: FloatArray | None = None
+    warming: float | None = None
     force_uncertainty: ForceUncertainty | None = None
     field_per_ampere: float | None = None
     newtons_per_tesla: float | None = None

@@ -49,7 +49,12 @@ RECORDS = {
     "spikes": np.dtype(
         [("sample", "f8"), ("time", "f8"), ("amplitude", "i2"), ("width", "f4")]
     ),
-    "current": np.dtype([("time", "f8"), ("setpoint", "f8"), ("measured", "f8")]),
+    "current": np.dtype(
+        [
+            ("time", "f8"), ("setpoint", "f8"), ("measured", "f8"),
+            ("resistance_ratio", "f8"),
+        ]
+    ),
     "field": np.dtype([("time", "f8"), ("field", "f8")]),
     "trials": np.dtype(
         [
@@ -68,7 +73,7 @@ UNITS = {
     "gaps": "sample: sample, missing: sample, time: s",
     "overrange": "sample: sample, samples: sample, channels: bit per row",
     "spikes": "sample: sample, time: s, amplitude: code, width: sample",
-    "current": "time: s, setpoint: A, measured: A",
+    "current": "time: s, setpoint: A, measured: A, resistance_ratio: 1",
     "field": "time: s, field: T",
     "trials": "start: s, end: s, level: N, hold_start: s, hold_end: s, "
     "rest_V_C1: V, drift_V_C1: V",

@@ -119,10 +119,17 @@ class Recorder:
             )
         self.tick()
 
-    def current(self, time: float, setpoint: float, measured: float | None) -> None:
-        """Store an applied set-point and its read-back, A."""
+    def current(
+        self,
+        time: float,
+        setpoint: float,
+        measured: float | None,
+        ratio: float | None = None,
+    ) -> None:
+        """Store a set-point and its read-back, A, and the resistance over cold."""
         read = math.nan if measured is None else measured
-        self._records["current"].append(time, setpoint, read)
+        warm = math.nan if ratio is None else ratio
+        self._records["current"].append(time, setpoint, read, warm)
         self.tick()
 
     def field(self, time: float, field: float) -> None:

@@ -96,9 +96,15 @@ class RecorderThread:
         size = max(found.nbytes, RECORD_BYTES)
         self._put(partial(self._recorder.spikes, times, found), size)
 
-    def current(self, time: float, setpoint: float, measured: float | None) -> None:
+    def current(
+        self,
+        time: float,
+        setpoint: float,
+        measured: float | None,
+        ratio: float | None = None,
+    ) -> None:
         """See `Recorder.current`."""
-        self._put(partial(self._recorder.current, time, setpoint, measured))
+        self._put(partial(self._recorder.current, time, setpoint, measured, ratio))
 
     def field(self, time: float, field: float) -> None:
         """See `Recorder.field`."""

@@ -48,6 +48,28 @@ def test_a_wide_loop_is_warned_of():
     assert "demagnetise" in fit_field(loop(half=1.5e-3)).warnings[0]
 
 
+def again(drift, slope=0.0112, half=4e-4):
+    """The first steps of the falling branch once more, after a drift, T."""
+    return [
+        FieldStep(branch="again", current=i, field=slope * i + half + drift, error=5e-6)
+        for i in (1.0, 0.9, 0.8)
+    ]
+
+
+def test_a_drift_widens_the_uncertainty_and_a_large_one_is_refused():
+    steady, drifted = fit_field(loop()), fit_field([*loop(), *again(1e-4)])
+    assert steady.drift is None
+    assert drifted.drift == pytest.approx(1e-4, abs=1e-5)
+    assert drifted.uncertainty == pytest.approx(np.hypot(4e-4, 1e-4), rel=0.05)
+    with pytest.raises(NotIdentifiableError, match=r"drifted by 300 µT.*limit 2 %"):
+        fit_field([*loop(noise=0), *again(3e-4)])
+
+
+def test_a_winding_that_became_hot_is_warned_of():
+    assert fit_field(loop(), warming=5.0).warnings == ()
+    assert "35 K warmer" in fit_field(loop(), warming=35.0).warnings[0]
+
+
 def test_missing_branches_are_refused():
     one = [s for s in loop() if s.branch == "rising"]
     with pytest.raises(NotIdentifiableError, match="falling branch has 0 steps"):

@@ -216,13 +216,15 @@ def test_calibrate_field_never_overshoots_a_step():
     trials = drive(CalibrateField(most=0.8, points=11), quiet)
     prepared = [t.label for t in trials if t.pause]
     assert prepared == [
-        "demagnetise", "conditioning 1", "conditioning 2", "turn", "turn",
+        "demagnetise", "conditioning 1", "conditioning 2", "turn", "turn", "turn",
         "back to 0 A",
     ]  # fmt: skip
     steps = [t for t in trials if not t.pause]
     levels = [t.current.value[-1] for t in steps]
     assert levels[:11] == pytest.approx(np.linspace(0.8, -0.8, 11))
-    assert levels[11:] == pytest.approx(np.linspace(-0.8, 0.8, 11))
+    assert levels[11:22] == pytest.approx(np.linspace(-0.8, 0.8, 11))
+    assert levels[22:] == levels[:3]
+    assert [t.label.split()[0] for t in steps[22:]] == ["again"] * 3
     for before, after in pairwise(trials):
         if after.label != "demagnetise":
             assert before.current.value[-1] == pytest.approx(after.current.value[0])

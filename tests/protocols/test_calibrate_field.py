@@ -1,0 +1,61 @@
+"""A field calibration from the current source to a file that a bench then uses."""
+
+import json
+
+import pytest
+
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.acquisition.execution import Execution
+from tactile_lab.calibration import read_calibration
+from tactile_lab.errors import LimitError
+from tactile_lab.report.from_run import read
+from tactile_lab.report.write import write
+from tactile_lab.scene.load import load
+
+SHORT = (
+    "protocol.points=5",
+    "protocol.most=0.5 A",
+    "protocol.loops=0",
+    "protocol.dwell=0.5 s",
+    "record.sample_rate=2 kS/s",
+)
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    done = Execution(load("calibrate_field", SHORT), folder).run()
+    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    write(done.folder, read(done.folder))
+    return done.folder
+
+
+def test_drift_and_temperature_are_checked_and_told(calibrated):
+    found = json.loads((calibrated / "results.json").read_text())["conclusion"]
+    assert found["slope_T_per_A"] == pytest.approx(0.011, rel=1e-3)
+    assert abs(found["drift_T"]) < 1e-6
+    assert 0 <= found["warming_K"] < 10
+    # the loop of mild steel, 50 mA to either side
+    assert found["uncertainty_T"] == pytest.approx(0.05 * 0.011, rel=0.02)
+
+
+def test_the_file_tells_its_origin_and_covers_what_was_measured(calibrated):
+    path = calibrated / "calibration.csv"
+    assert path.stat().st_mode & 0o222 == 0
+    used = read_calibration(path)
+    assert used.whole
+    assert {"coil", "date", "valid until", "drift T", "winding warmed by K"} <= set(
+        used.head
+    )
+    assert used.at(0.3) == pytest.approx(0.3 * 0.011, abs=1e-5)
+    with pytest.raises(LimitError, match="outside the calibration"):
+        used.at(0.6)
+
+
+def test_neither_a_value_nor_the_date_can_be_changed_unnoticed(calibrated, tmp_path):
+    text = (calibrated / "calibration.csv").read_text()
+    for old, new in (("valid until: 20", "valid until: 21"), ("\n0.5,0", "\n0.5,1")):
+        assert old in text
+        changed = tmp_path / "changed.csv"
+        changed.write_text(text.replace(old, new))
+        assert not read_calibration(changed).whole
