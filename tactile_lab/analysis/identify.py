@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.twin import Measured
+from tactile_lab.analysis.twin import PART, Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import PARAMETERS, Circuit
 from tactile_lab.model.equations import I_C
@@ -74,6 +74,7 @@ def identify(
     *,
     V_C1: Measured | None = None,
     spike_times: FloatArray | None = None,
+    displaced: Sequence[Waveform] = (),
 ) -> Identified:
     """Fit the parameters `names`, starting from those of `circuit`.
 
@@ -82,8 +83,14 @@ def identify(
         names: parameters of `Circuit` to fit.
         force: N on the run's time axis, from the measured coil current.
         duration: of the run, s.
-        V_C1: measured, decimated; its bins must be independent.
+        V_C1: measured, decimated; its bins must be independent. Its resolution is taken
+            for what the channel's offset is known to.
         spike_times: detected spikes, s.
+        displaced: the force moved by `twin.PART` of its 95 % band, one for each
+            independent cause of its uncertainty.
+
+    Intervals hold the scatter of the data, and what the offset of V_C1 and each
+    displaced force would move the estimate by.
 
     Raises:
         ParameterError: an unknown parameter, or an option.
@@ -104,7 +111,7 @@ def identify(
         )  # fmt: skip
         x = np.asarray(solved.x, dtype=np.float64)
         weights = problem.weights(problem.residual(x))
-    return _identified(problem, x, weights)
+    return _identified(problem, x, weights, _systematic(problem, x, displaced))
 
 
 def _check(circuit: Circuit, names: Sequence[str]) -> None:
@@ -142,6 +149,7 @@ class _Problem:
         short = np.diff(times) <= LONGEST
         self._earlier, self._later = times[:-1][short], times[1:][short]
         self.bins = 0 if V_C1 is None else int(V_C1.time.size)
+        self.offset = 0.0 if V_C1 is None else V_C1.resolution
         self.size = self.bins + self._earlier.size
         self._grids = [
             np.linspace(a, b, max(8, int((b - a) / STEP)) | 1)
@@ -166,11 +174,11 @@ class _Problem:
             return self._circuit.reset_voltage
         return float(getattr(self._circuit, name))
 
-    def residual(self, x: FloatArray) -> FloatArray:
-        """All residuals, V: those of V_C1, then those at firing."""
-        circuit = self.circuit(x)
+    def residual(self, x: FloatArray, force: Waveform | None = None) -> FloatArray:
+        """All residuals, V, under `force`: those of V_C1, then those at firing."""
+        circuit, force = self.circuit(x), force or self._force
         found = simulate(
-            circuit, self._force, keep=("V_C1",), until=self._duration, tolerance=1e-7
+            circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
         )
         parts = []
         if self._trace is not None:
@@ -221,7 +229,22 @@ def _simpson(values: FloatArray, grid: FloatArray) -> float:
     return float(total * step / 3)
 
 
-def _identified(problem: _Problem, x: FloatArray, weights: FloatArray) -> Identified:
+def _systematic(
+    problem: _Problem, x: FloatArray, displaced: Sequence[Waveform]
+) -> list[FloatArray]:
+    """Half of the 95 % band each systematic cause gives all residuals, V."""
+    here = problem.residual(x)
+    causes = [(problem.residual(x, f) - here) / PART for f in displaced]
+    if problem.bins and problem.offset:
+        shifted = np.zeros(problem.size)
+        shifted[: problem.bins] = problem.offset
+        causes.append(shifted)
+    return causes
+
+
+def _identified(
+    problem: _Problem, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
+) -> Identified:
     jacobian = _jacobian(problem, x) * weights[:, None]
     lengths = np.linalg.norm(jacobian, axis=0)
     for name, length in zip(problem.names, lengths, strict=True):
@@ -236,9 +259,14 @@ def _identified(problem: _Problem, x: FloatArray, weights: FloatArray) -> Identi
     errors = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(errors, errors)
     circuit = problem.circuit(x)
+    # what each cause moves the least-squares estimate by, to first order
+    solve = inverse / np.outer(lengths, lengths) @ jacobian.T
+    moved = [np.abs(solve @ (cause * weights)) for cause in causes]
     estimates = {
-        name: _estimate(problem, circuit, name, float(error), freedom)
-        for name, error in zip(problem.names, errors, strict=True)
+        name: _estimate(
+            problem, circuit, name, float(errors[i]), freedom, [m[i] for m in moved]
+        )
+        for i, name in enumerate(problem.names)
     }
     bins = problem.bins
     return Identified(
@@ -263,14 +291,20 @@ def _jacobian(problem: _Problem, x: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    problem: _Problem, circuit: Circuit, name: str, error: float, freedom: int
+    problem: _Problem,
+    circuit: Circuit,
+    name: str,
+    error: float,
+    freedom: int,
+    halves: Sequence[float],
 ) -> Estimate:
     value = getattr(circuit, name)
     if name in SCALES:
-        return Estimate.of(value, error * SCALES[name], freedom)
-    logarithm = Estimate.of(float(np.log(value)), error, freedom)
+        found = Estimate.of(value, error * SCALES[name], freedom)
+        return found.widened(*(half * SCALES[name] for half in halves))
+    logarithm = Estimate.of(float(np.log(value)), error, freedom).widened(*halves)
     low, high = np.exp(np.clip((logarithm.low, logarithm.high), -700, 700))
-    return Estimate(value, value * error, float(low), float(high))
+    return Estimate(value, value * logarithm.error, float(low), float(high))
 
 
 def _warnings(

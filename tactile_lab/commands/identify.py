@@ -39,7 +39,8 @@ def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
     if found.scatter_V_C1 is not None:
         click.echo(
             f"V_C1 is left with {found.scatter_V_C1 * 1e3:.2g} mV of scatter. The "
-            "intervals are of noise alone, without the offset of the scope's channel."
+            "intervals hold noise, one code of offset of its channel, and what the "
+            "bench states of the force's uncertainty."
         )
     for text in found.warnings:
         warn(text)

@@ -10,6 +10,7 @@ from tactile_lab.analysis.identify import Identified, identify
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.report.run_data import RunData
+from tactile_lab.report.twinned import displaced
 
 
 def identify_run(run: RunData, names: Sequence[str]) -> Identified:
@@ -30,7 +31,8 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
     seen = None
     if trace is not None:
         inside = (trace.time >= 0) & (trace.time <= run.duration)
-        seen = Measured("V_C1", trace.time[inside], trace.mean[inside])
+        code = trace.code or 0.0
+        seen = Measured("V_C1", trace.time[inside], trace.mean[inside], code)
     return identify(
         run.circuit,
         names,
@@ -38,4 +40,5 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
         run.duration,
         V_C1=seen,
         spike_times=spikes[spikes <= run.duration] if run.searched else None,
+        displaced=displaced(run),
     )

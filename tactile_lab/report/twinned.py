@@ -41,7 +41,7 @@ def with_twin(run: RunData) -> tuple[RunData, Twin | None]:
         spike_times=spikes if run.searched else None,
         pauses=pauses,
         start=run.start,
-        displaced=_displaced(run),
+        displaced=displaced(run),
         clock=max((t.clock_uncertainty or 0.0 for t in run.trials), default=0.0),
     )
     node_a = found.residual("V_C1")
@@ -53,7 +53,7 @@ def with_twin(run: RunData) -> tuple[RunData, Twin | None]:
     return replace(run, traces=(*run.traces, model)), found
 
 
-def _displaced(run: RunData) -> list[Waveform]:
+def displaced(run: RunData) -> list[Waveform]:
     """The force moved a little by each cause of its uncertainty."""
     known, force = run.force_uncertainty, run.force
     if known is None:

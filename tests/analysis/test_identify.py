@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.analysis.identify import identify
-from tactile_lab.analysis.twin import Measured
+from tactile_lab.analysis.twin import PART, Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -76,3 +76,27 @@ def test_no_data_is_refused():
 def test_impossible_names_are_refused(names):
     with pytest.raises(ParameterError):
         identify(Circuit(), names, FORCE, FORCE.end)
+
+
+def test_an_uncertain_force_and_offset_widen_the_intervals():
+    trace, _ = run_of(Circuit())
+
+    def found(force=(), code=0.0):
+        seen = replace(trace, resolution=code)
+        return identify(
+            Circuit(), ("V_GS", "tau"), FORCE, FORCE.end, V_C1=seen, displaced=force
+        ).estimates
+
+    noise, offset = found(), found(code=16e-3)
+    assert offset["V_GS"].value == noise["V_GS"].value
+    assert offset["V_GS"].error > 5 * noise["V_GS"].error
+    band = 0.05
+    known = found([FORCE.scaled(1 + band * PART)])
+    # a force that is wrong by that much really moves the estimate so
+    wrong = identify(
+        Circuit(), ("V_GS", "tau"), FORCE.scaled(1 + band / 2), FORCE.end, V_C1=trace
+    ).estimates
+    for name in ("V_GS", "tau"):
+        half = (known[name].high - known[name].low) / 2
+        moved = abs(wrong[name].value - noise[name].value)
+        assert 0.5 * half < 2 * moved < 2 * half
