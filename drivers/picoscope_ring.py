@@ -30,14 +30,16 @@ class StreamRing:
         self.at_end = False
         """The last callback ended at the ring's end: more may wait from its start."""
         self.bits = tuple(bits)
-        self._ring = np.zeros((len(bits), samples), dtype=np.int16)
-        self._out = np.empty_like(self._ring)
+        # written now: a page touched for the first time while samples come costs them
+        self._ring = np.full((len(bits), samples), 0, dtype=np.int16)
+        self._parts: list[NDArray[np.int16]] = []
         self._lock = threading.Lock()
         self.clear()
 
     def clear(self) -> None:
         """Make ready for a new stream."""
         with self._lock:
+            self._parts = []
             self._filled = self._overflow = self._next = 0
             self._failure: BaseException | None = None
 
@@ -51,9 +53,10 @@ class StreamRing:
         with self._lock:
             if self._filled == 0:
                 return None
-            codes = self._out[:, : self._filled].copy()
+            parts, self._parts = self._parts, []
             overrange = tuple(bool(self._overflow >> bit & 1) for bit in self.bits)
             self._filled, self._overflow = 0, 0
+        codes = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
         return codes, overrange
 
     def failure(self) -> BaseException | None:
@@ -104,7 +107,7 @@ class StreamRing:
                 f"{self.samples} there is room for. Relieve the computer or lower "
                 "record.sample_rate."
             )
-        self._out[:, self._filled : filled] = self._ring[:, start:end]
+        self._parts.append(self._ring[:, start:end].copy())
         self._filled = filled
         self._overflow |= overflow
         self._next = end % self.samples

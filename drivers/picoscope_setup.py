@@ -12,7 +12,7 @@ from drivers.picosdk import COUPLINGS, INPUTS, RANGES, TIME_UNITS
 from tactile_lab.bench import Channel
 from tactile_lab.errors import LimitError
 
-_LEAST_RING, _MOST_RING = 1 << 16, 1 << 22
+_LEAST_RING, _MOST_RING = 1 << 16, 1 << 23
 _SHORTEST = 8e-9
 
 
@@ -34,7 +34,7 @@ def streaming_interval(interval: float) -> tuple[int, float]:
 
 
 def ring_samples(interval: float) -> int:
-    """Ring length for 2 s, a power of two from 64 Ki to 4 Mi samples."""
+    """Ring length for 2 s, a power of two from 64 Ki to 8 Mi samples."""
     wanted = 1 << math.ceil(math.log2(max(1.0, 2 / interval)))
     return min(max(wanted, _LEAST_RING), _MOST_RING)
 

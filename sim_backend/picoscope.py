@@ -35,6 +35,7 @@ class Make:
         empty_callbacks: make a callback with no samples when there are none.
         clock_error: relative error of its sample clock; 50e-6 is 50 ppm.
         memory: samples of block mode, shared by the enabled inputs.
+        beyond: times the model's own streaming rate, to find a computer's limit.
     """
 
     serial: str = "SIM04/0001"
@@ -49,6 +50,7 @@ class Make:
     empty_callbacks: bool = False
     clock_error: float = 0.0
     memory: int = 128 << 20
+    beyond: int = 1
 
     @property
     def inputs(self) -> int:
@@ -243,7 +245,8 @@ class SimulatedPicoScope:
 
     def _least_ticks(self, inputs: int) -> int:
         power_of_two = 1 << (inputs - 1).bit_length()
-        return power_of_two * (1 if self.make.usb == "3.0" else 4)
+        ticks = power_of_two * (1 if self.make.usb == "3.0" else 4)
+        return max(1, ticks // self.make.beyond)
 
     def produced(self) -> int:
         """Samples a channel taken since the stream began."""
