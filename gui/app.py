@@ -56,6 +56,7 @@ def main(
     _close_on_signals(window)
     QTimer.singleShot(0, lambda: begin(window, target, bench))
     app.exec()
+    session.close()
     left = session.coil_view()
     return 4 if left is not None and left.verified_off is False else 0
 

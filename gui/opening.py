@@ -15,7 +15,7 @@ from gui.lanes.expected import PlanSource
 from gui.lanes.source import LiveSource
 from gui.review.finding import Finding, facts_of, of_outcome, of_run
 from gui.review.runs import Entry, entries
-from gui.session.messages import Level, Planned
+from gui.session.messages import Level, Planned, Twins
 from gui.session.request import Request
 from gui.session.threads import start
 from gui.state import State
@@ -113,13 +113,6 @@ class Opening(QObject):
                 self.failed.emit(str(error))
                 return
             self.loaded.emit(source)
-            try:
-                from gui.session.twin import twin_of
-
-                scene = Request(str(folder / "scene.toml"), (), None).load()
-                source.add_twin(twin_of(scene, source.current, source.length))
-            except (TactileLabError, OSError) as error:
-                self.failed.emit(f"No model beside {folder.name}: {error}")
 
         start(work, "open run")
 
@@ -200,6 +193,16 @@ class Opening(QObject):
                 (folder / "report.html").exists()
             )
 
+    def twin_made(self, twins: Twins) -> None:
+        """Put the model beside the run on disk, if that is still on screen."""
+        run = self.run
+        if run is None or isinstance(run, Comparison) or run.path != twins.folder:
+            return
+        if twins.problem:
+            self.say(twins.problem)
+        else:
+            run.add_twin(twins.parts)
+
     def take_fetched(self) -> None:
         """Repaint where samples of a run on disk have been read."""
         if self.run is not None and self.run.take_fetched():
@@ -241,6 +244,7 @@ class Opening(QObject):
         view.show_all()
         window.centre.tools.widths.choose(3)
         window.centre.stack.show_values()
+        window.session.make_twin(source.path, source.current, source.length)
         status = str(source.info.get("status"))
         self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
         self._results_of(source)

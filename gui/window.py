@@ -120,7 +120,7 @@ class Window(QMainWindow):
             expectation = self.session.expectation
             if expectation is None:
                 return
-            needs, record = expectation.needs, expectation.scene.record
+            needs, record = expectation.needs, expectation.record
             signals = {"force", *needs.stored} | (
                 set(record.signals) & {"spikes", "field"}
             )
@@ -239,6 +239,7 @@ class Window(QMainWindow):
         session.trial_ended.connect(self.opening.trial_ended)
         session.run_ended.connect(self.opening.run_ended)
         session.reported.connect(self.opening.reported)
+        session.twinned.connect(self.opening.twin_made)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
         self.banner.log_asked.connect(self.centre.log.show_safety)

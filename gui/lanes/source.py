@@ -10,7 +10,7 @@ from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.expected import Aligned, Hold, Preview, settled
 from gui.lanes.history import SlowTrack, Track
 from gui.lanes.twinned import TwinTracks, joined
-from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.live import Bins
 
 
 class Source(Protocol):
@@ -60,26 +60,22 @@ class Source(Protocol):
 
 
 class LiveSource:
-    """A run in progress: polls the newest bins, remembers them all, decimated.
+    """A run in progress: remembers all it is told, decimated.
 
     Args:
-        live: the run's ring of bins.
         preview: the model's expectation; None until it is known.
         newtons_per_ampere: turns coil current into force.
     """
 
-    def __init__(
-        self, live: Live, preview: Preview | None, newtons_per_ampere: float
-    ) -> None:
+    def __init__(self, preview: Preview | None, newtons_per_ampere: float) -> None:
         self.preview = preview
         self.aligned = None if preview is None else Aligned(preview)
         self.tracks = TwinTracks()
         self.running = True
         self.holds: list[Hold] = []
-        self._live = live
         self._gain = newtons_per_ampere
         self._loop: list[tuple[float, float, float]] = []
-        self._seen = 0
+        self._new = False
         self._tracks: dict[str, Track] = {}
         self._slow = {name: SlowTrack() for name in ("force", "field")}
         self._spikes = np.empty(1024)
@@ -110,18 +106,16 @@ class LiveSource:
         known = self.tracks.end
         return np.concatenate([self.tracks.spikes, planned[planned > known]])
 
-    def poll(self) -> bool:
-        """Take what is new from the ring; whether there was anything."""
-        written = self._live.written
-        if written == self._seen:
-            return False
-        if written < self._seen:
-            self._seen = 0
-        for signal in self._live.signals:
-            track = self._tracks.setdefault(signal, Track())
-            track.add(self._live.since(self._seen, signal))
-        self._seen = written
-        return True
+    def add_bins(self, bins: dict[str, Bins]) -> None:
+        """The newest samples by signal."""
+        for signal, part in bins.items():
+            self._tracks.setdefault(signal, Track()).add(part)
+            self._new = self._new or part.time.size > 0
+
+    def take_new(self) -> bool:
+        """Whether samples have come since this was last asked."""
+        new, self._new = self._new, False
+        return new
 
     def add_spikes(self, times: tuple[float, ...]) -> None:
         """Detected spikes, ascending."""

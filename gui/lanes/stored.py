@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -142,7 +143,7 @@ class RunSource:
         time, field = time[inside], field[inside]
         return np.column_stack([np.interp(time, at, force) / self._gain, field])
 
-    def add_twin(self, parts: list[TwinSlice]) -> None:
+    def add_twin(self, parts: Iterable[TwinSlice]) -> None:
         """Put the twin beside the data."""
         tracks = TwinTracks()
         for part in parts:

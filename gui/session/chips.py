@@ -88,7 +88,7 @@ def _scope(session: Session) -> InstrumentView:
     if lamp in (Lamp.ABSENT, Lamp.WAITING, Lamp.BAD):
         return InstrumentView(NAMES["scope"], lamp, words)
     if expectation is not None:
-        rate = expectation.scene.record.sample_rate
+        rate = expectation.record.sample_rate
         words = f"{len(expectation.needs.channels)} channels · 8 bit"
         if session.monitor.alive:
             lamp, value = Lamp.ACTIVE, "monitor"

@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import LiveSource
 from gui.session.coil import CoilWatch
+from gui.session.link import Link, RunAfar
 from gui.session.messages import (
     Checked,
     Errand,
@@ -21,7 +22,6 @@ from gui.session.messages import (
 )
 from gui.session.monitor import Monitor
 from gui.session.request import Request
-from gui.session.threads import RunThread
 from gui.state import CoilView, Fault, State
 from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.scene.bench_file import BenchSpec
@@ -29,8 +29,7 @@ from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.session.expect import Expectation
-    from gui.session.twin import LiveTwin
-    from tactile_lab.acquisition.execution import CoilState, Execution
+    from tactile_lab.acquisition.execution import CoilState
 
 LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
 
@@ -49,6 +48,7 @@ class Core(QObject):
 
     Args:
         out: folder for run folders.
+        separate: benches are driven in a process of its own.
 
     Attributes:
         bench_overrides: ``bench.key=value`` texts that change the connected bench.
@@ -61,10 +61,11 @@ class Core(QObject):
     trial_ended = Signal(object)
     run_ended = Signal(object)
     reported = Signal(object)
+    twinned = Signal(object)
     queue_changed = Signal()
 
-    def __init__(self, out: Path, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, out: Path, *, separate: bool = True) -> None:
+        super().__init__()
         self.out = out
         self.state = State.DISCONNECTED
         self.bench: Checked | None = None
@@ -89,13 +90,13 @@ class Core(QObject):
         self.reports = True
         self.lines: list[Line] = []
         self.coil = CoilWatch()
-        self.monitor = Monitor()
         self.inbox: SimpleQueue[Told] = SimpleQueue()
-        self._run: RunThread | None = None
+        self.link = Link(self.inbox, separate=separate)
+        self.monitor = Monitor(self.link)
+        self.folder: Path | None = None
+        self._run: RunAfar | None = None
         self._running: Expectation | None = None
         self._serial = 0
-        self._twin: LiveTwin | None = None
-        self._twinned: Execution | None = None
         self._after_monitor: tuple[Request, str] | None = None
         self._check_request: Request | None = None
 
@@ -111,11 +112,10 @@ class Core(QObject):
         self.elapsed, self.expected = 0.0, None
         self.run_name = title
         self._running = self.expectation
-        self._run = RunThread(
-            request, self.out, self.inbox, dict(self.notes), report=self.reports
+        self._run = self.link.run(
+            request, self.out, self.inbox, self.notes, report=self.reports
         )
         self._enter(State.RUNNING)
-        self._run.start()
 
     def enqueue(self, item: Queued) -> None:
         """Have a run follow those before it; it starts at once if none is running."""
@@ -151,8 +151,8 @@ class Core(QObject):
     def _coil_state(self) -> CoilState | None:
         if self.manual is not None:
             return self.manual.state
-        if self._run is not None and self._run.alive and self._run.execution:
-            return self._run.execution.coil_state
+        if self._run is not None and self._run.alive:
+            return self._run.coil
         return None
 
     def _next_in_queue(self) -> None:
@@ -164,7 +164,6 @@ class Core(QObject):
 
     def _stop_source(self) -> None:
         if self.source is not None:
-            self.source.poll()
             self.source.running = False
 
     def _set_fault(self, fault: Fault) -> None:

@@ -12,6 +12,7 @@ from tactile_lab.plan.estimate import Estimate
 from tactile_lab.plan.needs import Needs
 from tactile_lab.plan.plan import Plan, plan
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.tables import Record
 
 MODELLED = ("V_C1", "V_C2", "V_K", "I_DS")
 SPACING = 1e-3
@@ -23,7 +24,7 @@ class Expectation:
     """A scene that can be run, and what it will do.
 
     Attributes:
-        scene: validated.
+        record: what is asked for.
         needs: what it opens and keeps.
         estimate: its cost.
         preview: what the model expects.
@@ -32,7 +33,7 @@ class Expectation:
         assumptions: what the numbers rest on.
     """
 
-    scene: Scene
+    record: Record
     needs: Needs
     estimate: Estimate
     preview: Preview
@@ -49,7 +50,7 @@ def expect(scene: Scene) -> Expectation:
     """
     made = plan(scene)
     return Expectation(
-        scene=scene,
+        record=scene.record,
         needs=made.needs,
         estimate=made.estimate,
         preview=_preview(made),

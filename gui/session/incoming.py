@@ -18,13 +18,15 @@ from gui.session.messages import (
     FieldByHand,
     Level,
     Line,
+    Lost,
     Planned,
     Refused,
     Reported,
+    Samples,
     Told,
     Twinned,
+    Twins,
 )
-from gui.session.threads import start
 from gui.state import Fault, State, milliamperes
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.by_hand import ManualCoil
@@ -32,7 +34,7 @@ from tactile_lab.bench import OffReport
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.execution import Executed, Execution
+    from tactile_lab.acquisition.execution import Executed
 
 LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
 
@@ -41,7 +43,7 @@ class Incoming(Core):
     """Takes everything from the one queue; nothing here blocks."""
 
     def poll(self) -> bool:
-        """Take all that background threads told; whether samples came too."""
+        """Take all that engine and threads told; whether samples came too."""
         if self.manual is not None:
             self._mind_manual(self.manual)
         self._mind_monitor()
@@ -51,7 +53,7 @@ class Incoming(Core):
             except Empty:
                 break
             self._take(told)
-        return self.source is not None and self.source.running and self.source.poll()
+        return self.source is not None and self.source.take_new()
 
     def _take(self, told: Told) -> None:
         match told:
@@ -75,10 +77,13 @@ class Incoming(Core):
             case events.StateChanged():
                 self._run_state(told)
             case events.FolderMade(folder=folder):
-                self.run_name = folder.name
+                self.folder, self.run_name = folder, folder.name
                 self.log(Level.INFO, "store", f"Recording to {folder}")
-            case Begun(execution=execution):
-                self._begun(execution)
+            case Begun():
+                self._begun(told)
+            case Samples(bins=bins):
+                if self.source is not None:
+                    self.source.add_bins(bins)
             case Ended(done=done):
                 self._ended(done)
             case Broken(fault=fault, off=off):
@@ -99,8 +104,8 @@ class Incoming(Core):
                         Level.GOOD, "report", f"Report in {folder / 'report.html'}"
                     )
                 self.reported.emit(folder)
-            case Twinned(execution=execution, part=part):
-                if execution is self._twinned and self.source is not None:
+            case Twinned(part=part):
+                if self.source is not None:
                     self.source.tracks.add(part)
             case Errand():
                 self.errand = told
@@ -112,6 +117,10 @@ class Incoming(Core):
                     self.readings["field"] = mean
                 self.log(Level.INFO if mean is not None else Level.ERROR, "meter", text)
                 self.changed.emit()
+            case Twins():
+                self.twinned.emit(told)
+            case Lost():
+                self._lost(told)
             case Line():
                 self.lines.append(told)
                 self.logged.emit(told)
@@ -121,8 +130,6 @@ class Incoming(Core):
         value = told.setpoint if told.measured is None else told.measured
         if self.source is not None:
             self.source.add_current(told.time, value)
-        if self._twin is not None:
-            self._twin.add(told.time, value)
 
     def _trial_started(self, told: events.TrialStarted) -> None:
         trial = told.trial
@@ -151,38 +158,31 @@ class Incoming(Core):
         if told.state in (events.RunState.CONNECTING, events.RunState.RUNNING):
             self.log(Level.INFO, "runner", told.text.capitalize())
 
-    def _begun(self, execution: Execution) -> None:
+    def _begun(self, told: Begun) -> None:
         expectation = self._running
         self.expected = expectation.estimate.duration if expectation else None
-        limits = execution.bench.coil.limits if execution.bench.coil else None
-        self.coil.limits = limits or self.coil.limits
+        self.coil.limits = told.limits or self.coil.limits
         self.coil.sign_of_life(read_back=True)
-        gain = execution.scene.bench.magnet.newtons_per_ampere
         preview = expectation.preview if expectation else None
-        self.source = LiveSource(execution.live, preview, gain)
+        self.source = LiveSource(preview, told.newtons_per_ampere)
         for warning in expectation.warnings if expectation else ():
             self.log(Level.WARNING, "plan", warning)
-        self._start_twin(execution, self.source)
         self.source_changed.emit(self.source)
         self.changed.emit()
 
-    def _start_twin(self, execution: Execution, source: LiveSource) -> None:
-        """Let the twin follow the run, where the scene records what it predicts."""
-        from gui.session.twin import LiveTwin
-
-        self._twin, self._twinned = None, execution
-        if not {"V_C1", "V_C2", "V_K", "spikes"} & set(execution.scene.record.signals):
-            return
-        twin = self._twin = LiveTwin(execution.scene)
-        inbox = self.inbox
-
-        def reach() -> float | None:
-            return source.reach if source.running else None
-
-        def work() -> None:
-            twin.run(reach, lambda part: inbox.put(Twinned(execution, part)))
-
-        start(work, "twin")
+    def _lost(self, told: Lost) -> None:
+        """The engine died. A guard, where the source has one, switches it off."""
+        self._stop_source()
+        self.log(Level.ERROR, "engine", f"The engine ended: {told.why}")
+        if told.driving or self.state is State.CONNECTING:
+            self.coil.left(OffReport(False, None, "not verified"))
+            self._set_fault(
+                Fault(
+                    "The process that drives the instruments has ended.",
+                    "Data up to then are kept (`tactile-lab recover`). Look at the "
+                    "source: its guard switches it off, a simulated one is gone.",
+                )
+            )
 
     def _ended(self, done: Executed) -> None:
         ending = done.ending

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
@@ -13,12 +12,13 @@ from gui.lanes.twinned import TwinSlice
 from gui.session.request import Request
 from gui.state import Fault
 from tactile_lab.acquisition.events import Event
-from tactile_lab.bench import OffReport
+from tactile_lab.acquisition.live import Bins
+from tactile_lab.bench import CoilLimits, OffReport
 
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
     from gui.session.expect import Expectation
-    from tactile_lab.acquisition.execution import Executed, Execution
+    from tactile_lab.acquisition.execution import CoilState, Executed
 
 
 class Level(Enum):
@@ -86,11 +86,27 @@ class Checked:
     off: OffReport | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Begun:
-    """A run exists; its samples can be polled."""
+    """A run exists; its samples follow.
 
-    execution: Execution
+    Attributes:
+        limits: of its coil; None without one.
+        newtons_per_ampere: turns coil current into force.
+        critical_V_C1: the sensor fires below it, V.
+    """
+
+    limits: CoilLimits | None
+    newtons_per_ampere: float
+    critical_V_C1: float
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The newest samples of a run by signal, decimated, and the coil just now."""
+
+    bins: dict[str, Bins]
+    coil: CoilState
 
 
 @dataclass(frozen=True)
@@ -131,20 +147,40 @@ class FieldByHand:
     text: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Errand:
-    """A person is asked to do something at the bench; `done` lets the run go on."""
+    """A person is asked to do something at the bench; the run waits for it."""
 
     text: str
-    done: threading.Event
 
 
 @dataclass(frozen=True, eq=False)
 class Twinned:
-    """The twin of a run has come further."""
+    """The twin of a run in progress has come further."""
 
-    execution: Execution
     part: TwinSlice
+
+
+@dataclass(frozen=True, eq=False)
+class Twins:
+    """The twin of a finished run, or why there is none."""
+
+    folder: Path
+    parts: tuple[TwinSlice, ...]
+    problem: str
+
+
+@dataclass(frozen=True)
+class Gone:
+    """A run's thread has ended; nothing of it holds an instrument any more."""
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The engine has ended by itself; `driving` is whether a run was in progress."""
+
+    why: str
+    driving: bool
 
 
 Told = (
@@ -158,6 +194,10 @@ Told = (
     | Reported
     | Errand
     | FieldByHand
+    | Samples
     | Twinned
+    | Twins
+    | Gone
+    | Lost
     | Line
 )

@@ -11,9 +11,9 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from gui.lanes.source import LiveSource
-from gui.session.messages import Begun, Broken, Refused, Told
+from gui.session.link import Link, RunAfar
+from gui.session.messages import Begun, Broken, Refused, Samples, Told
 from gui.session.request import Request
-from gui.session.threads import RunThread
 from tactile_lab.acquisition import events
 from tactile_lab.quantity import show
 
@@ -28,10 +28,11 @@ class Monitor:
         problem: why watching ended by itself, "" if it did not.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, link: Link) -> None:
+        self._link = link
         self.source: LiveSource | None = None
         self.problem = ""
-        self._thread: RunThread | None = None
+        self._run: RunAfar | None = None
         self._inbox: SimpleQueue[Told] = SimpleQueue()
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._critical = float("nan")
@@ -39,7 +40,7 @@ class Monitor:
     @property
     def alive(self) -> bool:
         """Whether instruments may still be open."""
-        return self._thread is not None and self._thread.alive
+        return self._run is not None and self._run.alive
 
     def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Watch the sensor on a bench ("sim" or a bench file)."""
@@ -50,13 +51,12 @@ class Monitor:
         )
         self._inbox = SimpleQueue()
         out = Path(self._folder.name)
-        self._thread = RunThread(request, out, self._inbox, {}, report=False)
-        self._thread.start()
+        self._run = self._link.run(request, out, self._inbox, report=False)
 
     def stop(self) -> None:
         """Let go of the instruments; returns at once."""
-        if self._thread is not None:
-            self._thread.stop("monitor off")
+        if self._run is not None:
+            self._run.stop("monitor off")
 
     def poll(self) -> LiveSource | None:
         """Take what is new; the source if it has just begun."""
@@ -67,25 +67,24 @@ class Monitor:
             except Empty:
                 break
             match told:
-                case Begun(execution=execution):
-                    scene = execution.scene
-                    self._critical = scene.circuit.critical_V_C1
-                    gain = scene.bench.magnet.newtons_per_ampere
-                    begun = self.source = LiveSource(execution.live, None, gain)
+                case Begun(newtons_per_ampere=gain, critical_V_C1=critical):
+                    self._critical = critical
+                    begun = self.source = LiveSource(None, gain)
+                case Samples(bins=bins):
+                    if self.source is not None:
+                        self.source.add_bins(bins)
                 case events.SpikesSeen(times=times):
                     if self.source is not None:
                         self.source.add_spikes(times)
                 case Refused(fault=fault) | Broken(fault=fault):
                     self.problem = f"{fault.title} {fault.consequence}"
-        if self._thread is not None and not self._thread.alive:
+        if self._run is not None and not self._run.alive:
             if self.source is not None:
                 self.source.running = False
             if self._folder is not None:
                 self._folder.cleanup()
                 self._folder = None
-            self._thread = None
-        if self.source is not None:
-            self.source.poll()
+            self._run = None
         return begun
 
     def words(self) -> str:

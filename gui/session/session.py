@@ -1,34 +1,28 @@
 """The one state machine behind the window. It decides nothing about instruments.
 
-Background threads put what they have to tell into one queue; the window's timer calls
-`poll`, which takes it all and moves the state. Nothing here blocks.
+The engine, a process of its own, does. What it tells is put into one queue; the
+window's timer calls `poll`, which takes it all and moves the state. Nothing blocks.
 """
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from gui.lanes.decimate import FloatArray
 from gui.session import chips
+from gui.session.commands import CheckBench, MakePlan, MakeTwin
 from gui.session.core import Core, Queued
+from gui.session.field import read_in_background
 from gui.session.incoming import Incoming
 from gui.session.messages import Level
 from gui.session.request import Request, bench_request
-from gui.session.threads import (
-    check_in_background,
-    plan_in_background,
-    read_field_in_background,
-)
 from gui.state import Fault, Snapshot, State
 from tactile_lab.acquisition.by_hand import ManualCoil
-from tactile_lab.bench import OffReport
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import check_scope, open_bench
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
-
-if TYPE_CHECKING:
-    from tactile_lab.acquisition.execution import Execution
 
 __all__ = ["Core", "Queued", "Session"]
 
@@ -54,7 +48,7 @@ class Session(Incoming):
         self.bench = None
         self._enter(State.CONNECTING)
         self.log(Level.INFO, "bench", f"Asking the instruments of {self.spec.name}")
-        check_in_background(self._check_request, self.inbox)
+        self.link.ask(CheckBench(self._check_request))
 
     def disconnect_bench(self) -> None:
         """Let go of the bench."""
@@ -66,7 +60,11 @@ class Session(Incoming):
     def plan(self, request: Request) -> None:
         """Have `request` planned; `planned` tells the result."""
         self._serial += 1
-        plan_in_background(self._serial, request, self.inbox)
+        self.link.ask(MakePlan(self._serial, request))
+
+    def make_twin(self, folder: Path, current: FloatArray, length: float) -> None:
+        """Have the twin of a run on disk computed; `twinned` tells the result."""
+        self.link.ask(MakeTwin(folder, current, length))
 
     def stop(self, reason: str = "STOP in the window") -> None:
         """Coil off, now. Reaches the coil's thread directly and never waits."""
@@ -84,7 +82,7 @@ class Session(Incoming):
         elif self.state is State.READY and self._check_request is not None:
             self.log(Level.INFO, "safety", "Coil off sent again", safety=True)
             self._enter(State.CONNECTING)
-            check_in_background(self._check_request, self.inbox)
+            self.link.ask(CheckBench(self._check_request))
 
     def acknowledge(self) -> None:
         """The user has read the fault."""
@@ -97,8 +95,9 @@ class Session(Incoming):
         """The person has done what the run waits for."""
         if self.errand is not None:
             self.log(Level.INFO, "runner", f"Done: {self.errand.text}")
-            self.errand.done.set()
             self.errand = None
+            if self._run is not None:
+                self._run.errand_done()
             self.changed.emit()
 
     def begin_manual(self) -> None:
@@ -132,7 +131,7 @@ class Session(Incoming):
             return
         self.reading_field = True
         self.changed.emit()
-        read_field_in_background(bench, self.inbox)
+        read_in_background(bench, self.inbox)
 
     def set_inputs(self, channels: str) -> str:
         """Set the scope's inputs for all that follows; why not, "" if it went well.
@@ -170,8 +169,8 @@ class Session(Incoming):
         """A note of the user, stamped with wall-clock and run time."""
         at = f" (at {self.elapsed:.1f} s)" if self.state is State.RUNNING else ""
         self.log(Level.NOTE, "note", text + at)
-        if self._run is not None and self._run.alive and self._run.execution:
-            self._run.execution.folder.log("note", text, time_s=self.elapsed)
+        if self._run is not None and self._run.alive:
+            self._run.note(text, self.elapsed)
 
     # --- what the window shows
 
@@ -180,18 +179,6 @@ class Session(Incoming):
         """Whether closing needs a question first."""
         live = self._run is not None and self._run.alive
         return live or self.manual is not None
-
-    @property
-    def execution(self) -> Execution | None:
-        """The run in progress."""
-        return None if self._run is None else self._run.execution
-
-    @property
-    def off_report(self) -> OffReport | None:
-        """How the coil was left when the last run or manual control ended."""
-        if self.manual is not None:
-            return self.manual.off
-        return self.execution.coil_state.off if self.execution else None
 
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""
@@ -221,3 +208,7 @@ class Session(Incoming):
         if self.manual is not None:
             self.manual.thread.join(max(0.0, until - time.monotonic()))
         return not self.busy
+
+    def close(self) -> None:
+        """Let go of the engine; nothing drives a coil any more."""
+        self.link.close()

@@ -64,6 +64,11 @@ class Live:
         """Bins written so far; grows by one per bin and never falls."""
         return self._written
 
+    @property
+    def reach(self) -> float:
+        """Run time up to which there are bins, s; 0 before any."""
+        return self._next_time
+
     def begin(self, stream: Stream, start: float) -> None:
         """Start a segment whose first sample is at `start` s on the run's axis."""
         with self._lock:

@@ -114,7 +114,7 @@ def opened(
     (folder / "short.toml").write_text(SCENE)
     theme = Theme("light")
     theme.apply()
-    session = Session(folder / "runs")
+    session = Session(folder / "runs", separate=False)
     session.reports = False
     window = Window(session, theme)
     window.show()

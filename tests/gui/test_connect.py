@@ -1,7 +1,6 @@
 """The connect dialog: discovery through the real look-up, a bench file that loads."""
 
 import json
-import threading
 import tomllib
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from gui.dialogs.bench_text import bench_text, save_bench, show_bench, start_cho
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import rows_of
 from gui.review.conclusion import conclusion_of
+from gui.session.link import RunAfar
 from gui.session.messages import Errand
 from gui.session.request import Request
 from gui.state import Fault, State
@@ -121,15 +121,19 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
 
 def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     window, session = lab.window, lab.session
-    errand = Errand("Put the probes on 0 V.", threading.Event())
+    done: list[bool] = []
+    run = RunAfar(session.link, 0, session.inbox)
+    run.errand_done = lambda: done.append(True)
+    session._run = run
     session._enter(State.RUNNING)
-    session.inbox.put(errand)
+    session.inbox.put(Errand("Put the probes on 0 V."))
     lab.until(window.errand.isVisible)
     assert "0 V" in window.errand.text.text()
     window.errand.done.click()
-    assert errand.done.is_set() and not window.errand.isVisible()
-    session.inbox.put(Errand("Put them on V_S.", threading.Event()))
+    assert done and not window.errand.isVisible()
+    session.inbox.put(Errand("Put them on V_S."))
     lab.until(window.errand.isVisible)
+    session._run = None
     session._enter(State.READY)
     assert not window.errand.isVisible(), "a run that ended waits for nobody"
 

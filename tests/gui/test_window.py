@@ -130,8 +130,8 @@ def test_queue_can_be_edited_while_running(lab) -> None:
     assert [item.title for item in session.queue] == ["three", "two"]
     assert window.setup.queue.isVisible()
     session.unqueue(1)
-    first = session.execution
-    lab.until(lambda: session.execution is not first and session.source is not None)
+    first = session.folder
+    lab.until(lambda: session.folder != first and session.source is not None)
     assert session.queue == []
 
 
@@ -175,7 +175,7 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
 def test_old_run_opens_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
     lab.complete_run()
-    folder = session.execution.folder.path
+    folder = session.folder
     live_spikes = session.source.spikes.copy()
     window.opening.open_run(folder)
     lab.until(lambda: window.opening.run is not None)

@@ -1,0 +1,102 @@
+"""What the window asks of the engine. Immutable; sent through one pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gui.session.request import Request
+
+
+@dataclass(frozen=True)
+class StartRun:
+    """Run a request.
+
+    Attributes:
+        run: number that tells this run's messages from others'.
+        request: what to run.
+        out: folder for run folders.
+        notes: kept with the run.
+        report: whether the report is written at its end.
+    """
+
+    run: int
+    request: Request
+    out: Path
+    notes: Mapping[str, str] = field(default_factory=dict)
+    report: bool = True
+
+
+@dataclass(frozen=True)
+class StopRun:
+    """Switch the coil off and end a run; why."""
+
+    run: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class TakeNote:
+    """Put a note of the user into a run's log, stamped with its time, s."""
+
+    run: int
+    text: str
+    time: float
+
+
+@dataclass(frozen=True)
+class ErrandDone:
+    """The person has done what a run waits for."""
+
+    run: int
+
+
+@dataclass(frozen=True)
+class MakePlan:
+    """Plan a request; `serial` comes back with the answer."""
+
+    serial: int
+    request: Request
+
+
+@dataclass(frozen=True)
+class CheckBench:
+    """Ask every instrument of a request's bench who it is; make the coil safe."""
+
+    request: Request
+
+
+@dataclass(frozen=True, eq=False)
+class MakeTwin:
+    """Compute the twin of a finished run.
+
+    Attributes:
+        folder: of the run.
+        current: shape (n, 2): time, s, and applied current, A.
+        length: of the run, s.
+    """
+
+    folder: Path
+    current: NDArray[np.float64]
+    length: float
+
+
+@dataclass(frozen=True)
+class Leave:
+    """The window closes: end all runs, then the process."""
+
+
+Command = (
+    StartRun
+    | StopRun
+    | TakeNote
+    | ErrandDone
+    | MakePlan
+    | CheckBench
+    | MakeTwin
+    | Leave
+)

@@ -1,0 +1,139 @@
+"""The engine: the process that drives benches and solves models for the window.
+
+In a process of its own nothing it does takes time from a frame, and a window that dies
+takes no run with it: when the pipe's other end is gone, each run is stopped, its coil
+verified off and its record completed, before the process ends.
+
+It knows no Qt. Commands come through one pipe and are never waited on: a STOP is read
+at once and goes straight to the coil's thread.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+
+from gui.session.checking import check_bench
+from gui.session.commands import (
+    CheckBench,
+    Command,
+    ErrandDone,
+    Leave,
+    MakePlan,
+    MakeTwin,
+    StartRun,
+    StopRun,
+    TakeNote,
+)
+from gui.session.messages import Planned, Told, Twins
+from gui.session.request import Request
+from gui.session.running import Running
+from gui.session.threads import start
+from tactile_lab.errors import TactileLabError
+
+LEAVE = 60.0
+"""Longest wait for runs to end after the window has gone, s."""
+
+
+class Engine:
+    """Serves one window through `pipe`."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._sending = threading.Lock()
+        self._runs: dict[int, Running] = {}
+
+    def serve(self) -> None:
+        """Do what is asked until the window has gone; then leave every coil off."""
+        try:
+            while not isinstance(command := self._pipe.recv(), Leave):
+                self._do(command)
+        except (EOFError, OSError):
+            pass
+        finally:
+            self._end()
+
+    def _end(self) -> None:
+        for run in self._runs.values():
+            run.stop("The window has gone")
+        for run in self._runs.values():
+            run.join(LEAVE)
+        self._pipe.close()
+
+    def _do(self, command: Command) -> None:
+        match command:
+            case StartRun(run=number):
+                self._runs = {n: r for n, r in self._runs.items() if r.alive}
+                self._runs[number] = Running(command, self._teller(number))
+                self._runs[number].start()
+            case StopRun(run=number, reason=reason):
+                if number in self._runs:
+                    self._runs[number].stop(reason)
+            case TakeNote(run=number, text=text, time=at):
+                if number in self._runs:
+                    self._runs[number].note(text, at)
+            case ErrandDone(run=number):
+                if number in self._runs:
+                    self._runs[number].errand_done()
+            case MakePlan(serial=serial, request=request):
+                start(lambda: self.tell(0, _planned(serial, request)), "plan")
+            case CheckBench(request=request):
+                start(lambda: self.tell(0, check_bench(request)), "check")
+            case MakeTwin():
+                start(lambda: self.tell(0, _twins(command)), "twin of a run")
+
+    def _teller(self, number: int) -> Callable[[Told], None]:
+        return lambda told: self.tell(number, told)
+
+    def tell(self, number: int, told: Told) -> None:
+        """Tell the window; run 0 is none. A window that has gone hears nothing."""
+        with self._sending:
+            try:
+                self._pipe.send((number, told))
+            except OSError:
+                pass  # `serve` sees the end of the pipe and stops every run
+
+
+def main(pipe: Connection) -> None:
+    """Serve in a process of its own.
+
+    Ctrl-C and a closed terminal reach the window too, which decides; SIGTERM ends as
+    the window's end does.
+    """
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave)
+    Engine(pipe).serve()
+
+
+def _leave(number: int, frame: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise EOFError
+
+
+def _planned(serial: int, request: Request) -> Planned:
+    from gui.session.expect import expect
+
+    found = None
+    try:
+        found, problem = expect(request.load()), ""
+    except (TactileLabError, OSError) as error:
+        problem = str(error)
+    except Exception as error:  # a protocol of the user's own may raise anything
+        problem = f"The plan broke: {type(error).__name__}: {error}"
+    return Planned(serial, request, found, problem)
+
+
+def _twins(asked: MakeTwin) -> Twins:
+    from gui.session.twin import twin_of
+
+    folder = asked.folder
+    try:
+        scene = Request(str(folder / "scene.toml"), (), None).load()
+        parts = twin_of(scene, asked.current, asked.length)
+    except (TactileLabError, OSError) as error:
+        return Twins(folder, (), f"No model beside {folder.name}: {error}")
+    return Twins(folder, tuple(parts), "")

@@ -1,0 +1,207 @@
+"""One run in the engine: executed, watched, and told to the window."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gui.session.commands import StartRun
+from gui.session.messages import (
+    Begun,
+    Broken,
+    Ended,
+    Errand,
+    Gone,
+    Refused,
+    Reported,
+    Samples,
+    Told,
+    Twinned,
+)
+from gui.session.threads import start
+from gui.state import Fault
+from tactile_lab.acquisition import events
+from tactile_lab.errors import TactileLabError
+
+if TYPE_CHECKING:
+    from gui.session.twin import LiveTwin
+    from tactile_lab.acquisition.execution import Executed, Execution
+
+EVERY = 0.02
+"""Seconds between two looks at the newest samples and at the coil."""
+
+TWINNED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
+"""Signals beside which the twin runs."""
+
+
+class Running:
+    """Executes one request; STOP reaches it from any thread without waiting.
+
+    Args:
+        asked: what to run.
+        tell: tells the window, from any thread.
+    """
+
+    def __init__(self, asked: StartRun, tell: Callable[[Told], None]) -> None:
+        self._asked, self._tell = asked, tell
+        self._execution: Execution | None = None
+        self._twin: LiveTwin | None = None
+        self._stop_asked: str | None = None
+        self._errand_done = threading.Event()
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Start the run."""
+        self._thread = start(self._main, "run")
+
+    def stop(self, reason: str) -> None:
+        """Switch the coil off and end the run; returns at once."""
+        with self._lock:
+            self._stop_asked = self._stop_asked or reason
+            execution = self._execution
+        if execution is not None:
+            execution.stop(reason)
+
+    def note(self, text: str, at: float) -> None:
+        """Put a note into the run's log, stamped with its time, s."""
+        if self._execution is not None and self.alive:
+            self._execution.folder.log("note", text, time_s=at)
+
+    def errand_done(self) -> None:
+        """The person has done what the run waits for."""
+        self._errand_done.set()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the run has not ended yet."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def join(self, timeout: float) -> None:
+        """Wait for the end, at most `timeout` s."""
+        if self._thread is not None:
+            self._thread.join(timeout)
+
+    def _main(self) -> None:
+        try:
+            execution = self._prepare()
+            if execution is not None:
+                self._run(execution)
+        finally:
+            self._tell(Gone())
+
+    def _prepare(self) -> Execution | None:
+        from tactile_lab.acquisition.execution import Execution
+
+        try:
+            execution = Execution(
+                self._asked.request.load(),
+                self._asked.out,
+                realtime=True,
+                emit=self._emit,
+                notes=self._asked.notes,
+                ask=self._ask,
+            )
+        except (TactileLabError, OSError) as error:
+            self._tell(Refused(Fault("The run was refused.", str(error))))
+            return None
+        except Exception as error:  # a protocol of the user's own may raise anything
+            text = f"{type(error).__name__}: {error}"
+            self._tell(Refused(Fault("The run broke before it began.", text)))
+            return None
+        with self._lock:
+            self._execution = execution
+            reason = self._stop_asked
+        if reason is not None:
+            execution.stop(reason)
+        return execution
+
+    def _run(self, execution: Execution) -> None:
+        scene, coil = execution.scene, execution.bench.coil
+        if TWINNED & set(scene.record.signals):
+            from gui.session.twin import LiveTwin
+
+            self._twin = LiveTwin(scene)
+        self._tell(
+            Begun(
+                limits=None if coil is None else coil.limits,
+                newtons_per_ampere=scene.bench.magnet.newtons_per_ampere,
+                critical_V_C1=scene.circuit.critical_V_C1,
+            )
+        )
+        ended = threading.Event()
+        watching = [start(lambda: self._watch(execution, ended), "watch")]
+        if self._twin is not None:
+            twin = self._twin
+            watching.append(start(lambda: self._follow(twin, execution, ended), "twin"))
+        try:
+            done: Executed | BaseException = execution.run()
+        except BaseException as error:
+            done = error
+        ended.set()
+        for thread in watching:
+            thread.join()
+        if isinstance(done, BaseException):
+            title = f"The run broke: {type(done).__name__}."
+            off = execution.coil_state.off
+            self._tell(Broken(Fault(title, str(done)), off))
+            return
+        # an error may hold anything; its words are in the ending's reason
+        self._tell(Ended(replace(done, ending=replace(done.ending, failure=None))))
+        if self._asked.report:
+            start(lambda: self._report(done.folder), "report")
+
+    def _emit(self, event: events.Event) -> None:
+        if self._twin is not None and isinstance(event, events.CoilCurrent):
+            sent = event.setpoint if event.measured is None else event.measured
+            self._twin.add(event.time, sent)
+        self._tell(event)
+
+    def _ask(self, text: str) -> None:
+        """Have the window ask a person; returns when it is done, or nobody cares."""
+        self._errand_done.clear()
+        self._tell(Errand(text))
+        while self.alive and not self._errand_done.wait(0.2):
+            pass
+
+    def _watch(self, execution: Execution, ended: threading.Event) -> None:
+        """Tell samples and the coil's state as they come, to the very last."""
+        live, seen, last, said = execution.live, 0, None, 0.0
+        while True:
+            over = ended.wait(EVERY)
+            written, coil = live.written, execution.coil_state
+            changed = coil != last or time.monotonic() - said > 0.2
+            if written != seen or changed:
+                first = seen if written >= seen else 0
+                bins = {}
+                if written != seen:
+                    bins = {s: live.since(first, s) for s in live.signals}
+                self._tell(Samples(bins, coil))
+                seen, last, said = written, coil, time.monotonic()
+            if over:
+                return
+
+    def _follow(
+        self, twin: LiveTwin, execution: Execution, ended: threading.Event
+    ) -> None:
+        """Advance the twin to where the samples are, slice by slice."""
+        from gui.session.twin import EVERY as SLICE
+
+        while not ended.wait(SLICE):
+            part = twin.until(execution.live.reach)
+            if part is not None:
+                self._tell(Twinned(part))
+
+    def _report(self, folder: Path) -> None:
+        from gui.session.reports import write_report
+
+        try:
+            write_report(folder)
+        except (TactileLabError, OSError, ValueError) as error:
+            self._tell(Reported(folder, str(error)))
+        else:
+            self._tell(Reported(folder, ""))
