@@ -7,12 +7,15 @@ state of the coil.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
+from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
@@ -35,6 +38,11 @@ PULSE = 0.25
 
 GRACE = 2.0
 """Seconds samples may be late at the end of a trial before the scope is given up."""
+
+LATE = 0.75
+"""Part of a hold after which a person's reading is taken to be made."""
+
+T = TypeVar("T")
 
 
 class StopAskedError(Exception):
@@ -140,7 +148,9 @@ class Runner:
         drift = self._drifted(rest)
         begin, start = self._begin(index, trial)
         end = begin + trial.length
-        skipped = self._play_current(trial, begin, end)
+        asked = self._task.asked_field if trial.hold is not None else None
+        # a current that waits for a person is watched as long as that takes
+        skipped = self._play_current(trial, begin, math.inf if asked else end)
         scope = self.instruments.scope
         if scope is None:
             self._rest_until(end)
@@ -154,6 +164,8 @@ class Runner:
                     f"behind at the end of a trial (limit {GRACE:g} s). Lower the "
                     "sample rate or use a faster USB port."
                 )
+        if asked is not None:
+            self._ask_field(asked, trial, start)
         coil = self.instruments.coil
         self._note_edges(start)
         spikes = self.intake.spikes_between(start, start + trial.length)
@@ -168,6 +180,26 @@ class Runner:
             skipped=0 if coil is None else coil.skipped - skipped,
             drift=drift,
         )
+
+    def _errand(self, work: Callable[[], T]) -> T:
+        """What a person comes back with; simulated time stands still meanwhile."""
+        errand = Errand(work)
+        if not self._clock.simulated:
+            self._serve(lambda: errand.ended)
+        while not errand.ended_within(PULSE):
+            if self._stop.requested:
+                raise StopAskedError
+        return errand.result()
+
+    def _ask_field(self, asked: AskedField, trial: Trial, start: float) -> None:
+        """Have a person read the field of the trial that began at `start` s."""
+        coil = self.instruments.coil
+        current = 0.0 if coil is None or coil.last is None else coil.last.setpoint
+        field, doubt = self._errand(lambda: asked.read(current))
+        if doubt is not None:
+            self._account.warn(doubt)
+        held_from, held_to = trial.hold or (0.0, trial.length)
+        self._account.field(start + held_from + LATE * (held_to - held_from), field)
 
     def _drifted(self, rest: dict[str, float]) -> float | None:
         """Drift of V_C1 at rest, V; None where it is not measured or does not matter.
@@ -204,9 +236,8 @@ class Runner:
         if self._place_probes is not None:
             self._place_probes(where)
         elif self._task.ask is not None:
-            errand = Errand(self._task.ask, PLACES[where])
-            self._serve(lambda: errand.ended)
-            errand.check()
+            ask = self._task.ask
+            self._errand(lambda: ask(PLACES[where]))
         else:
             raise RefusedError(f"Nobody is there to ask: {PLACES[where]}")
         self._probes = where

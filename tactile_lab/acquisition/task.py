@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.person import Ask
@@ -30,6 +31,7 @@ class Task:
         doubts: told the opened instruments' settings, says what a person should know
             before the coil is switched on, or raises to prevent it.
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
+        asked_field: has a person read the field; None where a meter does, or nobody.
     """
 
     trials: Callable[[], Trials]
@@ -41,6 +43,7 @@ class Task:
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
     drift: Drift | None = None
     ask: Ask | None = None
+    asked_field: AskedField | None = None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactile_lab.commands.read_off import readings
 from tactile_lab.commands.terminal import (
     Progress,
     fail,
@@ -71,6 +72,12 @@ SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     metavar="RUN",
     help="Repeat the run in folder RUN and say what differs.",
 )
+@click.option(
+    "--field",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="What a manual teslameter showed at each hold, one a line, mT or with unit.",
+)
 @click.option("--no-report", is_flag=True, help="Leave out figure and report.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 def command(
@@ -83,6 +90,7 @@ def command(
     temperature: str | None,
     transcripts: Path | None,
     again: Path | None,
+    field: Path | None,
     no_report: bool,
     as_json: bool,
 ) -> None:
@@ -107,6 +115,7 @@ def command(
             emit=narrator,
             notes=_notes(notes),
             ask=somebody(),
+            field=None if field is None else readings(field, loaded),
         )
         if transcripts is not None:
             record(execution.bench, transcripts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -70,15 +71,18 @@ def print_json(data: Mapping[str, Any]) -> None:
     click.echo(json.dumps(data, allow_nan=False))
 
 
-def somebody() -> Callable[[str], None] | None:
-    """Asks the person at the terminal to do something; None where none sits there."""
+def somebody() -> Callable[[str], str] | None:
+    """Asks the person at the terminal for something; None where none sits there."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return None
 
-    def ask(text: str) -> None:
+    def ask(text: str) -> str:
         click.echo(f"\n{text} Then press Enter.", err=True)
-        if not sys.stdin.readline():
+        # not readline: a thread left waiting in it would crash Python's exit
+        typed = os.read(sys.stdin.fileno(), 4096)
+        if not typed:
             raise EOFError("the terminal was closed")
+        return typed.decode(errors="replace").strip()
 
     return ask
 

@@ -12,9 +12,11 @@ def asked_signals(scene: Scene) -> frozenset[str]:
 
 
 def _at_hand(scene: Scene, signal: str) -> bool:
-    """Whether the bench measures that signal."""
+    """Whether the bench measures that signal without being asked twice."""
     bench = scene.bench
     wired = bench.scope is not None and signal in {
         channel.signal for channel in bench.scope.channels
     }
-    return wired or (signal == "field" and bench.field_meter is not None)
+    meter = bench.field_meter
+    by_itself = meter is not None and meter.driver != "manual"
+    return wired or (signal == "field" and by_itself)

@@ -34,6 +34,7 @@ class Needs:
     Attributes:
         coil: whether the current source is opened: not where no trial asks for force.
         field_meter: whether the teslameter is opened.
+        asked_field: whether a person is asked for the field at each hold.
         channels: scope channels to enable, in the bench's order; none: no scope.
         stored: signals of those that are stored sample by sample.
         detect_on: signal spikes are detected on ("V_K", or "V_C2" by its resets where
@@ -46,6 +47,7 @@ class Needs:
 
     coil: bool
     field_meter: bool
+    asked_field: bool
     channels: tuple[Channel, ...]
     stored: tuple[str, ...]
     detect_on: str | None
@@ -104,9 +106,13 @@ def needs(scene: Scene) -> Needs:
                 "neither spikes nor rate."
             )
     recorded = set(scene.record.signals)
+    metered = "field" in asked and "field" not in wired
+    meter = scene.bench.field_meter
+    by_hand = meter is not None and meter.driver == "manual"
     return Needs(
         coil=timeline(scene, through_coil=True).drives,
-        field_meter="field" in asked and "field" not in wired,
+        field_meter=metered and not by_hand,
+        asked_field=metered and by_hand,
         channels=channels,
         stored=tuple(
             name

@@ -37,6 +37,8 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
         found.append((f"channel {channel.input}: {name}", why))
     if needed.field_meter and bench.field_meter is not None:
         found.append(("teslameter", f"{bench.field_meter.dialect} reads the field"))
+    if needed.asked_field:
+        found.append(("a person", "reads the teslameter at each hold"))
     for name in scene.record.signals:
         if name in needed.model:
             found.append(
@@ -64,7 +66,9 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
     if not needed.channels:
         found.append(("scope", "no recorded signal comes from it"))
     enabled = {channel.signal for channel in needed.channels}
-    if not needed.field_meter:
+    if needed.asked_field:
+        found.append(("port of a teslameter", "a person reads it"))
+    elif not needed.field_meter:
         why = "a scope channel has the field" if AVERAGED in enabled else NOT_RECORDED
         found.append(("teslameter", why))
     for channel in bench.scope.channels if bench.scope is not None else ():

@@ -27,6 +27,9 @@ BRANCHES: dict[str, Literal["rising", "falling", "again"]] = {
     "rising": "rising", "falling": "falling", "again": "again",
 }  # fmt: skip
 
+HALF_A_DIGIT = 5e-6
+"""Error of a field read off a display that shows 0.01 mT, T."""
+
 
 def calibrate_field(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """Slope, loop and uncertainty of B2(I)."""
@@ -107,10 +110,12 @@ def field_steps(run: RunData, trials: Sequence[TrialData]) -> list[FieldStep]:
         time, value = run.field.T
         readings = value[(time >= start) & (time <= end)]
         before = run.current[:, 0] <= end
-        if readings.size < 2 or not before.any():
+        if not readings.size or not before.any():
             continue
         applied = float(run.current[before][-1, 1])
-        error = float(readings.std(ddof=1) / np.sqrt(readings.size))
+        error = HALF_A_DIGIT
+        if readings.size > 1:
+            error = float(readings.std(ddof=1) / np.sqrt(readings.size))
         steps.append(
             FieldStep(
                 branch=branch,

@@ -197,12 +197,14 @@ class FieldMeterSpec(Table):
     """``[field_meter]``: the teslameter.
 
     Attributes:
+        driver: "serial", or "manual": a person is asked what it shows.
         dialect: id of a row in drivers/dialects, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
         interval: time between two readings, s.
     """
 
+    driver: Literal["serial", "manual"] = "serial"
     dialect: str = "lakeshore-425"
     port: str = "sim://field_meter"
     baud: int | None = Field(default=None, ge=50, le=4_000_000)
@@ -259,6 +261,8 @@ class BenchTable(Table):
     def _reachable(self) -> BenchTable:
         for name in ("coil", "field_meter"):
             spec = getattr(self, name)
+            if getattr(spec, "driver", "") == "manual":
+                continue
             if spec is not None and not self.simulated and spec.port.startswith("sim:"):
                 raise ValueError(
                     f"[{name}] port is missing: real instruments need one, such as "

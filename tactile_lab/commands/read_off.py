@@ -1,0 +1,57 @@
+"""Readings of a teslameter that a person wrote into a file, instead of being asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactile_lab.errors import QuantityError, SceneError
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.person import Ask
+    from tactile_lab.scene.scene import Scene
+
+
+def readings(path: Path, scene: Scene) -> Ask:
+    """Answers with one line of the file after another.
+
+    Args:
+        path: one reading a line, mT or with a unit; empty lines and `#` count for
+            nothing.
+        scene: asks for one reading at each hold.
+
+    Raises:
+        SceneError: the file cannot be read, a line is no field, or there are not as
+            many as holds are planned, or nobody is to read the field.
+    """
+    from tactile_lab.acquisition.asked_field import read_off
+    from tactile_lab.plan.needs import needs
+    from tactile_lab.plan.timeline import timeline
+
+    if not needs(scene).asked_field:
+        raise SceneError(
+            f"--field {path}: {scene.name} has nobody read the field. Give the bench a "
+            'teslameter with [field_meter] driver = "manual", or leave --field out.'
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise SceneError(f"Readings {path} cannot be read: {reason}.") from reason
+    lines = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not (told := line.partition("#")[0].strip()):
+            continue
+        try:
+            read_off(told)
+        except QuantityError as reason:
+            raise SceneError(f"{path}, line {number}: {reason}") from reason
+        lines.append(told)
+    steps = timeline(scene, through_coil=True).steps
+    holds = sum(1 for s in steps if s.trial.hold is not None and not s.trial.pause)
+    if len(lines) != holds:
+        raise SceneError(
+            f"{path} has {len(lines)} readings; {scene.name} asks for {holds}, one at "
+            "each hold."
+        )
+    answers = iter(lines)
+    return lambda _: next(answers)
