@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tactile_lab.acquisition.person import Ask
+from tactile_lab.acquisition.person import Question
 from tactile_lab.errors import QuantityError, RefusedError
 from tactile_lab.quantity import parse, show
 
@@ -32,7 +32,7 @@ class AskedField:
     """
 
     def __init__(
-        self, ask: Ask, expected: Callable[[float], float], *, patient: bool = True
+        self, ask: Question, expected: Callable[[float], float], *, patient: bool = True
     ) -> None:
         self._ask = ask
         self._expected = expected

@@ -102,7 +102,7 @@ class Execution:
         notes: kept with the run (operator, sample, ...).
         ask: asks a person to do something at a real bench and returns when it is done;
             called in a thread of its own.
-        field: what was read off a teslameter, answer by answer; asked for unless given.
+        asked_field: has a person read the teslameter, where the bench says so.
 
     Raises:
         SceneError, LimitError: the scene cannot be run on its bench.
@@ -119,14 +119,14 @@ class Execution:
         emit: events.Emit = events.ignore,
         notes: Mapping[str, str] | None = None,
         ask: Ask | None = None,
-        field: Ask | None = None,
+        asked_field: AskedField | None = None,
     ) -> None:
         self.scene = scene
         self.plan = plan(scene, preview=False)
         self.needs = self.plan.needs
         self.bench = bench or open_bench(scene, realtime=realtime)
         self._ask = ask
-        self._field = field
+        self._asked_field = asked_field
         self._check_somebody_is_there()
         self.stop = StopRequest(self.bench.clock)
         self._emit = emit
@@ -252,18 +252,7 @@ class Execution:
             doubts=self._doubts,
             drift=self._drift(),
             ask=self._ask,
-            asked_field=self._asked_field(),
-        )
-
-    def _asked_field(self) -> AskedField | None:
-        ask = self._field or self._ask
-        if not self.needs.asked_field or ask is None:
-            return None
-        magnet = self.scene.bench.magnet
-        return AskedField(
-            ask,
-            lambda current: float(magnet.field(current)),
-            patient=self._field is None,
+            asked_field=self._asked_field if needed.asked_field else None,
         )
 
     def _check_somebody_is_there(self) -> None:
@@ -273,7 +262,7 @@ class Execution:
                 f"{self.scene.name} needs a person who puts the probes on 0 V and V_S. "
                 "Run it in a terminal, or set protocol.calibrate = false."
             )
-        if self.needs.asked_field and self._ask is None and self._field is None:
+        if self.needs.asked_field and self._asked_field is None:
             raise SceneError(
                 f"{self.scene.name} has a person read the teslameter, and nobody is "
                 "there to be asked. Run it in a terminal, or give the readings with "

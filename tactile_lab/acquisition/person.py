@@ -14,8 +14,11 @@ PLACES = {
     "circuit": "Put the probes of V_C1, V_C2 and V_K back on their nodes.",
 }
 
-Ask = Callable[[str], str]
-"""Tells a person what to do and returns what was typed; raises if it is not done."""
+Ask = Callable[[str], object]
+"""Tells a person what to do and returns when it is done; raises if it will not be."""
+
+Question = Callable[[str], str]
+"""Asks a person and returns what was typed; raises if nothing will be."""
 
 T = TypeVar("T")
 

@@ -1,4 +1,4 @@
-"""Readings of a teslameter that a person wrote into a file, instead of being asked."""
+"""Who reads the teslameter for `run`: the person at the terminal, or a file of his."""
 
 from __future__ import annotations
 
@@ -8,11 +8,36 @@ from typing import TYPE_CHECKING
 from tactile_lab.errors import QuantityError, SceneError
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.person import Ask
+    from tactile_lab.acquisition.asked_field import AskedField
+    from tactile_lab.acquisition.person import Question
     from tactile_lab.scene.scene import Scene
 
 
-def readings(path: Path, scene: Scene) -> Ask:
+def field_reader(
+    scene: Scene, person: Question | None, path: Path | None
+) -> AskedField | None:
+    """Whoever tells what the teslameter shows; None where nobody does.
+
+    Args:
+        scene: its bench says what is expected.
+        person: at the terminal.
+        path: of a file with the readings.
+
+    Raises:
+        SceneError: the file does not fit the scene.
+    """
+    from tactile_lab.acquisition.asked_field import AskedField
+
+    ask = person if path is None else readings(path, scene)
+    if ask is None:
+        return None
+    magnet = scene.bench.magnet
+    return AskedField(
+        ask, lambda current: float(magnet.field(current)), patient=path is None
+    )
+
+
+def readings(path: Path, scene: Scene) -> Question:
     """Answers with one line of the file after another.
 
     Args:

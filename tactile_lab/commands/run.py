@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.read_off import readings
+from tactile_lab.commands.read_off import field_reader
 from tactile_lab.commands.terminal import (
     Progress,
     fail,
@@ -107,15 +107,15 @@ def command(
         if temperature is not None:
             overrides = (*overrides, f"conditions.temperature={temperature}")
         loaded = _scene(scene, overrides, bench, again)
-        narrator = Narrator(loaded.name)
+        narrator, person = Narrator(loaded.name), somebody()
         execution = Execution(
             loaded,
             out,
             realtime=realtime,
             emit=narrator,
             notes=_notes(notes),
-            ask=somebody(),
-            field=None if field is None else readings(field, loaded),
+            ask=person,
+            asked_field=field_reader(loaded, person, field),
         )
         if transcripts is not None:
             record(execution.bench, transcripts)

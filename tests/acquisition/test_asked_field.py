@@ -5,7 +5,7 @@ import pytest
 from tactile_lab.acquisition.asked_field import AskedField, read_off
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
-from tactile_lab.commands.read_off import readings
+from tactile_lab.commands.read_off import field_reader, readings
 from tactile_lab.errors import QuantityError, RefusedError, SceneError
 from tactile_lab.plan.needs import needs
 from tactile_lab.report.findings import find
@@ -47,11 +47,9 @@ class Person:
 def test_a_calibration_from_what_is_read_off(tmp_path, given):
     loaded, person = scene(tmp_path), Person(*SHOWN)
     (tmp_path / "shown.txt").write_text("# mT\n\n" + "\n".join(SHOWN))
-    if given == "in a file":
-        how = {"field": readings(tmp_path / "shown.txt", loaded)}
-    else:
-        how = {"ask": person}
-    done = Execution(loaded, tmp_path / "runs", **how).run()
+    file = tmp_path / "shown.txt" if given == "in a file" else None
+    reader = field_reader(loaded, person, file)
+    done = Execution(loaded, tmp_path / "runs", asked_field=reader).run()
     assert done.ending.state is RunState.COMPLETE, done.ending.reason
     assert done.ending.off.verified
     with Run.load(done.folder) as run:
@@ -65,7 +63,7 @@ def test_a_calibration_from_what_is_read_off(tmp_path, given):
 
 def test_nobody_to_ask_is_refused_before_anything_is_made(tmp_path):
     with pytest.raises(SceneError, match="--field FILE"):
-        Execution(scene(tmp_path), tmp_path / "runs")
+        Execution(scene(tmp_path), tmp_path / "runs", ask=print)
     assert not (tmp_path / "runs").exists()
 
 
@@ -73,7 +71,9 @@ def test_a_person_who_leaves_ends_the_run_safely(tmp_path):
     def gone(_):
         raise EOFError("the terminal was closed")
 
-    done = Execution(scene(tmp_path), tmp_path / "runs", ask=gone).run()
+    loaded = scene(tmp_path)
+    reader = field_reader(loaded, gone, None)
+    done = Execution(loaded, tmp_path / "runs", asked_field=reader).run()
     assert done.ending.exit_code == 3
     assert "the terminal was closed" in done.ending.reason
 
