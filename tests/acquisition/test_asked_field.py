@@ -24,8 +24,12 @@ driver = "manual"
 r = "6 mm"
 """
 SHORT = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
-CURRENTS = (1.0, 0.5, 0.0, -0.5, -1.0, -1.0, -0.5, 0.0, 0.5, 1.0)
-SHOWN = [f"{10.8 * i + (0.5 if k < 5 else -0.5):.2f}" for k, i in enumerate(CURRENTS)]
+FALLING = (1.0, 0.5, 0.0, -0.5, -1.0)
+SHOWN = [
+    *(f"{10.8 * i + 0.5:.2f}" for i in FALLING),
+    *(f"{10.8 * i - 0.5:.2f}" for i in reversed(FALLING)),
+    *(f"{10.8 * i + 0.5:.2f}" for i in FALLING[:3]),  # again, for drift
+]
 
 
 def scene(folder, overrides=SHORT):
@@ -58,7 +62,7 @@ def test_a_calibration_from_what_is_read_off(tmp_path, given):
     assert "10.8 mT/A" in told and "500 µT" in told
     if given == "by a person":
         assert "shows at 1 A, in mT" in person.asked[0]
-        assert len(person.asked) == 10
+        assert len(person.asked) == 13
 
 
 def test_nobody_to_ask_is_refused_before_anything_is_made(tmp_path):
@@ -90,10 +94,10 @@ def test_only_a_scene_that_records_the_field_asks(tmp_path):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("1\n2\n", "2 readings.*asks for 10"),
-        ("\n".join([*SHOWN[:9], "x"]), "line 10"),
-        ("\n".join([*SHOWN[:9], "10.8 A"]), "line 10"),
-        ("\n".join([*SHOWN[:9], "10.8 T"]), "line 10.*more than"),
+        ("1\n2\n", "2 readings.*asks for 13"),
+        ("\n".join([*SHOWN[:12], "x"]), "line 13"),
+        ("\n".join([*SHOWN[:12], "10.8 A"]), "line 13"),
+        ("\n".join([*SHOWN[:12], "10.8 T"]), "line 13.*more than"),
     ],
 )
 def test_a_file_that_does_not_fit_is_refused(tmp_path, text, why):
