@@ -12,8 +12,9 @@ from gui.comparing import compare, show_comparison
 from gui.lanes.compare import Comparison
 from gui.lanes.decimate import FloatArray
 from gui.lanes.expected import PlanSource
-from gui.lanes.source import LiveSource
+from gui.lanes.source import LiveSource, Source
 from gui.review.finding import Finding, facts_of, of_outcome, of_run
+from gui.review.fitting import Fitting
 from gui.review.runs import Entry, entries
 from gui.session.messages import Level, Planned, Twins
 from gui.session.request import Request
@@ -48,6 +49,9 @@ class Opening(QObject):
         self.ending = ""
         self.findings: list[Finding] = []
         self._folder: Path | None = None
+        self._fitting = Fitting(self)
+        self._fitting.fitted.connect(window.review.results.show_fit)
+        self._tracks: object = None
         self.loaded.connect(self._show_run)
         self.failed.connect(self.say)
         self.listed.connect(self._list)
@@ -152,9 +156,13 @@ class Opening(QObject):
         window.centre.tools.widths.choose(1)
         if not window.session.monitor.alive:
             self.findings, self.ending = [], ""
+            self._fit(None)
             window.review.results.show_facts("", report=False)
             self._show_findings(running=True)
         window.render_state()
+
+    def _fit(self, source: Source | None) -> None:
+        self._fitting.ask(self.findings, source)
 
     def _show_loop(self, loop: FloatArray) -> None:
         self._window.review.results.show_loop(loop)
@@ -165,6 +173,7 @@ class Opening(QObject):
         if found is not None:
             self.findings.append(found)
         self._show_findings(running=True)
+        self._fit(self._window.session.source)
         if self._window.session.source is not None:
             self._show_loop(self._window.session.source.loop)
 
@@ -176,6 +185,7 @@ class Opening(QObject):
         if source is not None:
             self._window.centre.view.set_now(source.reach, source.length)
         self._show_findings(running=False)
+        self._fit(source)
         lost = done.loss.get("samples")
         said = done.ending.off.text.partition(" | ")[0]
         facts = [f"<b>{done.folder.name}</b>", said]
@@ -187,8 +197,9 @@ class Opening(QObject):
         self.list_runs()
 
     def reported(self, folder: Path) -> None:
-        """A report exists."""
+        """A report exists, and the twin has come to the end."""
         if folder == self._folder:
+            self._fit(self.run or self._window.session.source)
             self._window.review.results.report.setVisible(
                 (folder / "report.html").exists()
             )
@@ -206,6 +217,9 @@ class Opening(QObject):
     def take_fetched(self) -> None:
         """Repaint where samples of a run on disk have been read."""
         if self.run is not None and self.run.take_fetched():
+            if self.run.tracks is not self._tracks:
+                self._tracks = self.run.tracks
+                self._fit(self.run)
             self._window.show_lanes()
             self._window.centre.stack.refresh()
             self._window.centre.stack.show_values()
@@ -258,6 +272,7 @@ class Opening(QObject):
     def _results_of(self, source: RunSource) -> None:
         self.findings = of_run(source)
         self._show_findings(running=False)
+        self._fit(source)
         self._show_loop(source.loop)
         report = (source.path / "report.html").exists()
         self._window.review.results.show_facts(facts_of(source), report=report)

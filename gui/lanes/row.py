@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 
 from gui.lanes.axis import number
 from gui.lanes.compare import Comparison
-from gui.lanes.decimate import Drawn
+from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.derive import rate_of
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.lane import Kind, Lane
@@ -178,6 +178,11 @@ class LaneRow(QFrame):
         if self._value.text() != text:
             self._value.setText(text)
             self._value.setAccessibleName(f"{self.lane.plain} {text} {self.lane.unit}")
+        if self.lane.kind is Kind.RASTER and self._view.cursors is None:
+            words = interval_text(source.spikes, source.reach)
+            self._at_cursors.setVisible(bool(words) and self.height() >= 44)
+            if self._at_cursors.text() != words:
+                self._at_cursors.setText(words)
 
     def value_of(self, source: Source) -> float | None:
         """The newest value in shown units; None without data."""
@@ -200,7 +205,7 @@ class LaneRow(QFrame):
         """Values at A and B and their difference, as text."""
         cursors = self._view.cursors
         if cursors is None or self.height() < 66:
-            self._at_cursors.hide()
+            self._at_cursors.setVisible(self.lane.kind is Kind.RASTER)
             return
         tokens = self._theme.tokens
         if self.lane.kind is Kind.RASTER:
@@ -257,6 +262,16 @@ class LaneRow(QFrame):
         picture.setDevicePixelRatio(2)
         self._swatch.setPixmap(picture)
         self.plot.update()
+
+
+def interval_text(spikes: FloatArray, now: float) -> str:
+    """The last interval and, where it has been silent for longer, since when."""
+    if spikes.size < 2:
+        return ""
+    last = float(spikes[-1] - spikes[-2])
+    words = f"ISI {number(1e3 * last, 1)} ms"
+    silent = now - float(spikes[-1])
+    return f"{words} · silent {silent:.1f} s" if silent > 2 * last else words
 
 
 def _at(drawn: Drawn, time: float) -> float | None:

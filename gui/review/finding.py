@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Finding:
     """What one step gave.
 
@@ -28,6 +28,9 @@ class Finding:
         latency: from onset to the first spike, s.
         peak_rate, final_rate: Hz.
         fall: part by which the rate fell during the hold.
+        times: of its spikes, s from the step's start.
+        hold: (start, end) of the constant force, s from the step's start.
+        start, end: of the step on the run's time axis, s.
     """
 
     label: str
@@ -37,6 +40,10 @@ class Finding:
     peak_rate: float | None
     final_rate: float | None
     fall: float | None
+    times: NDArray[np.float64]
+    hold: tuple[float, float] | None
+    start: float
+    end: float
 
     def cells(self) -> tuple[str, ...]:
         """One row of the table."""
@@ -55,7 +62,10 @@ def of_outcome(outcome: Outcome) -> Finding | None:
     trial = outcome.trial
     if trial.pause:
         return None
-    return finding(trial.label, trial.level, outcome.spike_times, trial.hold)
+    end = outcome.start + trial.length
+    return finding(
+        trial.label, trial.level, outcome.spike_times, trial.hold, outcome.start, end
+    )
 
 
 def finding(
@@ -63,8 +73,10 @@ def finding(
     level: float | None,
     spikes: NDArray[np.float64],
     hold: tuple[float, float] | None,
+    start: float,
+    end: float,
 ) -> Finding:
-    """What spikes (s from the step's start) say."""
+    """What spikes (s from the step's start) say; `start`, `end`: of the step, s."""
     response = respond(spikes, hold=hold)
     return Finding(
         label,
@@ -74,6 +86,10 @@ def finding(
         response.peak_rate,
         response.final_rate,
         response.fall,
+        spikes,
+        hold,
+        start,
+        end,
     )
 
 
@@ -92,6 +108,8 @@ def of_run(source: RunSource) -> list[Finding]:
                 level if level == level else None,
                 source.spikes[inside] - hold.start,
                 span if span[0] == span[0] else None,
+                hold.start,
+                hold.end,
             )
         )
     return found

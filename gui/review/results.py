@@ -23,8 +23,10 @@ from gui.lanes.decimate import FloatArray
 from gui.lanes.paint import Frame
 from gui.look.fonts import sized
 from gui.look.theme import Theme
-from gui.parts import column, label, panel, push, set_role
+from gui.parts import column, label, panel, push, scrolling, set_role
 from gui.review.finding import Finding
+from gui.review.fit import Fit
+from gui.review.fit_view import FitCards, TwinBars
 from gui.review.loop import LoopPlot, axes
 
 HEADINGS = ("Step", "Spikes", "First\nms", "Peak\nHz", "Final\nHz", "Fall\n%")
@@ -37,6 +39,7 @@ class RatePlot(QWidget):
         super().__init__()
         self._theme = theme
         self._points: list[tuple[float, float, float]] = []
+        self._model: tuple[tuple[float, float], ...] = ()
         self.setMinimumHeight(190)
         self.setMaximumHeight(300)
         self.setAccessibleName("Rate against force")
@@ -45,8 +48,13 @@ class RatePlot(QWidget):
     def show_points(self, points: list[tuple[float, float, float]]) -> None:
         """Show (force mN, peak rate Hz, final rate Hz) points."""
         if points != self._points:
-            self._points = points
+            self._points, self._model = points, ()
             self.update()
+
+    def show_model(self, model: tuple[tuple[float, float], ...]) -> None:
+        """Show the model's (force N, peak rate Hz) beside them."""
+        self._model = model
+        self.update()
 
     @property
     def has_points(self) -> bool:
@@ -71,12 +79,22 @@ class RatePlot(QWidget):
             return
         rows = np.array(self._points)
         x_low, x_high = nice_range(min(0.0, rows[:, 0].min()), rows[:, 0].max(), 20.0)
-        y_high = nice_range(0.0, float(rows[:, 1:].max()), 2.0)[1]
+        highest = max(float(rows[:, 1:].max()), *(rate for _, rate in self._model), 0.0)
+        y_high = nice_range(0.0, highest, 2.0)[1]
         x_low = 0.0 if rows[:, 0].min() >= 0 else x_low
         frame = Frame(
             44, self.width() - 12, 24, self.height() - 36, x_low, x_high, 0.0, y_high
         )
         axes(painter, frame, tokens, "force / mN", "rate / Hz")
+        if self._model:
+            line = frame.x(np.array([1e3 * f for f, _ in sorted(self._model)]))
+            high = frame.y(np.array([rate for _, rate in sorted(self._model)]))
+            paint.polyline(painter, line, high, paint.pen(tokens.twin))
+            key = frame.left + 148
+            painter.drawLine(QPointF(key, 10), QPointF(key + 16, 10))
+            painter.setPen(QColor(tokens.text))
+            legend = QRectF(key + 21, 2, 80, 16)
+            painter.drawText(legend, Qt.AlignmentFlag.AlignLeft, "model")
         for index, name, colour in (
             (1, "peak", tokens.rate),
             (2, "final", tokens.force),
@@ -116,6 +134,8 @@ class ResultsView(QWidget):
         self.plot = RatePlot(theme)
         self.loop = LoopPlot(theme)
         self.loop.hide()
+        self.cards = FitCards()
+        self.bars = TwinBars(theme)
         self.table = QTableWidget(0, len(HEADINGS))
         self._facts = panel("card")
         self._facts_text = label("", "", wrap=True)
@@ -129,11 +149,16 @@ class ResultsView(QWidget):
         head.addWidget(self._title)
         head.addStretch(1)
         head.addWidget(self._mark)
+        inner = QWidget()
+        middle = column(inner, spacing=9)
+        middle.addWidget(self.cards)
+        middle.addWidget(self.plot, 2)
+        middle.addWidget(self.loop, 2)
+        middle.addWidget(self.table, 3)
+        middle.addWidget(self.bars)
         whole = column(self, spacing=9)
         whole.addLayout(head)
-        whole.addWidget(self.plot, 2)
-        whole.addWidget(self.loop, 2)
-        whole.addWidget(self.table, 3)
+        whole.addWidget(scrolling(inner), 1)
         whole.addWidget(self._facts)
         whole.addWidget(self.report)
 
@@ -165,6 +190,12 @@ class ResultsView(QWidget):
         else:
             self._mark.setText(f"final · {steps}")
             set_role(self._mark, "pill-ok")
+
+    def show_fit(self, found: Fit | None) -> None:
+        """Show what the steps say together, beside the model; None clears it."""
+        self.cards.show_cards(() if found is None else found.cards)
+        self.bars.show_bars(() if found is None else found.bars)
+        self.plot.show_model(() if found is None else found.model)
 
     def show_loop(self, loop: FloatArray) -> None:
         """Show the field against the current where a calibration reads it."""
@@ -208,6 +239,7 @@ class ResultsView(QWidget):
         table.verticalHeader().hide()
         table.verticalHeader().setDefaultSectionSize(26)
         table.setShowGrid(False)
+        table.setMinimumHeight(150)
         table.setAlternatingRowColors(True)
         table.setTabKeyNavigation(False)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

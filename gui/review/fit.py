@@ -1,0 +1,224 @@
+"""What the steps so far say together, beside what the model says. No Qt here.
+
+The analysis room computes; this arranges. Fits take tens of milliseconds: call `fit`
+away from the window's thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gui.lanes.axis import number
+from gui.lanes.decimate import Drawn, FloatArray
+from gui.lanes.derive import difference
+from gui.lanes.source import Source
+from gui.review.finding import Finding, finding
+from tactile_lab.analysis.adaptation import fit_adaptation
+from tactile_lab.analysis.rate_force import mean_slope, onset
+from tactile_lab.analysis.twin import match
+from tactile_lab.errors import NotIdentifiableError
+
+COLUMNS = 2000
+"""Columns in which measured and modelled voltages are compared."""
+
+FULL = 0.1
+"""Relative error at which a bar is full."""
+
+FULL_TIME = 20e-3
+"""Offset of spikes at which a bar is full, s."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """One fitted number.
+
+    Attributes:
+        name: of the quantity.
+        value: with its unit; "—" where it cannot be told.
+        detail: its uncertainty and the model's value, or why there is none.
+    """
+
+    name: str
+    value: str
+    detail: str
+
+
+@dataclass(frozen=True)
+class Bar:
+    """How far one signal is from the model.
+
+    Attributes:
+        signal: names it and its colour.
+        name: for people.
+        share: length of the bar, 0 to 1.
+        text: the number.
+    """
+
+    signal: str
+    name: str
+    share: float
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Measured and modelled signals of the run so far, taken at one instant."""
+
+    spikes: FloatArray
+    twin_spikes: FloatArray
+    voltages: dict[str, tuple[Drawn, Drawn]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Cards, bars, and the model's steps as (force N, peak rate Hz)."""
+
+    cards: tuple[Card, ...]
+    bars: tuple[Bar, ...]
+    model: tuple[tuple[float, float], ...]
+
+
+def beside(source: Source) -> Beside:
+    """What `fit` compares; cheap, and called where the source may be read."""
+    reach = source.reach
+    twin = source.twin_spikes
+    return Beside(
+        source.spikes.copy(),
+        twin[twin < reach],
+        {
+            name: (
+                source.trace(name, 0.0, reach, COLUMNS),
+                source.twin(name, 0.0, reach, COLUMNS),
+            )
+            for name in ("V_C1", "V_C2")
+        },
+    )
+
+
+def fit(findings: Sequence[Finding], seen: Beside) -> Fit:
+    """Fit the steps so far, and compare the run with the model."""
+    steps = [f for f in findings if f.level is not None]
+    model = [_modelled(f, seen.twin_spikes) for f in steps] if _has_model(seen) else []
+    cards: tuple[Card, ...] = ()
+    if steps:
+        cards = (
+            _card("Onset", _onset, steps, model),
+            _card("Slope of the peak rate", _slope, steps, model),
+            _adaptation(steps, model),
+            _fall(steps, model),
+        )
+    points = tuple((f.level or 0.0, f.peak_rate or 0.0) for f in model)
+    return Fit(cards, (*_voltages(seen), *_spikes(seen)), points)
+
+
+def _has_model(seen: Beside) -> bool:
+    return bool(seen.twin_spikes.size) or any(
+        not model.empty for _, model in seen.voltages.values()
+    )
+
+
+def _modelled(step: Finding, spikes: FloatArray) -> Finding:
+    inside = spikes[(spikes >= step.start) & (spikes < step.end)] - step.start
+    return finding(step.label, step.level, inside, step.hold, step.start, step.end)
+
+
+def _card(
+    name: str,
+    how: Callable[[Sequence[Finding]], tuple[str, str]],
+    steps: Sequence[Finding],
+    model: Sequence[Finding],
+) -> Card:
+    try:
+        value, spread = how(steps)
+    except NotIdentifiableError as reason:
+        return Card(name, "—", _capital(str(reason)))
+    beside = ""
+    if model:
+        try:
+            beside = f"model {how(model)[0]}"
+        except NotIdentifiableError:
+            beside = "model: none"
+    return Card(name, value, " · ".join(text for text in (spread, beside) if text))
+
+
+def _onset(steps: Sequence[Finding]) -> tuple[str, str]:
+    found = onset([f.level or 0.0 for f in steps], [f.spikes for f in steps])
+    low, high = found.silent * 1e3, found.fires * 1e3
+    return f"{number(found.middle * 1e3, 0)} mN", f"{low:.4g} to {high:.4g} mN"
+
+
+def _slope(steps: Sequence[Finding]) -> tuple[str, str]:
+    rated = [f for f in steps if f.peak_rate is not None]
+    found = mean_slope(
+        [f.level or 0.0 for f in rated], [f.peak_rate or 0.0 for f in rated]
+    )
+    half = (found.high - found.value) / 1e3
+    return f"{number(found.value / 1e3, 3)} Hz/mN", f"± {number(half, 3)}"
+
+
+def _adaptation(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
+    """Of the newest step that lets it be told."""
+    name, why = "Adaptation 1/|β|", "No step has fired."
+    for at in range(len(steps) - 1, -1, -1):
+        step = steps[at]
+        if step.hold is None or not step.spikes:
+            continue
+        try:
+            found = fit_adaptation(step.times, step.hold).time_constant
+        except NotIdentifiableError as reason:
+            why = _capital(str(reason)) if why == "No step has fired." else why
+            continue
+        span = f"{found.low:.2g} to {found.high:.2g} s at {step.label}"
+        try:
+            own = fit_adaptation(model[at].times, step.hold) if model else None
+            if own is not None:
+                span += f" · model {own.time_constant.value:.2g} s"
+        except NotIdentifiableError:
+            pass
+        return Card(name, f"{found.value:.3g} s", span)
+    return Card(name, "—", why)
+
+
+def _fall(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
+    """Of the largest force that fired."""
+    fell = [at for at, step in enumerate(steps) if step.fall is not None]
+    if not fell:
+        return Card("Fall in the hold", "—", "No step has fired often enough.")
+    at = max(fell, key=lambda number_: steps[number_].level or 0.0)
+    text = f"at {steps[at].label}"
+    theirs = model[at].fall if model else None
+    if theirs is not None:
+        text += f" · model {100 * theirs:.0f} %"
+    return Card("Fall in the hold", f"{100 * (steps[at].fall or 0.0):.0f} %", text)
+
+
+def _voltages(seen: Beside) -> list[Bar]:
+    """Root mean square of measured less model, over the range that was measured."""
+    made = []
+    for signal, (measured, model) in seen.voltages.items():
+        rest = difference(measured, model)
+        extent = measured.extent
+        if rest.empty or extent is None or extent[1] <= extent[0]:
+            continue
+        off = float(np.sqrt(np.mean(rest.mean**2))) / (extent[1] - extent[0])
+        made.append(Bar(signal, signal, min(off / FULL, 1.0), f"{100 * off:.1f} %"))
+    return made
+
+
+def _spikes(seen: Beside) -> list[Bar]:
+    if not (seen.spikes.size and seen.twin_spikes.size):
+        return []
+    found = match(seen.spikes, seen.twin_spikes)
+    if not found.offsets.size:
+        return [Bar("spikes", "Spikes", 1.0, "none matched")]
+    off = float(np.median(np.abs(found.offsets)))
+    many = f"{found.offsets.size} of {seen.spikes.size}"
+    text = f"{1e3 * off:.1f} ms · {many}"
+    return [Bar("spikes", "Spikes", min(off / FULL_TIME, 1.0), text)]
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
