@@ -131,6 +131,21 @@ class Coil(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CoilCapability:
+    """What a source can do, as far as is known before it is opened.
+
+    Attributes:
+        title: of the model, for people.
+        bipolar: gives current of both signs.
+        update_interval: time between two set-points to plan with, s.
+    """
+
+    title: str
+    bipolar: bool
+    update_interval: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Channel:
     """One scope input and what is wired to it.
 

@@ -22,7 +22,7 @@ from tactile_lab.errors import SceneError
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from tactile_lab.bench import Bench, Channel, ScopeCapability
+    from tactile_lab.bench import Bench, Channel, CoilCapability, ScopeCapability
     from tactile_lab.scene.bench_file import CoilSpec, ScopeSpec
     from tactile_lab.scene.scene import Scene
     from tactile_lab.trial import Protocol
@@ -146,15 +146,21 @@ def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
     return findings
 
 
-def update_interval(coil: CoilSpec) -> float:
-    """Time between two set-points of that coil source to plan with, s.
+def coil_capability(coil: CoilSpec) -> CoilCapability:
+    """What such a source can do, as far as is known before it is opened.
 
     Raises:
         SceneError: there is no such dialect, or a limit is beyond the source's rating.
     """
+    from tactile_lab.bench import CoilCapability
+
     row: Any = importlib.import_module("drivers.dialect").coil_dialect(coil.dialect)
     row.check_limits(coil.limits)
-    return float(row.promised_interval(coil.baud))
+    return CoilCapability(
+        title=row.title,
+        bipolar=row.polarity == "both",
+        update_interval=row.promised_interval(coil.baud),
+    )
 
 
 def scope_capability(scope: ScopeSpec) -> ScopeCapability:

@@ -7,12 +7,12 @@ import pytest
 
 from tactile_lab.errors import SceneError
 from tactile_lab.plugins import (
+    coil_capability,
     nearest,
     protocol_class,
     protocol_from_file,
     protocol_names,
     scene_names,
-    update_interval,
 )
 from tactile_lab.scene.bench_file import CoilSpec
 from tactile_lab.scene.load import load
@@ -78,6 +78,6 @@ def test_nearest():
 
 
 def test_a_faster_line_updates_faster():
-    slow = update_interval(CoilSpec(baud=9600))
-    fast = update_interval(CoilSpec(baud=19200))
+    slow = coil_capability(CoilSpec(baud=9600)).update_interval
+    fast = coil_capability(CoilSpec(baud=19200)).update_interval
     assert 0.02 < fast < slow < 0.2

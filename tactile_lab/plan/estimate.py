@@ -10,7 +10,7 @@ from tactile_lab.bench import Channel, CoilLimits
 from tactile_lab.plan.heat import heat_along
 from tactile_lab.plan.needs import Needs
 from tactile_lab.plan.timeline import Timeline
-from tactile_lab.plugins import update_interval
+from tactile_lab.plugins import coil_capability
 from tactile_lab.scene.scene import Scene
 from tactile_lab.waveform import Waveform
 
@@ -61,7 +61,9 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Estimate:
     """What running `scene` takes."""
     coil, current = scene.bench.coil, drive.current
     assert current is not None
-    interval = update_interval(coil) if needed.coil and coil is not None else None
+    interval = None
+    if needed.coil and coil is not None:
+        interval = coil_capability(coil).update_interval
     limits = CoilLimits() if coil is None else coil.limits
     samples = round(drive.streamed * scene.record.sample_rate)
     if not needed.channels:

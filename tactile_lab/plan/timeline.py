@@ -8,15 +8,19 @@ from functools import lru_cache
 
 import numpy as np
 
+from tactile_lab.bench import CoilCapability
 from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
 from tactile_lab.plan.heat import heat_along
 from tactile_lab.plan.limited import limited
 from tactile_lab.plan.outcome import ModelOutcome, Step, joined
-from tactile_lab.plugins import update_interval
+from tactile_lab.plugins import coil_capability
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
+
+SMALLEST = 1e-9
+"""Current that counts as reversed, A."""
 
 MOST_TRIALS = 10_000
 """A protocol that asks for more never ends, as far as planning is concerned."""
@@ -122,7 +126,7 @@ class _Driver:
         self._time = 0.0
         self._amperes = 0.0
         self._heat = 0.0
-        self._interval: float | None = None
+        self._source: CoilCapability | None = None
 
     def take(self, trial: Trial) -> Outcome:
         length = trial.length
@@ -169,9 +173,12 @@ class _Driver:
                     f'trial "{trial.label}": current {show(wanted.peak, "A")} is '
                     f"beyond the coil's limit of {show(limits.current, 'A')}."
                 )
-        if self._interval is None:
-            self._interval = update_interval(coil)
-        current, warning = limited(wanted, limits.slew, self._interval, self._amperes)
+        if self._source is None:
+            self._source = coil_capability(coil)
+        if not self._source.bipolar and wanted.value.min() < -SMALLEST:
+            raise LimitError(f'trial "{trial.label}": {self._one_sign(wanted)}')
+        interval = self._source.update_interval
+        current, warning = limited(wanted, limits.slew, interval, self._amperes)
         if warning is not None:
             text = f'the coil cannot follow trial "{trial.label}": {warning}'
             if self.scene.coil.strict:
@@ -188,6 +195,19 @@ class _Driver:
                 "hold, or a longer rest before it."
             )
         return magnet.force_for(current, beyond="hold"), current
+
+    def _one_sign(self, wanted: Waveform) -> str:
+        """Why a source that cannot reverse does not play `wanted`, A."""
+        bench = self.scene.bench
+        assert bench.coil is not None and self._source is not None
+        least = float(wanted.value.min())
+        reach = sorted((0.0, *bench.magnet.force([bench.coil.limits.current])))
+        return (
+            f"{show(float(bench.magnet.force([least])[0]), 'N')} needs "
+            f"{show(least, 'A')}, and {self._source.title} gives current of one sign "
+            f"only: forces from {show(reach[0], 'N')} to {show(reach[-1], 'N')}. "
+            "Ask for those, or use a four-quadrant source."
+        )
 
     def timeline(self) -> Timeline:
         force = joined([(step.start, step.force) for step in self.steps])

@@ -196,3 +196,37 @@ def test_a_bench_without_a_coil_can_watch_but_not_push(tmp_path):
     assert not plan(load("monitor", watch, bench=str(bench)), preview=False).needs.coil
     with pytest.raises(SceneError, match=r"has no \[coil\]"):
         plan(load("demo", watch, bench=str(bench)))
+
+
+ONE_SIGN = """
+name = "one sign"
+simulated = true
+[coil]
+dialect = "aim-tti-pl"
+[coil.limits]
+current = "1.5 A"
+[magnet]
+r = "6 mm"
+B2_per_ampere = "{slope} mT/A"
+"""
+
+
+@pytest.mark.parametrize(
+    ("slope", "given", "refused", "reach"),
+    [(11, 100, -100, "0 N to 300.9 mN"), (-11, -100, 100, "−300.9 mN to 0 N")],
+)
+def test_a_source_that_cannot_reverse_is_asked_for_one_sign_only(
+    tmp_path, slope, given, refused, reach
+):
+    bench = tmp_path / "bench.toml"
+    bench.write_text(ONE_SIGN.format(slope=slope))
+
+    def scene(level):
+        levels = f'protocol.levels=["{level} mN"]'
+        return load("demo", [levels, 'record.signals=["force"]'], str(bench))
+
+    assert plan(scene(given), preview=False).estimate.peak_current > 0.4
+    with pytest.raises(LimitError) as why:
+        plan(scene(refused), preview=False)
+    assert reach in str(why.value) and "one sign only" in str(why.value)
+    assert "−498" in str(why.value)  # mA
