@@ -47,6 +47,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/tactile-lab accuracy --campaign 1000 --out docs
 	$(BIN)/tactile-lab stability --out docs
 	$(BIN)/python docs/make_fit_recovery.py
+	if command -v ngspice >/dev/null; then $(BIN)/python docs/make_saturation.py; fi
 	$(BIN)/python docs/make_paper.py
 	$(BIN)/python tests/benchmarks/spike_detection.py --out docs/detection-figures.md
 	$(BIN)/python tests/benchmarks/store_speed.py --out docs/store-figures.md

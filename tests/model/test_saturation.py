@@ -1,6 +1,8 @@
 """T1 that saturates: V_C2 acts back on V_C1, and the circuit falls silent again."""
 
+import csv
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,6 +50,34 @@ def test_errors_are_below_the_estimate(circuit, force, until, start):
 def test_a_random_scene_has_errors_below_the_estimate():
     found = compare(saturated_case(3), samples=6)
     assert found.honest, found
+
+
+def spice_rows():
+    with Path(__file__).with_name("saturation.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("netlist", ["t1", "complete"])
+def test_rates_agree_with_transistors_in_ngspice(netlist):
+    compared = silenced = 0
+    for row in spice_rows():
+        if row["netlist"] != netlist:
+            continue
+        circuit = Circuit(
+            saturation=True, firing=row["firing"], C2=float(row["C2_F"]),
+            V_GS=float(row["V_GS_V"]), tau=float(row["tau_s"]),
+        )  # fmt: skip
+        force = Waveform.through([(0, 0), (0.1, 0), (0.11, float(row["force_N"]))])
+        spikes = simulate(circuit, force, until=float(row["until_s"])).spike_times
+        if float(row["highest_Hz"]) > 0:
+            rate = np.max(1 / np.diff(spikes))
+            assert rate == pytest.approx(float(row["highest_Hz"]), rel=0.03), row
+            compared += 1
+        elif float(row["force_N"]) > 0.13:
+            assert spikes.size == 0, row
+            silenced += 1
+    assert compared >= 10
+    assert silenced >= 4
 
 
 def test_rest_is_an_equilibrium_of_both_voltages():
