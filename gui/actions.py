@@ -9,16 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QPoint, Qt
+from PySide6.QtCore import QObject, QPoint, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMenu, QWidget
 
-from gui.dialogs.choosing import ask_run, ask_scene
-
-if TYPE_CHECKING:
-    from gui.window import Window
+from gui.dialogs.closing import Closing
+from gui.opening import Opening
+from gui.panels import Panels
 
 
 @dataclass(frozen=True)
@@ -39,35 +37,48 @@ class Key:
 
 
 class Actions(QObject):
-    """All shortcuts of the window."""
+    """All shortcuts of the panels.
 
-    def __init__(self, window: Window) -> None:
+    Args:
+        window: has the shortcuts, is closed and pictured.
+        panels: what they work on.
+        opening: opens scenes and runs.
+        closing: the question in which Esc is not STOP.
+    """
+
+    fold_asked = Signal(QWidget, bool)
+    """Fold a side panel, or unfold it."""
+
+    def __init__(
+        self, window: QWidget, panels: Panels, opening: Opening, closing: Closing
+    ) -> None:
         super().__init__(window)
-        self._window = window
+        self._window, self._panels = window, panels
+        self._opening, self._closing = opening, closing
         self.keys = self._all()
         self._shortcuts: list[QShortcut] = []
         for key in self.keys:
             for keys in () if key.single else key.keys:
                 self._bind(keys, key)
         self._bind_stop()
-        window.header.help_asked.connect(self.show_help)
-        window.header.menu_asked.connect(self.show_menu)
-        window.header.picture_asked.connect(self.copy_picture)
+        panels.header.help_asked.connect(self.show_help)
+        panels.header.menu_asked.connect(self.show_menu)
+        panels.header.picture_asked.connect(self.copy_picture)
 
     def _bind_stop(self) -> None:
         escape = QShortcut(QKeySequence("Esc"), self._window)
         escape.activated.connect(self.escape)
         stop = QShortcut(QKeySequence("F12"), self._window)
         stop.setContext(Qt.ShortcutContext.ApplicationShortcut)
-        stop.activated.connect(lambda: self._window.session.stop("STOP by F12"))
+        stop.activated.connect(lambda: self._panels.session.stop("STOP by F12"))
         self._shortcuts += [escape, stop]
 
     def escape(self) -> None:
         """STOP; in the closing question: keep running."""
-        if self._window.closing.isVisible():
-            self._window.closing.keep.click()
+        if self._closing.isVisible():
+            self._closing.keep.click()
         else:
-            self._window.session.stop("STOP by Esc")
+            self._panels.session.stop("STOP by Esc")
 
     def _bind(self, keys: str, key: Key) -> None:
         shortcut = QShortcut(QKeySequence(keys), self._window)
@@ -84,12 +95,12 @@ class Actions(QObject):
         return False
 
     def _all(self) -> list[Key]:
-        window = self._window
-        tools, view = window.centre.tools, window.centre.view
-        form = window.setup.form
+        panels = self._panels
+        tools, view = panels.centre.tools, panels.centre.view
+        form = panels.setup.form
         return [
-            Key(("Ctrl+R",), "Run", window.setup.start),
-            Key(("Ctrl+Return",), "Queue", window.setup.enqueue),
+            Key(("Ctrl+R",), "Run", panels.setup.start),
+            Key(("Ctrl+Return",), "Queue", panels.setup.enqueue),
             Key(("Space",), "Freeze the display", tools.freeze.toggle, single=True),
             Key(("F",), "Follow", tools.follow.click, single=True),
             Key(("A",), "Fit the whole run", view.show_all, single=True),
@@ -105,9 +116,9 @@ class Actions(QObject):
             Key(("Right",), "Later", lambda: self._nudge(1), single=True),
             Key(("Home",), "Start of the run", self._home, single=True),
             Key(("End",), "End of the run", lambda: view.set_follow(True), single=True),
-            Key(("N",), "Note", window.centre.log.note.setFocus, single=True),
-            Key(("Ctrl+O",), "Open a scene", lambda: ask_scene(window)),
-            Key(("Ctrl+Shift+O",), "Open a run", lambda: ask_run(window)),
+            Key(("N",), "Note", panels.centre.log.note.setFocus, single=True),
+            Key(("Ctrl+O",), "Open a scene", self._opening.ask_scene),
+            Key(("Ctrl+Shift+O",), "Open a run", self._opening.ask_run),
             Key(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
             Key(("Ctrl+E",), "Export the view", lambda: self.export_view()),
             Key(("Ctrl+F",), "Search runs", self._search),
@@ -116,44 +127,44 @@ class Actions(QObject):
             Key(("Ctrl+3",), "Manual", lambda: self._tab(2)),
             Key(("Ctrl+Z",), "Undo in the form", form.undo.undo),
             Key(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.undo.redo),
-            Key(("F7",), "Fold the left panel", lambda: self._fold(window.setup)),
-            Key(("F8",), "Fold the right panel", lambda: self._fold(window.review)),
+            Key(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
+            Key(("F8",), "Fold the right panel", lambda: self._fold(panels.review)),
             Key(("F11",), "Lanes only", self._focus),
             Key(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
             Key(("?", "F1"), "Help and shortcuts", self.show_help, single=True),
         ]
 
     def _nudge(self, way: int) -> None:
-        view = self._window.centre.view
+        view = self._panels.centre.view
         if view.cursors is not None:
             view.move_cursor(1, view.cursors[1] + way * view.width / 400)
         else:
             view.pan(way * view.width / 10)
 
     def _home(self) -> None:
-        view = self._window.centre.view
+        view = self._panels.centre.view
         view.show_span(0.0, view.width)
 
     def _tab(self, number: int) -> None:
-        window = self._window
-        if window.review.isHidden():
-            window.fold(window.review, False)
-        window.review.show_tab(number)
+        panels = self._panels
+        if panels.review.isHidden():
+            self.fold_asked.emit(panels.review, False)
+        panels.review.show_tab(number)
 
     def _search(self) -> None:
         self._tab(1)
-        self._window.review.runs.search.setFocus()
+        self._panels.review.runs.search.setFocus()
 
     def _fold(self, side: object) -> None:
-        window = self._window
-        panel = window.setup if side is window.setup else window.review
-        window.fold(panel, panel.isVisible())
+        panels = self._panels
+        panel = panels.setup if side is panels.setup else panels.review
+        self.fold_asked.emit(panel, panel.isVisible())
 
     def _focus(self) -> None:
-        window = self._window
-        folded = window.setup.isVisible() or window.review.isVisible()
-        window.fold(window.setup, folded)
-        window.fold(window.review, folded)
+        panels = self._panels
+        folded = panels.setup.isVisible() or panels.review.isVisible()
+        self.fold_asked.emit(panels.setup, folded)
+        self.fold_asked.emit(panels.review, folded)
 
     def copy_picture(self) -> None:
         """Put a picture of the window on the clipboard."""
@@ -163,33 +174,33 @@ class Actions(QObject):
         """Save the form as a scene file."""
         from gui.dialogs.saving import save_scene
 
-        save_scene(self._window)
+        save_scene(self._panels)
 
     def export_view(self) -> None:
         """Export what the lanes show."""
         from gui.dialogs.saving import export_view
 
-        export_view(self._window)
+        export_view(self._panels, self._opening.run)
 
     def show_help(self) -> None:
         """Show the shortcut list and the help of the panels."""
         from gui.dialogs.help import show_help
 
-        show_help(self._window)
+        show_help(self._window, [(", ".join(key.keys), key.words) for key in self.keys])
 
     def connect_dialog(self) -> None:
         """Show the connect dialog."""
         from gui.dialogs.connect import show_connect
 
-        show_connect(self._window)
+        show_connect(self._window, self._panels, self._opening)
 
     def show_menu(self) -> None:
         """Open the menu below its button."""
-        window, menu = self._window, QMenu(self._window)
-        session, theme = window.session, window.theme
-        menu.addAction("Open scene …", partial(ask_scene, window))
+        panels, menu = self._panels, QMenu(self._window)
+        session, theme = panels.session, panels.theme
+        menu.addAction("Open scene …", self._opening.ask_scene)
         menu.addAction("Save scene …", self.save_scene)
-        menu.addAction("Open run …", partial(ask_run, window))
+        menu.addAction("Open run …", self._opening.ask_run)
         menu.addAction("Export view …", self.export_view)
         menu.addSeparator()
         menu.addAction("Use simulated bench", lambda: session.connect_bench("sim"))
@@ -203,12 +214,12 @@ class Actions(QObject):
         menu.addSeparator()
         menu.addAction("Copy command line", self._copy_command)
         menu.addAction("Help and shortcuts", self.show_help)
-        menu.addAction("Quit", window.close)
-        button = window.header.menu_button
+        menu.addAction("Quit", self._window.close)
+        button = panels.header.menu_button
         menu.popup(button.mapToGlobal(QPoint(0, button.height())))
 
     def _copy_command(self) -> None:
-        QGuiApplication.clipboard().setText(self._window.setup.request().command())
+        QGuiApplication.clipboard().setText(self._panels.setup.request().command())
 
 
 def _written(event: QKeyEvent) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel
@@ -12,11 +12,7 @@ from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, empty, label
 from gui.review.runs import Entry
 from gui.session.threads import start
-from gui.state import State
 from tactile_lab.errors import TactileLabError
-
-if TYPE_CHECKING:
-    from gui.window import Window
 
 
 class CompareBar(QFrame):
@@ -84,9 +80,12 @@ class CompareBar(QFrame):
             self.changed.emit()
 
 
-def compare(window: Window, chosen: list[Entry]) -> None:
-    """Load the chosen runs away from the window's thread, then show them together."""
-    opening = window.opening
+def load_comparison(
+    chosen: list[Entry],
+    loaded: Callable[[Comparison], None],
+    failed: Callable[[str], None],
+) -> None:
+    """Load two or three runs in a background thread, which calls one of the two."""
 
     def work() -> None:
         from gui.lanes.stored import RunSource
@@ -100,28 +99,8 @@ def compare(window: Window, chosen: list[Entry]) -> None:
         except (TactileLabError, OSError) as error:
             for member in members:
                 member.source.close()
-            opening.failed.emit(str(error))
+            failed(str(error))
             return
-        opening.compared.emit(Comparison(members))
+        loaded(Comparison(members))
 
     start(work, "compare")
-
-
-def show_comparison(window: Window, comparison: Comparison) -> None:
-    """Put a loaded comparison into the lanes."""
-    opening = window.opening
-    if window.session.state in (State.RUNNING, State.ABORTING):
-        comparison.close()
-        opening.say("A run is in progress; runs are compared when it has ended.")
-        return
-    opening.leave_run()
-    opening.run = comparison
-    window.session.run_name = f"Comparing {len(comparison.members)} runs"
-    window.centre.compare_bar.show_comparison(comparison)
-    view = window.centre.view
-    view.set_now(comparison.reach, comparison.length)
-    window.show_lanes()
-    window.centre.stack.show_source(comparison)
-    view.show_all()
-    window.centre.tools.widths.choose(3)
-    window.render_state()

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
+from gui.opening import Opening
+from gui.panels import Panels
 from gui.state import State
-
-if TYPE_CHECKING:
-    from gui.window import Window
 
 FAST, SLOW = 33, 100
 """Milliseconds between frames."""
@@ -23,11 +21,14 @@ BUDGET = 0.6
 
 
 class Frames(QObject):
-    """Drives the window; `costs` holds the newest frame costs, s, for diagnostics."""
+    """Moves what is on screen; `costs` holds the newest frame costs, s."""
 
-    def __init__(self, window: Window) -> None:
-        super().__init__(window)
-        self._window = window
+    told = Signal(object)
+    """The newest snapshot, as often as numbers can be read."""
+
+    def __init__(self, panels: Panels, opening: Opening) -> None:
+        super().__init__(panels.centre)
+        self._panels, self._opening = panels, opening
         self.frozen = False
         self.costs: list[float] = []
         self.paints: list[float] = []
@@ -50,53 +51,53 @@ class Frames(QObject):
     def tick(self) -> None:
         """One frame."""
         begun = time.perf_counter()
-        window, session = self._window, self._window.session
+        panels, session = self._panels, self._panels.session
         moved = session.poll()
         now = time.monotonic()
-        live = session.source is not None and window.opening.run is None
-        if live and not self.frozen and not window.isMinimized():
+        live = session.source is not None and self._opening.run is None
+        if live and not self.frozen and not panels.centre.window().isMinimized():
             source = session.source
             assert source is not None
-            view = window.centre.view
+            view = panels.centre.view
             if source.running or moved:
                 view.set_now(source.reach, source.length)
-                window.centre.stack.refresh()
-        window.opening.take_fetched()
+                panels.centre.stack.refresh()
+        self._opening.take_fetched()
         if now - self._numbers >= NUMBERS:
             self._numbers = now
             self._show_numbers(live)
         self._keep_budget(time.perf_counter() - begun)
 
     def _show_numbers(self, live: bool) -> None:
-        window, session = self._window, self._window.session
+        panels, session = self._panels, self._panels.session
         snapshot = session.snapshot()
-        window.render_clock(snapshot)
+        self.told.emit(snapshot)
         self._show_monitor()
         source = session.source
         if source is not None and live:
             if not self.frozen:
-                window.centre.stack.show_values()
+                panels.centre.stack.show_values()
             planned = source.preview.holds if source.preview else []
             holds = planned if source.running and planned else source.holds
-            window.centre.progress.show_run(
+            panels.centre.progress.show_run(
                 snapshot, holds, source.length, source.reach, session.trial,
                 "Monitor: nothing is kept" if session.monitor.alive
-                else window.opening.ending,
+                else self._opening.ending,
             )  # fmt: skip
             running = session.state in (State.RUNNING, State.ABORTING)
-            window.setup.show_head(source.reach if running else None)
+            panels.setup.show_head(source.reach if running else None)
 
     def _show_monitor(self) -> None:
-        window, monitor = self._window, self._window.session.monitor
+        panels, monitor = self._panels, self._panels.session.monitor
         if monitor.alive:
-            window.centre.notice.setText(monitor.words())
-            window.centre.notice.show()
+            panels.centre.notice.setText(monitor.words())
+            panels.centre.notice.show()
             self._watched = True
         elif self._watched:
-            window.centre.notice.hide()
+            panels.centre.notice.hide()
             self._watched = False
-        if window.centre.tools.monitor.isChecked() is not monitor.alive:
-            window.centre.tools.monitor.setChecked(monitor.alive)
+        if panels.centre.tools.monitor.isChecked() is not monitor.alive:
+            panels.centre.tools.monitor.setChecked(monitor.alive)
 
     def _keep_budget(self, cost: float) -> None:
         self.costs.append(cost)

@@ -8,24 +8,26 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 
-from gui.comparing import compare, show_comparison
+from gui.choosing import choose_run, choose_scene
+from gui.comparing import load_comparison
 from gui.lanes.compare import Comparison
 from gui.lanes.decimate import FloatArray
 from gui.lanes.expected import PlanSource
 from gui.lanes.source import LiveSource, Source
+from gui.panels import Panels
 from gui.review.finding import Finding, facts_of, of_outcome, of_run
 from gui.review.fitting import Fitting
 from gui.review.runs import Entry, entries
 from gui.session.messages import Level, Planned, Twins
 from gui.session.request import Request
 from gui.session.threads import start
+from gui.showing import lanes_shown
 from gui.state import State
 from tactile_lab.errors import TactileLabError
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
-    from gui.window import Window
     from tactile_lab.acquisition.execution import Executed
 
 
@@ -37,44 +39,59 @@ class Opening(QObject):
         ending: how the run on screen ended, in words.
     """
 
+    changed = Signal()
     loaded = Signal(object)
     failed = Signal(str)
     listed = Signal(object)
     compared = Signal(object)
 
-    def __init__(self, window: Window) -> None:
-        super().__init__(window)
-        self._window = window
+    def __init__(self, panels: Panels) -> None:
+        super().__init__(panels.centre)
+        self._panels = panels
         self.run: RunSource | Comparison | None = None
         self.ending = ""
         self.findings: list[Finding] = []
         self._folder: Path | None = None
         self._fitting = Fitting(self)
-        self._fitting.fitted.connect(window.review.results.show_fit)
+        self._fitting.fitted.connect(panels.review.results.show_fit)
         self._tracks: object = None
         self.loaded.connect(self._show_run)
         self.failed.connect(self.say)
         self.listed.connect(self._list)
-        self.compared.connect(lambda comparison: show_comparison(window, comparison))
-        runs = window.review.runs
+        self.compared.connect(self._show_comparison)
+        runs = panels.review.runs
         runs.opened.connect(lambda entry: self.open_run(entry.folder))
         runs.again.connect(self._again)
-        runs.compared.connect(lambda chosen: compare(window, chosen))
-        bar = window.centre.compare_bar
-        bar.changed.connect(window.centre.stack.refresh)
-        view = window.centre.view
+        runs.compared.connect(
+            lambda chosen: load_comparison(chosen, self.compared.emit, self.failed.emit)
+        )
+        bar = panels.centre.compare_bar
+        bar.changed.connect(panels.centre.stack.refresh)
+        view = panels.centre.view
         view.changed.connect(lambda: bar.look_at(view.start + view.width / 2))
         bar.closed.connect(self.close_run)
-        window.review.results.report_asked.connect(self._open_report)
-        window.review.export.clicked.connect(self._open_folder)
+        panels.review.results.report_asked.connect(self._open_report)
+        panels.review.export.clicked.connect(self._open_folder)
 
     # --- asked by the user
+
+    def ask_scene(self) -> None:
+        """Let the user choose a scene, and open it."""
+        path = choose_scene(self._panels.centre.window())
+        if path is not None:
+            self.open_path(path)
+
+    def ask_run(self) -> None:
+        """Let the user choose a run, and open it."""
+        path = choose_run(self._panels.centre.window(), self._panels.session.out)
+        if path is not None:
+            self.open_path(path)
 
     def open_path(self, path: Path) -> None:
         """Open a scene, a protocol file, a run folder or a run's data file."""
         if path.is_dir() or path.suffix in (".h5", ".json"):
             self.open_run(path if path.is_dir() else path.parent)
-        elif self._window.session.state in (State.RUNNING, State.ABORTING):
+        elif self._panels.session.state in (State.RUNNING, State.ABORTING):
             self._queue_scene(path)
         else:
             self.open_scene(str(path))
@@ -84,17 +101,17 @@ class Opening(QObject):
 
         A mistake in the scene is shown, and nothing else changes.
         """
-        before = self._window.setup.form.texts()
+        before = self._panels.setup.form.texts()
         try:
-            self._window.setup.open_scene(name)
+            self._panels.setup.open_scene(name)
         except (TactileLabError, OSError) as error:
             self.say(str(error))
             return False
-        after = self._window.setup.form.texts()
+        after = self._panels.setup.form.texts()
         new = [f"{key} {before[key]} → {value}" for key, value in after.items()
                if key in before and before[key] != value]  # fmt: skip
         said = f"Scene {name or 'demo'} loaded"
-        self._window.session.log(
+        self._panels.session.log(
             Level.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
         )
         return True
@@ -103,7 +120,7 @@ class Opening(QObject):
         """Put a shipped scene into the form, and run it as soon as it is planned."""
         self.leave_run()
         if self.open_scene(name):
-            self._window.setup.start_when_planned()
+            self._panels.setup.start_when_planned()
 
     def open_run(self, folder: Path) -> None:
         """Open a run from disk in the same lanes; read away from this thread."""
@@ -122,50 +139,50 @@ class Opening(QObject):
 
     def list_runs(self) -> None:
         """Read the run folder anew, away from this thread."""
-        out = self._window.session.out
+        out = self._panels.session.out
         start(lambda: self.listed.emit(entries(out)), "list runs")
 
     # --- told by the session
 
     def plan_arrived(self, planned: Planned) -> None:
         """Show the plan in the lanes, unless a run is on screen."""
-        session = self._window.session
+        session = self._panels.session
         busy = session.state in (State.RUNNING, State.ABORTING)
         if planned.expectation is None or busy or self.run is not None:
             return
         if session.source is None:
-            self._window.show_lanes()
+            self.show_lanes()
             preview = planned.expectation.preview
-            self._window.centre.view.set_now(0.0, preview.length)
-            self._window.centre.stack.show_source(PlanSource(preview))
-            self._window.centre.view.show_span(0.0, preview.length)
+            self._panels.centre.view.set_now(0.0, preview.length)
+            self._panels.centre.stack.show_source(PlanSource(preview))
+            self._panels.centre.view.show_span(0.0, preview.length)
 
     def follow_run(self, source: LiveSource) -> None:
         """Show the run that begins."""
         self.leave_run()
-        window = self._window
-        window.show_lanes()
-        window.centre.stack.show_source(source)
-        view = window.centre.view
+        panels = self._panels
+        self.show_lanes()
+        panels.centre.stack.show_source(source)
+        view = panels.centre.view
         view.clear_cursors()
-        window.centre.tools.cursors.setChecked(False)
+        panels.centre.tools.cursors.setChecked(False)
         view.follow = True
         view.set_width(5.0)
         view.set_follow(True)
-        window.centre.tools.follow.setChecked(True)
-        window.centre.tools.widths.choose(1)
-        if not window.session.monitor.alive:
+        panels.centre.tools.follow.setChecked(True)
+        panels.centre.tools.widths.choose(1)
+        if not panels.session.monitor.alive:
             self.findings, self.ending = [], ""
             self._fit(None)
-            window.review.results.show_facts("", report=False)
+            panels.review.results.show_facts("", report=False)
             self._show_findings(running=True)
-        window.render_state()
+        self.changed.emit()
 
     def _fit(self, source: Source | None) -> None:
         self._fitting.ask(self.findings, source)
 
     def _show_loop(self, loop: FloatArray) -> None:
-        self._window.review.results.show_loop(loop)
+        self._panels.review.results.show_loop(loop)
 
     def trial_ended(self, outcome: Outcome) -> None:
         """Add a step to the results."""
@@ -173,17 +190,17 @@ class Opening(QObject):
         if found is not None:
             self.findings.append(found)
         self._show_findings(running=True)
-        self._fit(self._window.session.source)
-        if self._window.session.source is not None:
-            self._show_loop(self._window.session.source.loop)
+        self._fit(self._panels.session.source)
+        if self._panels.session.source is not None:
+            self._show_loop(self._panels.session.source.loop)
 
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
         self.ending = f"{done.ending.state} · {done.folder.name} · {done.spikes} spikes"
         self._folder = done.folder
-        source = self._window.session.source
+        source = self._panels.session.source
         if source is not None:
-            self._window.centre.view.set_now(source.reach, source.length)
+            self._panels.centre.view.set_now(source.reach, source.length)
         self._show_findings(running=False)
         self._fit(source)
         lost = done.loss.get("samples")
@@ -193,14 +210,14 @@ class Opening(QObject):
             facts.append(
                 f"Loss: {lost} samples, {done.loss.get('spikes') or 0} spikes."
             )
-        self._window.review.results.show_facts("<br>".join(facts), report=False)
+        self._panels.review.results.show_facts("<br>".join(facts), report=False)
         self.list_runs()
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""
         if folder == self._folder:
-            self._fit(self.run or self._window.session.source)
-            self._window.review.results.report.setVisible(
+            self._fit(self.run or self._panels.session.source)
+            self._panels.review.results.report.setVisible(
                 (folder / "report.html").exists()
             )
 
@@ -220,14 +237,20 @@ class Opening(QObject):
             if self.run.tracks is not self._tracks:
                 self._tracks = self.run.tracks
                 self._fit(self.run)
-            self._window.show_lanes()
-            self._window.centre.stack.refresh()
-            self._window.centre.stack.show_values()
+            self.show_lanes()
+            self._panels.centre.stack.refresh()
+            self._panels.centre.stack.show_values()
 
     def close_run(self) -> None:
         """Go back from a run on disk to the plan."""
         self.leave_run()
-        self._window.setup.plan_now()
+        self._panels.setup.plan_now()
+
+    def show_lanes(self) -> None:
+        """Show the lanes of what is on screen."""
+        lanes = lanes_shown(self._panels.session, self.run)
+        if lanes is not None:
+            self._panels.centre.stack.show_lanes(lanes)
 
     # --- inside
 
@@ -236,38 +259,55 @@ class Opening(QObject):
         if self.run is not None:
             self.run.close()
             self.run = None
-            self._window.centre.compare_bar.show_comparison(None)
-            self._window.session.run_name = ""
-        self._window.centre.notice.hide()
+            self._panels.centre.compare_bar.show_comparison(None)
+            self._panels.session.run_name = ""
+        self._panels.centre.notice.hide()
 
     def _show_run(self, source: RunSource) -> None:
-        window = self._window
-        if window.session.state in (State.RUNNING, State.ABORTING):
+        panels = self._panels
+        if panels.session.state in (State.RUNNING, State.ABORTING):
             source.close()
             self.say("A run is in progress; old runs open when it has ended.")
             return
         self.leave_run()
         self.run, self._folder = source, source.path
-        window.session.run_name = f"Looking at {source.path.name}"
-        view = window.centre.view
+        panels.session.run_name = f"Looking at {source.path.name}"
+        view = panels.centre.view
         view.set_now(source.reach, source.length)
         view.clear_cursors()
-        window.centre.tools.cursors.setChecked(False)
-        window.show_lanes()
-        window.centre.stack.show_source(source)
+        panels.centre.tools.cursors.setChecked(False)
+        self.show_lanes()
+        panels.centre.stack.show_source(source)
         view.show_all()
-        window.centre.tools.widths.choose(3)
-        window.centre.stack.show_values()
-        window.session.make_twin(source.path, source.current, source.length)
+        panels.centre.tools.widths.choose(3)
+        panels.centre.stack.show_values()
+        panels.session.make_twin(source.path, source.current, source.length)
         status = str(source.info.get("status"))
         self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
         self._results_of(source)
-        window.review.runs.show_current(source.path)
-        window.centre.progress.show_run(
-            window.session.snapshot(), source.holds, source.length, source.reach,
+        panels.review.runs.show_current(source.path)
+        panels.centre.progress.show_run(
+            panels.session.snapshot(), source.holds, source.length, source.reach,
             None, self.ending,
         )  # fmt: skip
-        window.render_state()
+        self.changed.emit()
+
+    def _show_comparison(self, comparison: Comparison) -> None:
+        session, centre = self._panels.session, self._panels.centre
+        if session.state in (State.RUNNING, State.ABORTING):
+            comparison.close()
+            self.say("A run is in progress; runs are compared when it has ended.")
+            return
+        self.leave_run()
+        self.run = comparison
+        session.run_name = f"Comparing {len(comparison.members)} runs"
+        centre.compare_bar.show_comparison(comparison)
+        centre.view.set_now(comparison.reach, comparison.length)
+        self.show_lanes()
+        centre.stack.show_source(comparison)
+        centre.view.show_all()
+        centre.tools.widths.choose(3)
+        self.changed.emit()
 
     def _results_of(self, source: RunSource) -> None:
         self.findings = of_run(source)
@@ -275,12 +315,12 @@ class Opening(QObject):
         self._fit(source)
         self._show_loop(source.loop)
         report = (source.path / "report.html").exists()
-        self._window.review.results.show_facts(facts_of(source), report=report)
+        self._panels.review.results.show_facts(facts_of(source), report=report)
 
     def _show_findings(self, *, running: bool) -> None:
-        expectation = self._window.session.expectation
+        expectation = self._panels.session.expectation
         total = expectation.estimate.trials if expectation else 0
-        self._window.review.results.show_findings(
+        self._panels.review.results.show_findings(
             self.findings,
             total=total,
             running=running,
@@ -290,7 +330,7 @@ class Opening(QObject):
     def _queue_scene(self, path: Path) -> None:
         from gui.session.session import Queued
 
-        session = self._window.session
+        session = self._panels.session
         request = Request(str(path), (), session.bench_choice)
         try:
             request.load()
@@ -304,17 +344,17 @@ class Opening(QObject):
         self.open_scene(str(entry.folder / "scene.toml"))
 
     def _list(self, found: list[Entry]) -> None:
-        self._window.review.runs.show_entries(found)
-        self._window.centre.empty.show_recent(
+        self._panels.review.runs.show_entries(found)
+        self._panels.centre.empty.show_recent(
             [(f"{e.title} · {e.started} · {e.status}", e.folder) for e in found[:4]]
         )
 
     def say(self, problem: str) -> None:
         """Tell why something could not be opened, above the lanes and in the log."""
-        self._window.session.log(Level.ERROR, "open", problem)
-        self._window.centre.notice.setText(problem)
-        self._window.centre.notice.setStyleSheet("")
-        self._window.centre.notice.show()
+        self._panels.session.log(Level.ERROR, "open", problem)
+        self._panels.centre.notice.setText(problem)
+        self._panels.centre.notice.setStyleSheet("")
+        self._panels.centre.notice.show()
 
     def _open_report(self) -> None:
         if self._folder is not None:
@@ -322,5 +362,5 @@ class Opening(QObject):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(file.resolve())))
 
     def _open_folder(self) -> None:
-        folder = self._folder or self._window.session.out
+        folder = self._folder or self._panels.session.out
         QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder.resolve())))

@@ -17,14 +17,13 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QWidget
 from gui.actions import Actions
 from gui.banner import Banner
 from gui.centre import Centre
-from gui.dialogs.choosing import ask_scene
 from gui.dialogs.closing import Closing
 from gui.dialogs.errand import ErrandCard
 from gui.frames import Frames
 from gui.header.header import Header
-from gui.lanes.lane import lanes_for
 from gui.look.theme import Theme
 from gui.opening import Opening
+from gui.panels import Panels
 from gui.parts import column
 from gui.review.panel import ReviewPanel
 from gui.session.session import Session
@@ -66,9 +65,12 @@ class Window(QMainWindow):
         self._lay_out()
         self.closing = Closing(self, theme)
         self.errand = ErrandCard(self, session, theme)
-        self.opening = Opening(self)
-        self.frames = Frames(self)
-        self.actions_ = Actions(self)
+        self.panels = Panels(
+            session, theme, self.header, self.setup, self.centre, self.review
+        )
+        self.opening = Opening(self.panels)
+        self.frames = Frames(self.panels, self.opening)
+        self.actions_ = Actions(self, self.panels, self.opening, self.closing)
         self._leaving = False
         self._connect()
         self.render_state()
@@ -107,30 +109,6 @@ class Window(QMainWindow):
         self.review.manual.render_snapshot(
             snapshot, session.readings.get("field"), reading=session.reading_field
         )
-
-    def show_lanes(self) -> None:
-        """Show the lanes of what is on screen; what is left out has none."""
-        run = self.opening.run
-        if self.session.monitor.alive:
-            signals, twin = {"V_C1", "V_C2", "V_K", "spikes"}, False
-        elif run is not None:
-            signals = set(run.signals)
-            twin = run.tracks is not None
-        else:
-            expectation = self.session.expectation
-            if expectation is None:
-                return
-            needs, record = expectation.needs, expectation.record
-            signals = {"force", *needs.stored} | (
-                set(record.signals) & {"spikes", "field"}
-            )
-            if needs.detect_on is not None:
-                signals.add("spikes")
-            signals -= (
-                {"coil_current"} if "coil_current" not in record.signals else set()
-            )
-            twin = bool(expectation.preview.traces)
-        self.centre.stack.show_lanes(lanes_for(signals, twin=twin))
 
     def fold(self, side: QWidget, folded: bool) -> None:
         """Fold a side panel by hand; the window's width no longer decides."""
@@ -233,6 +211,9 @@ class Window(QMainWindow):
     def _connect(self) -> None:
         session = self.session
         session.changed.connect(self.render_state)
+        self.opening.changed.connect(self.render_state)
+        self.frames.told.connect(self.render_clock)
+        self.actions_.fold_asked.connect(self.fold)
         session.logged.connect(self.centre.log.add)
         session.planned.connect(self.opening.plan_arrived)
         session.source_changed.connect(self.opening.follow_run)
@@ -245,13 +226,13 @@ class Window(QMainWindow):
         self.banner.log_asked.connect(self.centre.log.show_safety)
         self.centre.log.noted.connect(session.note)
         self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
-        self.centre.empty.open_asked.connect(lambda: ask_scene(self))
+        self.centre.empty.open_asked.connect(self.opening.ask_scene)
         self.centre.empty.connect_asked.connect(self.actions_.connect_dialog)
         self.centre.empty.recent_asked.connect(self.opening.open_run)
         self.closing.stopped.connect(self.leave)
         self.centre.tools.export_asked.connect(self.actions_.export_view)
         self.centre.tools.monitor.clicked.connect(session.watch)
-        self.setup.scene_wanted.connect(lambda: ask_scene(self))
+        self.setup.scene_wanted.connect(self.opening.ask_scene)
         manual = self.review.manual
         manual.begun.connect(session.begin_manual)
         manual.field_asked.connect(session.read_field)

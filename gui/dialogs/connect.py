@@ -35,7 +35,8 @@ from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 
 if TYPE_CHECKING:
-    from gui.window import Window
+    from gui.opening import Opening
+    from gui.panels import Panels
     from tactile_lab.acquisition.execution import Executed
 
 WIRING, FIELD = "wiring_check", "calibrate_field"
@@ -290,15 +291,15 @@ class Connect(Overlay):
         self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
 
-def show_connect(window: Window) -> None:
+def show_connect(window: QWidget, panels: Panels, opening: Opening) -> None:
     """Open the dialog."""
     found = window.findChild(Connect)
     if isinstance(found, Connect):
         shown = found
     else:
-        shown = Connect(window, window.session, window.theme)
-        shown.prepare_asked.connect(window.opening.open_scene)
-        shown.run_asked.connect(window.opening.run_scene)
+        shown = Connect(window, panels.session, panels.theme)
+        shown.prepare_asked.connect(opening.open_scene)
+        shown.run_asked.connect(opening.run_scene)
     shown.show_bench()
     shown.open()
     shown.instruments.scan.setFocus()

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.parts import Segments, column, label, push, scrolling
-
-if TYPE_CHECKING:
-    from gui.window import Window
 
 PANELS = (
     (
@@ -53,11 +50,11 @@ PANELS = (
 
 
 class Help(Overlay):
-    """Two pages: panels and shortcuts."""
+    """Two pages: panels and shortcuts, given as (keys, words)."""
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self, window: QWidget, keys: Sequence[tuple[str, str]]) -> None:
         super().__init__(window, 640)
-        self._pages = (self._panels(), self._shortcuts(window))
+        self._pages = (self._panels(), self._shortcuts(keys))
         choice = Segments(["Panels", "Shortcuts"], "Help page")
         choice.group.idClicked.connect(self._show)
         self._choice = choice
@@ -96,13 +93,12 @@ class Help(Overlay):
         rows.addStretch(1)
         return page
 
-    def _shortcuts(self, window: Window) -> QWidget:
+    def _shortcuts(self, own: Sequence[tuple[str, str]]) -> QWidget:
         page = QWidget()
         grid = QGridLayout(page)
         grid.setHorizontalSpacing(24)
         grid.setVerticalSpacing(5)
-        listed = [("Esc, F12", "STOP: coil off")]
-        listed += [(", ".join(key.keys), key.words) for key in window.actions_.keys]
+        listed = [("Esc, F12", "STOP: coil off"), *own]
         listed += [("Wheel", "Zoom time"), ("Shift+wheel", "Pan")]
         half = -(-len(listed) // 2)
         for number, (keys, words) in enumerate(listed):
@@ -113,9 +109,9 @@ class Help(Overlay):
         return page
 
 
-def show_help(window: Window) -> None:
+def show_help(window: QWidget, keys: Sequence[tuple[str, str]]) -> None:
     """Open the help."""
     found = window.findChild(Help)
-    shown = found if isinstance(found, Help) else Help(window)
+    shown = found if isinstance(found, Help) else Help(window, keys)
     shown.open()
     shown.close_button.setFocus()

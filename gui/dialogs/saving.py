@@ -22,47 +22,55 @@ from gui.setup.texts import FieldError
 from tactile_lab.errors import TactileLabError
 
 if TYPE_CHECKING:
-    from gui.window import Window
+    from gui.lanes.compare import Comparison
+    from gui.lanes.stored import RunSource
+    from gui.panels import Panels
 
 TITLE = 34
 CSV_POINTS = 20_000
 
 
-def save_scene(window: Window) -> None:
+def save_scene(panels: Panels) -> None:
     """Ask where, and write the form as a scene with every key expanded."""
     name, _ = QFileDialog.getSaveFileName(
-        window, "Save the scene", f"{window.setup.kind_name}.toml", "Scenes (*.toml)"
+        panels.centre.window(),
+        "Save the scene",
+        f"{panels.setup.kind_name}.toml",
+        "Scenes (*.toml)",
     )
     if name:
-        write_scene(window, Path(name))
+        write_scene(panels, Path(name))
 
 
-def write_scene(window: Window, path: Path) -> None:
+def write_scene(panels: Panels, path: Path) -> None:
     """Write the form as a scene."""
     try:
-        path.write_text(window.setup.request().load().to_toml(), encoding="utf-8")
+        path.write_text(panels.setup.request().load().to_toml(), encoding="utf-8")
     except (TactileLabError, FieldError, OSError) as error:
-        window.session.log(Level.ERROR, "scene", f"{path} was not saved: {error}")
+        panels.session.log(Level.ERROR, "scene", f"{path} was not saved: {error}")
     else:
-        window.session.log(Level.GOOD, "scene", f"Saved {path}")
+        panels.session.log(Level.GOOD, "scene", f"Saved {path}")
 
 
-def export_view(window: Window) -> None:
-    """Ask where, and export what the lanes show."""
+def export_view(panels: Panels, run: RunSource | Comparison | None) -> None:
+    """Ask where, and export what the lanes show; `run` is from disk."""
     name, _ = QFileDialog.getSaveFileName(
-        window, "Export this view", "view.png", "Picture (*.png *.svg);;Table (*.csv)"
+        panels.centre.window(),
+        "Export this view",
+        "view.png",
+        "Picture (*.png *.svg);;Table (*.csv)",
     )
     if name:
-        write_view(window, Path(name))
+        write_view(panels, run, Path(name))
 
 
-def write_view(window: Window, path: Path) -> None:
+def write_view(panels: Panels, run: RunSource | Comparison | None, path: Path) -> None:
     """Write the visible time of all visible lanes; the ending chooses the format."""
-    stack = window.centre.stack
-    simulated = window.session.spec is None or window.session.spec.simulated
-    if window.opening.run is not None:
-        simulated = window.opening.run.simulated
-    title = window.session.run_name or "plan"
+    stack = panels.centre.stack
+    simulated = panels.session.spec is None or panels.session.spec.simulated
+    if run is not None:
+        simulated = run.simulated
+    title = panels.session.run_name or "plan"
     title += " · SIMULATED" if simulated else " · measured"
     try:
         if path.suffix == ".csv":
@@ -72,9 +80,9 @@ def write_view(window: Window, path: Path) -> None:
         elif not picture(stack, title).save(str(path)):
             raise OSError(f"{path} cannot be written as a picture; end it in .png.")
     except OSError as error:
-        window.session.log(Level.ERROR, "export", f"The view was not exported: {error}")
+        panels.session.log(Level.ERROR, "export", f"The view was not exported: {error}")
     else:
-        window.session.log(Level.GOOD, "export", f"View exported to {path}")
+        panels.session.log(Level.GOOD, "export", f"View exported to {path}")
 
 
 def picture(stack: LaneStack, title: str, scale: int = 2) -> QImage:

@@ -17,12 +17,12 @@ from gui.state import (
 from tactile_lab.quantity import show
 
 if TYPE_CHECKING:
-    from gui.session.session import Session
+    from gui.session.core import Core
 
 NAMES = {"coil": "Coil source", "scope": "Oscilloscope", "meter": "Teslameter"}
 
 
-def instruments(session: Session, coil: CoilView | None) -> tuple[InstrumentView, ...]:
+def instruments(session: Core, coil: CoilView | None) -> tuple[InstrumentView, ...]:
     """Chips of the instruments the planned scene needs, the model last."""
     roles = _roles(session)
     views = []
@@ -39,7 +39,7 @@ def instruments(session: Session, coil: CoilView | None) -> tuple[InstrumentView
     return tuple(views)
 
 
-def _roles(session: Session) -> list[str]:
+def _roles(session: Core) -> list[str]:
     expectation = session.expectation
     if expectation is None:
         found = session.bench.found if session.bench is not None else ()
@@ -53,7 +53,7 @@ def _roles(session: Session) -> list[str]:
     return [role for role, used in wanted.items() if used]
 
 
-def _found(session: Session, role: str) -> tuple[Lamp, str]:
+def _found(session: Core, role: str) -> tuple[Lamp, str]:
     """Lamp and words of an instrument that is not in use now."""
     if session.state is State.CONNECTING:
         return Lamp.WAITING, "asking …"
@@ -65,7 +65,7 @@ def _found(session: Session, role: str) -> tuple[Lamp, str]:
     return Lamp.GOOD, "opens when a run starts"
 
 
-def _coil(session: Session, coil: CoilView | None) -> InstrumentView:
+def _coil(session: Core, coil: CoilView | None) -> InstrumentView:
     what = truth(session.state, coil)
     if coil is None or what is Truth.NONE:
         lamp, words = _found(session, "coil")
@@ -82,7 +82,7 @@ def _coil(session: Session, coil: CoilView | None) -> InstrumentView:
     return InstrumentView(NAMES["coil"], lamp, limit_text(coil), value)
 
 
-def _scope(session: Session) -> InstrumentView:
+def _scope(session: Core) -> InstrumentView:
     lamp, words = _found(session, "scope")
     expectation, value = session.expectation, "idle"
     if lamp in (Lamp.ABSENT, Lamp.WAITING, Lamp.BAD):
@@ -97,7 +97,7 @@ def _scope(session: Session) -> InstrumentView:
     return InstrumentView(NAMES["scope"], lamp, words, value)
 
 
-def _meter(session: Session) -> InstrumentView:
+def _meter(session: Core) -> InstrumentView:
     lamp, words = _found(session, "meter")
     field = session.readings.get("field")
     value = "—" if field is None else show(round(field, 5), "T", 3)
@@ -111,7 +111,7 @@ def _short(identity: str) -> str:
     return " ".join(identity.split(",")[:2])
 
 
-def _twin(session: Session) -> str:
+def _twin(session: Core) -> str:
     estimate = session.expectation
     if estimate is None:
         return "idle"

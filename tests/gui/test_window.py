@@ -247,11 +247,11 @@ def test_view_is_exported(lab) -> None:
 
     window, folder = lab.window, lab.folder
     for name in ("view.png", "view.svg", "view.csv"):
-        write_view(window, folder / name)
+        write_view(window.panels, None, folder / name)
         assert (folder / name).stat().st_size > 100
     header = (folder / "view.csv").read_text().splitlines()[1]
     assert "V_C1_time_s" in header and "force_mean_N" in header
-    write_scene(window, folder / "saved.toml")
+    write_scene(window.panels, folder / "saved.toml")
     assert 'name = "pulses"' in (folder / "saved.toml").read_text()
 
 
