@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import suppress
 from typing import Any
 
 import serial
@@ -11,12 +12,13 @@ import serial
 from drivers.dialect_row import Wire
 from tactile_lab.errors import InstrumentError, NotFoundError
 
-try:
-    from termios import error as termios_error
-except ImportError:  # Windows has no termios
-    termios_error = OSError  # type: ignore[misc, assignment]
+TermiosError: type[Exception] = OSError
+with suppress(ImportError):  # Windows has no termios
+    import termios
 
-PORT_ERRORS = (serial.SerialException, OSError, termios_error)
+    TermiosError = termios.error
+
+PORT_ERRORS = (serial.SerialException, OSError, TermiosError)
 """What pyserial raises when a port fails; `termios.error` is not an `OSError`."""
 
 

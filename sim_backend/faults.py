@@ -14,10 +14,7 @@ from typing import Literal
 
 import serial
 
-try:
-    from termios import error as termios_error
-except ImportError:  # Windows has no termios
-    termios_error = OSError  # type: ignore[misc, assignment]
+from drivers.serial_port import TermiosError
 
 Kind = Literal[
     "late",
@@ -35,7 +32,9 @@ Kind = Literal[
     "unplug",
 ]
 
-Form = Literal["usb", "closed", "reset"]
+Form = Literal["usb", "windows", "closed", "reset"]
+
+Call = Literal["write", "read", "waiting", "reset"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +54,9 @@ class SerialFault:
         times: how often it strikes; None for ever.
         amount: see `kind`; for `unplug`, s after which the port may be opened again
             (0: never).
-        form: of an unplug: `usb` adapter gone, socket `closed` or `reset`.
+        form: of an unplug: `usb` adapter gone, the same on `windows`, socket `closed`
+            or `reset`.
+        call: of pyserial's, at which an unplug strikes; `line` is the last one sent.
     """
 
     kind: Kind
@@ -65,6 +66,7 @@ class SerialFault:
     times: int | None = 1
     amount: float = 0.0
     form: Form = "usb"
+    call: Call = "write"
 
 
 @dataclass
@@ -96,14 +98,16 @@ class FaultSchedule:
         self._waiting.clear()
 
     def strike(
-        self, line: bytes, time: float, kinds: Iterable[str]
+        self, line: bytes, time: float, kinds: Iterable[str], call: Call = "write"
     ) -> list[SerialFault]:
-        """Faults of these kinds that strike `line` at `time` s."""
+        """Faults of these kinds that strike `line` at `time` s, in that call."""
         found = []
         text = line.decode("latin-1")
         for entry in self._waiting:
             fault = entry.fault
             if fault.kind not in kinds or entry.times == 0 or time < fault.after:
+                continue
+            if fault.call != call:
                 continue
             if re.search(fault.line, text) is None:
                 continue
@@ -148,10 +152,13 @@ def spoilt(
         elif fault.kind == "carriage_return":
             out = out.removesuffix(end) + b"\r"
         elif fault.kind == "flow_control":
-            out = b"\x13" + out + b"\x11"
+            out = b"\x13" + out[:2] + b"\x11\x13" + out[2:] + b"\x11"
         elif fault.kind == "noise":
             out = b"\x00\xfe\x7f" + out
     return delay, out
+
+
+WINDOWS_GONE = "PermissionError(13, 'The device does not recognize the command.', 22)"
 
 
 @dataclass
@@ -173,6 +180,8 @@ class Unplugged:
         self.writes += 1
         if self.form == "usb":
             raise serial.SerialException("write failed: [Errno 5] Input/output error")
+        if self.form == "windows":
+            raise serial.SerialException(f"WriteFile failed ({WINDOWS_GONE})")
         if self.form == "closed" and self.writes == 1:
             return  # the first write after a FIN succeeds silently
         code = 32 if self.form == "closed" else 104
@@ -185,6 +194,8 @@ class Unplugged:
                 "device reports readiness to read but returned no data (device "
                 "disconnected or multiple access on port?)"
             )
+        if self.form == "windows":
+            raise serial.SerialException(f"ReadFile failed ({WINDOWS_GONE})")
         if self.form == "closed":
             raise serial.SerialException("socket disconnected")
         raise serial.SerialException("connection failed ([Errno 104])")
@@ -193,10 +204,12 @@ class Unplugged:
         """Raise as `in_waiting` does, or say 1 as a dead socket does."""
         if self.form == "usb":
             raise OSError(errno.EIO, "Input/output error")
+        if self.form == "windows":
+            raise serial.SerialException(f"ClearCommError failed ({WINDOWS_GONE})")
         return 1
 
     def reset(self) -> None:
         """Raise as `reset_input_buffer` and `flush` do."""
         if self.form == "usb":
-            raise termios_error(errno.EIO, "Input/output error")
+            raise TermiosError(errno.EIO, "Input/output error")
         self.read()

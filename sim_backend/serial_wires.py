@@ -20,6 +20,7 @@ from drivers.dialect_row import Wire
 from sim_backend.faults import (
     ANSWER_KINDS,
     REFUSAL,
+    Call,
     FaultSchedule,
     SerialFault,
     Unplugged,
@@ -157,6 +158,7 @@ class SimPort(serial.SerialBase):
         self._far_end: FarEnd | None = None
         self._arriving: list[tuple[float, int]] = []
         self._line_free = 0.0
+        self._last = b""
         super().__init__(*args, **kwargs)  # type: ignore[arg-type]
 
     def open(self) -> None:
@@ -190,6 +192,7 @@ class SimPort(serial.SerialBase):
         clock, each = far_end.clock, far_end.wire.character_time
         heard = self._same_settings(far_end.wire)
         for group in re.findall(rb"[^\r\n]*[\r\n]|[^\r\n]+", data):
+            self._last = group
             self._strike(far_end, group)
             if far_end.unplugged is not None:
                 far_end.unplugged.write()
@@ -214,8 +217,8 @@ class SimPort(serial.SerialBase):
     def in_waiting(self) -> int:
         """Bytes that have arrived."""
         far_end = self._connected()
-        if far_end.unplugged is not None:
-            return far_end.unplugged.in_waiting()
+        if (gone := self._gone("waiting")) is not None:
+            return gone.in_waiting()
         now = far_end.clock.now()
         return sum(time <= now for time, _ in self._arriving)
 
@@ -230,9 +233,22 @@ class SimPort(serial.SerialBase):
 
     def flush(self) -> None:
         """Nothing waits to be sent: `write` returns when all is done."""
-        gone = self._connected().unplugged
-        if gone is not None:
+        if (gone := self._gone("reset")) is not None:
             gone.reset()
+
+    def _gone(self, call: Call) -> Unplugged | None:
+        """The far end's absence, if it is gone, from this call on if need be."""
+        far_end = self._connected()
+        now = far_end.clock.now()
+        for fault in far_end.faults.strike(self._last, now, ("unplug",), call):
+            self._unplug(far_end, fault)
+        return far_end.unplugged
+
+    def _unplug(self, far_end: FarEnd, fault: SerialFault) -> None:
+        now = far_end.clock.now()
+        back = now + fault.amount if fault.amount else float("inf")
+        far_end.unplugged = Unplugged(fault.form, back)
+        self._arriving.clear()
 
     def _strike(self, far_end: FarEnd, group: bytes) -> None:
         """Let the wire's own faults happen before these bytes go out."""
@@ -241,14 +257,12 @@ class SimPort(serial.SerialBase):
             if fault.kind == "stuck":
                 clock.sleep_until(clock.now() + (self.write_timeout or 0.0))
                 raise serial.SerialTimeoutException("Write timeout")
-            back = clock.now() + fault.amount if fault.amount else float("inf")
-            far_end.unplugged = Unplugged(fault.form, back)
-            self._arriving.clear()
+            self._unplug(far_end, fault)
 
     def _read(self, size: int | None, end: bytes | None) -> bytes:
         far_end = self._connected()
-        if far_end.unplugged is not None:
-            far_end.unplugged.read()
+        if (gone := self._gone("read")) is not None:
+            gone.read()
         clock = far_end.clock
         values = bytes(value for _, value in self._arriving)
         count = len(values) + 1 if size is None else size

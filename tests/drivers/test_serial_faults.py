@@ -101,7 +101,7 @@ def test_a_lasting_fault_is_told_and_not_called_safe(serial_bench, kind):
     assert it.coil.safe_off().verified
 
 
-@pytest.mark.parametrize("form", ["usb", "closed", "reset"])
+@pytest.mark.parametrize("form", ["usb", "windows", "closed", "reset"])
 @pytest.mark.parametrize("line", ["CURR [^M]", "MEAS", "OUTP 0", "OUTP\\?"])
 def test_unplugged_for_good(serial_bench, form, line):
     it = serial_bench
@@ -124,7 +124,43 @@ def test_unplugged_for_good(serial_bench, form, line):
         it.coil.open()
 
 
-@pytest.mark.parametrize("form", ["usb", "closed", "reset"])
+@pytest.mark.parametrize("form", ["usb", "windows", "closed", "reset"])
+@pytest.mark.parametrize("call", ["read", "waiting"])
+def test_unplugged_at_other_calls_than_write(serial_bench, form, call):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    # without an answer the line is drained, which asks what waits
+    it.end.faults.add(SerialFault(kind="missing", line="CURR [^M]"))
+    it.end.faults.add(
+        SerialFault(kind="unplug", line="CURR [^M]", form=form, call=call, amount=0.6)
+    )
+    with pytest.raises(LinkLostError, match="was lost"):
+        it.drive(0.7)
+    assert it.end.faults.struck >= 1
+    assert it.coil.safe_off().verified
+    assert not it.source.output_on
+
+
+@pytest.mark.parametrize("form", ["usb", "windows", "closed", "reset"])
+def test_unplugged_again_as_it_is_reopened(serial_bench, form):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="unplug", line="CURR [^M]", amount=0.1))
+    it.end.faults.add(
+        SerialFault(kind="unplug", form=form, call="reset", after=it.clock.now())
+    )
+    with pytest.raises(LinkLostError):
+        it.drive(0.7)
+    report = it.coil.safe_off()
+    assert it.end.faults.struck == 2
+    assert not report.verified and "OUTPUT STATE UNKNOWN" in report.text
+
+
+@pytest.mark.parametrize("form", ["usb", "windows", "closed", "reset"])
 def test_unplugged_and_back_is_made_safe_not_resumed(serial_bench, form):
     it = serial_bench
     it.coil.open()
