@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
 from tactile_lab.store.columns import Records, SampleColumn
+from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
 from tactile_lab.store.layout import RECORDS, Layout, declare
 from tactile_lab.trial import Outcome
@@ -33,17 +34,26 @@ class Recorder:
         folder: of the run.
         layout: what to store.
         reserve: bytes that must stay free on the disk.
+        sync: push the file to the disk every second (see `Durable`); unless given, for
+            measured runs, because a simulated one can be computed again.
 
     Raises:
         RecordingError: from every method, when something cannot be stored.
     """
 
     def __init__(
-        self, folder: RunFolder, layout: Layout, *, reserve: int = RESERVE
+        self,
+        folder: RunFolder,
+        layout: Layout,
+        *,
+        reserve: int = RESERVE,
+        sync: bool | None = None,
     ) -> None:
         self.folder = folder
         self.layout = layout
         self._reserve = reserve
+        self._sync = not layout.simulated if sync is None else sync
+        self._durable: Durable | None = None
         self._records = {name: Records(kind) for name, kind in RECORDS.items()}
         self._file: h5py.File | None = None
         self._columns: tuple[SampleColumn, ...] = ()
@@ -238,6 +248,8 @@ class Recorder:
         for name, records in self._records.items():
             records.attach(file[name])
         file.swmr_mode = True
+        if self._sync:
+            self._durable = Durable(path)
         self._flush()
 
     def _begin_piece(self, start: float) -> None:
@@ -273,6 +285,8 @@ class Recorder:
         if self._file is None:
             return
         check_space(self.folder.path, self._reserve)
+        if self._durable is not None:
+            self._durable.raise_failure()
         if time.monotonic() - self._flushed > CADENCE:
             for column in self._columns:
                 column.write()
@@ -298,6 +312,9 @@ class Recorder:
                     records.flush()
         finally:
             file.close()
+            if self._durable is not None:
+                with suppress(*failed):
+                    self._durable.close()
 
     def _guard(self, write: Callable[[], None]) -> None:
         """Turn what a disk can do to us into a message that says what is kept."""

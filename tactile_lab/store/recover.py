@@ -26,6 +26,7 @@ from tactile_lab.store.folder import (
 from tactile_lab.store.layout import CHECK, RECORDS, create_channel
 from tactile_lab.store.opening import missing_bytes
 from tactile_lab.store.run import Run
+from tactile_lab.store.torn import rows_of
 
 KEPT = "data.killed.h5"
 """What the file is called that the crash left."""
@@ -121,8 +122,8 @@ def _copy(run: Run, file: h5py.File) -> tuple[int, int]:
 def _readable_rows(run: Run, name: str, record: np.dtype[Any]) -> NDArray[Any]:
     """A table; empty where the crash left it unreadable."""
     try:
-        return run.records(name)
-    except OSError:
+        return rows_of(run.table(name))
+    except (OSError, RuntimeError):
         return np.empty(0, record)
 
 
@@ -131,9 +132,9 @@ def _sound(run: Run, name: str) -> int:
     samples, checks, _ = run.column(name)
     size = samples.chunks[0]
     end = 0
-    for number, (count, crc) in enumerate(checks[()].tolist()):
+    for number, (count, crc) in enumerate(rows_of(checks).tolist()):
         first = number * size
-        if first + count > samples.shape[0]:
+        if count == 0 or first + count > samples.shape[0]:
             break
         try:
             codes = samples[first : first + count]
@@ -142,6 +143,8 @@ def _sound(run: Run, name: str) -> int:
         if zlib.crc32(codes.data) != crc:
             break
         end = first + count
+        if count < size:
+            break  # written when it was the last; what follows has no such place
     return end
 
 

@@ -165,6 +165,10 @@ class Run:
         rows: Records = self._file[name][()]
         return rows
 
+    def table(self, name: str) -> h5py.Dataset:
+        """A table as the file holds it, unread."""
+        return self._file[name]
+
     def table_attributes(self, name: str) -> dict[str, Any]:
         """Units and settings stored with a table."""
         return dict(self._file[name].attrs)
