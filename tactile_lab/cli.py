@@ -12,6 +12,7 @@ import click
 VERBS = {
     "gui": "Open the bench window.",
     "run": "Run a scene on its bench and store every sample; the demo unless given.",
+    "monitor": "Watch the sensor, coil off; keep the last minute on demand.",
     "plan": "What a scene needs and leaves out, its cost and limits; opens nothing.",
     "simulate": "The model alone, no bench: spikes, error estimate, run time.",
     "accuracy": "Error against run time: our solver and others, seven scenes.",

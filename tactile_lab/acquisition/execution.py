@@ -15,15 +15,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
-from tactile_lab.acquisition.environment import environment
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import Ask
-from tactile_lab.acquisition.provenance import changed, keep_scene, temperature
+from tactile_lab.acquisition.provenance import (
+    changed,
+    keep_scene,
+    origin,
+    temperature,
+)
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.acquisition.stop import StopRequest
@@ -136,7 +139,10 @@ class Execution:
         self._search = SpikeSearch(scene, on) if on is not None else None
         self._journal: RecorderThread | None = None
         self.folder = RunFolder.create(
-            out, scene.name, self._info(), needed=self.plan.estimate.disk
+            out,
+            scene.name,
+            origin(self.plan, self.bench, self._notes),
+            needed=self.plan.estimate.disk,
         )
         self._runner: Runner | None = None
         self._certificate: Certificate | None = None
@@ -291,20 +297,3 @@ class Execution:
             magnet = self.scene.bench.magnet
             wanted = magnet.current_for(trial.force, coil.limits.current)
         return limited(wanted, coil.limits.slew, update_interval, before)[0]
-
-    def _info(self) -> dict[str, Any]:
-        scene = self.scene
-        return {
-            "scene": scene.name,
-            "protocol": scene.protocol.name,
-            "title": scene.protocol.title,
-            "bench": scene.bench.name,
-            "simulated": self.bench.simulated,
-            "seed": scene.simulated.seed if self.bench.simulated else None,
-            "sample_rate_Hz": scene.record.sample_rate,
-            "planned_s": self.plan.estimate.duration,
-            "warnings": list(self.plan.warnings),
-            "assumptions": list(self.plan.assumptions),
-            "notes": self._notes,
-            "environment": environment(),
-        }

@@ -5,8 +5,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+from tactile_lab.acquisition.environment import environment
+from tactile_lab.bench import Bench
 from tactile_lab.errors import RecordingError
+from tactile_lab.plan.plan import Plan
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, RunFolder
@@ -15,6 +19,25 @@ Settings = Mapping[str, Mapping[str, str]]
 
 MOVED = frozenset({"output", "setpoint_A"})
 """Settings that a run itself moves; the recorded current tells of them."""
+
+
+def origin(plan: Plan, bench: Bench, notes: Mapping[str, str]) -> dict[str, Any]:
+    """What `run.json` says of a run before it begins."""
+    scene = plan.scene
+    return {
+        "scene": scene.name,
+        "protocol": scene.protocol.name,
+        "title": scene.protocol.title,
+        "bench": scene.bench.name,
+        "simulated": bench.simulated,
+        "seed": scene.simulated.seed if bench.simulated else None,
+        "sample_rate_Hz": scene.record.sample_rate,
+        "planned_s": plan.estimate.duration,
+        "warnings": list(plan.warnings),
+        "assumptions": list(plan.assumptions),
+        "notes": dict(notes),
+        "environment": environment(),
+    }
 
 
 def keep_scene(folder: RunFolder, scene: Scene) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -113,7 +113,7 @@ def command(
             out,
             realtime=realtime,
             emit=narrator,
-            notes=_notes(notes),
+            notes=noted(notes),
             ask=person,
             asked_field=field_reader(loaded, person, field),
         )
@@ -235,7 +235,7 @@ def run_guarded(execution: Execution) -> tuple[Executed | None, Exception | None
             failed.append(error)
 
     worker = threading.Thread(target=work, name="runner")
-    with _caught_signals() as caught:
+    with caught_signals() as caught:
         worker.start()
         told = 0
         while worker.is_alive():
@@ -248,10 +248,10 @@ def run_guarded(execution: Execution) -> tuple[Executed | None, Exception | None
 
 
 @contextmanager
-def _caught_signals() -> Iterator[list[int]]:
-    """The numbers of the signals that ask to stop, as they come."""
+def caught_signals(names: Sequence[str] = SIGNALS) -> Iterator[list[int]]:
+    """The numbers of the signals of those names, as they come."""
     caught: list[int] = []
-    numbers = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
     before = {n: signal.signal(n, lambda got, _: caught.append(got)) for n in numbers}
     try:
         yield caught
@@ -307,7 +307,8 @@ def _differences(again: Path, done: Executed) -> Differences | None:
         return None
 
 
-def _notes(notes: tuple[str, ...]) -> dict[str, str]:
+def noted(notes: tuple[str, ...]) -> dict[str, str]:
+    """What ``--note`` options say."""
     from tactile_lab.errors import SceneError
 
     found = {}

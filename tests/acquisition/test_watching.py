@@ -1,0 +1,116 @@
+"""Watching without force: a minute is held, and becomes a run when asked."""
+
+import numpy as np
+import pytest
+
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.acquisition.ring import Ring
+from tactile_lab.acquisition.watching import Watching
+from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.errors import RecordingError, SceneError
+from tactile_lab.report.from_run import read
+from tactile_lab.report.write import write
+from tactile_lab.scene.load import load
+from tactile_lab.store.run import Run
+from tactile_lab.store.verify import verify
+
+FIRES = (
+    "sensor.V_GS=1.65 V",
+    "protocol.duration=4 s",
+    "record.sample_rate=0.5 MS/s",
+)
+"""So far above its threshold the sensor fires without any force."""
+
+
+def test_record_keeps_the_last_seconds_as_a_whole_run(tmp_path):
+    seen, kept = [], []
+
+    def emit(event):
+        if isinstance(event, events.SpikesSeen):
+            seen.extend(event.times)
+        if isinstance(event, events.Progress) and event.elapsed > 2.5 and not kept:
+            kept.append((event.elapsed, watching.record(tmp_path, {"why": "trimmed"})))
+
+    watching = Watching(load("monitor", FIRES), emit=emit, keep=1.0)
+    ending = watching.run()
+    assert ending.state is RunState.COMPLETE
+    assert ending.off.verified
+    assert watching.standing.distance < 0
+    assert watching.standing.rate > 1
+    assert "below it: fires" in str(watching.standing)
+
+    when, folder = kept[0]
+    later = watching.record(tmp_path)
+    for path, end in ((folder, when), (later, 4.2)):
+        with Run.load(path) as run:
+            assert run.status == "complete"
+            assert 1.0 <= run.duration < 1.3
+            assert len(run.signal("V_K")) == pytest.approx(run.duration * 5e5, abs=1)
+            times = run.spikes["time"]
+            zero = end - run.duration
+            inside = [t for t in seen if zero + 0.1 < t < end - 0.3]
+            assert len(inside) <= times.size <= len(inside) + 8
+            assert run.info["loss"]["spikes"] == 0
+            assert run.info["loss"]["produced"] == run.info["loss"]["written"]
+        assert verify(path).sound
+    with Run.load(folder) as run:
+        assert run.info["notes"]["why"] == "trimmed"
+    report = write(folder, read(folder))
+    assert "fires at rest" in report.html.read_text()
+
+
+def test_watching_stops_when_asked_and_stores_nothing_of_itself(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def emit(event):
+        if isinstance(event, events.Progress) and event.elapsed > 1:
+            watching.stop("enough")
+
+    overrides = ("protocol.duration=600 s", "record.sample_rate=10 kS/s")
+    watching = Watching(load("monitor", overrides), emit=emit)
+    ending = watching.run()
+    assert ending.state is RunState.ABORTED
+    assert ending.reason == "enough"
+    assert watching.standing.distance == pytest.approx(0.37, abs=0.02)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_pushes_is_not_watched():
+    with pytest.raises(SceneError, match="asks for a force"):
+        Watching(load("demo"))
+
+
+def test_what_does_not_fit_into_the_memory_is_refused():
+    with pytest.raises(SceneError, match=r"GB of memory.*sample_rate"):
+        Watching(load("monitor", ["record.sample_rate=5 MS/s"]))
+
+
+def test_nothing_can_be_kept_before_the_first_sample(tmp_path):
+    watching = Watching(load("monitor"))
+    assert str(watching.standing) == "no V_C1 yet"
+    with pytest.raises(RecordingError, match="Nothing to keep"):
+        watching.record(tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_the_ring_forgets_what_is_older_than_its_length():
+    ring = Ring(1.0)
+    channel = Channel(signal="V_C1", input="A", range=5.0)
+    stream = Stream(
+        channels=(channel,), interval=0.01, full_scale=32512, shift=8, started=3.0,
+        uncertainty=1e-3,
+    )  # fmt: skip
+    ring.segment(stream, 0.5)
+    for k in range(100):
+        codes = np.full((1, 7), k, np.int16)
+        ring.append(Block(7 * k, codes, (False,), 0.0))
+        ring.field(0.5 + 0.07 * (k + 1), float(k))
+    held = ring.held()
+    assert 1.0 <= held.length < 1.0 + 0.07
+    assert held.start == pytest.approx(0.5 + 7.0 - held.length)
+    assert held.blocks[-1].codes[0, 0] == 99
+    assert len(held.field) <= 15
+    ring.segment(stream, 9.0)
+    with pytest.raises(RecordingError):
+        ring.held()

@@ -1,0 +1,38 @@
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tactile_lab.report.from_run import read
+
+START = "import sys; from tactile_lab.cli import main; sys.exit(main())"
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGUSR1"), reason="a signal of POSIX")
+def test_enter_and_a_signal_record_and_ctrl_c_ends(tmp_path):
+    watching = subprocess.Popen(
+        [sys.executable, "-c", START, "monitor", "--keep", "2", "--out", "kept",
+         "--set", "record.sample_rate=10 kS/s"],
+        cwd=tmp_path, text=True, bufsize=1, env=os.environ,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        while "V_C1 4.3" not in (line := watching.stderr.readline()):
+            assert line, "it ended before it saw V_C1"
+        assert "mV above threshold: silent" in line
+        watching.stdin.write("\n")
+        watching.stdin.flush()
+        first = watching.stdout.readline().split()[-1]
+        watching.send_signal(signal.SIGUSR1)
+        second = watching.stdout.readline().split()[-1]
+        watching.send_signal(signal.SIGINT)
+        _, said = watching.communicate(timeout=120)
+    finally:
+        watching.kill()
+    assert watching.returncode == 0, said
+    assert first != second
+    for folder in (first, second):
+        assert read(tmp_path / folder).status == "complete"
+        assert (tmp_path / folder / "report.html").exists()
