@@ -128,8 +128,10 @@ def show(value: float, unit: str, digits: int = 4) -> str:
         if float(f"{abs(number):.{digits}g}") >= 1000 and power < 9:
             power, number = power + 3, number / 1000
         prefix = _SHOWN[power]
-    text = f"{number:.{digits}g}".replace("-", "−")
-    return f"{text} {prefix}{unit}".rstrip()
+    text = f"{number:.{digits}g}"
+    if "e+" in text and abs(number) < 1e4:
+        text = f"{float(text):.0f}"
+    return f"{text} {prefix}{unit}".replace("-", "−").rstrip()
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ SAME = 2e-5
 """Set-points nearer than this are one level, A."""
 VISIBLE = 0.03
 """Smallest step an edge of which the shunt shows, A: two codes."""
+ENOUGH = 5
+"""So many edges seen tell how early the others came."""
 BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s."""
 LEVEL = 0.2
@@ -39,12 +41,15 @@ class AppliedCurrent:
     Attributes:
         steps: shape (n, 2): from that time on, s, this current, A.
         edges: number of steps whose time the shunt gave.
+        lead: by how much those came before the host heard of them, s (median): all
+            others were moved by as much; 0 where there were too few.
         shunt_over_source: slope of the averaged shunt over the read-back; None where
             fewer than 3 levels were held long enough.
     """
 
     steps: FloatArray
     edges: int
+    lead: float
     shunt_over_source: Estimate | None
 
 
@@ -64,22 +69,27 @@ def applied_current(
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
-        return AppliedCurrent(np.empty((0, 2)), 0, None)
+        return AppliedCurrent(np.empty((0, 2)), 0, 0.0, None)
     first = np.flatnonzero(np.abs(np.diff(sent, prepend=np.inf)) > SAME)
     last = np.append(first[1:], t.size)
     level = np.array(
         [_level(sent[a], read[a:b]) for a, b in zip(first, last, strict=True)]
     )
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
-    edges = 0
+    edges, lead = 0, 0.0
     if shunt is not None:
+        seen = np.full(begin.size, np.nan)
         for i in range(1, begin.size):
             at = _edge(shunt, begin[i - 1], begin[i], level[i - 1], level[i])
-            if at is not None:
-                begin[i], edges = at, edges + 1
+            seen[i] = np.nan if at is None else at
+        edges = int(np.isfinite(seen).sum())
+        if edges >= ENOUGH:  # the small ones came as early as those the shunt shows
+            lead = float(np.nanmedian(begin - seen))
+        begin[1:] -= lead
+        begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     steps = np.column_stack([begin, level])
     ratio = None if shunt is None else _ratio(shunt, begin, ends, level)
-    return AppliedCurrent(steps, edges, ratio)
+    return AppliedCurrent(steps, edges, lead, ratio)
 
 
 def _level(sent: float, read: FloatArray) -> float:

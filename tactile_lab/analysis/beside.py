@@ -72,7 +72,7 @@ def _spikes(outcome: Outcome, predicted: np.ndarray) -> str:
     start, length = outcome.start, outcome.trial.length
     mine = predicted[(predicted >= start) & (predicted < start + length)] - start
     count = outcome.spike_times.size
-    text = f"{count} spikes (model {mine.size})"
+    text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
     offsets = match(outcome.spike_times, mine).offsets
     if offsets.size:
         text += f", {_signed(1e3 * float(np.median(offsets)))} ms (median)"

@@ -15,8 +15,12 @@ from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
+ELSEWHERE = frozenset({"wiring_check"})
+"""Protocols that put the probes elsewhere: nothing follows from V_C1 alone."""
 WITHIN = 0.5
-"""A pair of spikes may lie apart by this part of the interval around it."""
+"""A spike may lie off its expected place by this part of the interval around it."""
+SILENCE = 3.0
+"""A gap so many times longer than the interval before begins a new burst."""
 PART = 0.05
 """Of the force's band by which it is moved: so little that each spike is known again;
 what it does is taken to grow in proportion."""
@@ -249,9 +253,11 @@ def match(
     displaced: Sequence[ArrayLike] = (),
     clock: float = 0.0,
 ) -> Matched:
-    """Pair spikes that are each other's nearest and near enough.
+    """Pair spikes in order, each where the pair before lets expect it.
 
-    Near enough is half the shorter of the intervals around either spike, so that a
+    A train that runs a little faster leaves the other behind by and by, so each spike
+    is looked for at the offset of the last pair, after a long silence at none. It must
+    lie there within half the shorter of the intervals around either spike, so that a
     pair never reaches across a neighbour.
 
     Args:
@@ -268,12 +274,9 @@ def match(
         return Matched(
             nothing, nothing, theirs.size, ours.size, *(nothing for _ in range(4))
         )
-    to_theirs = _nearest(ours, theirs)
-    to_ours = _nearest(theirs, ours)
-    mutual = to_ours[to_theirs] == np.arange(ours.size)
+    to_theirs = _followed(ours, theirs)
+    paired = to_theirs >= 0
     offsets = ours - theirs[to_theirs]
-    room = WITHIN * np.minimum(_interval(ours), _interval(theirs)[to_theirs])
-    paired = mutual & (np.abs(offsets) <= room)
     index = np.flatnonzero(paired)
     both = paired[1:] & paired[:-1] & (np.diff(to_theirs) == 1)
     rate_error = np.diff(theirs[to_theirs])[both] / np.diff(ours)[both] - 1
@@ -303,6 +306,26 @@ def _shift(spikes: FloatArray, displaced: FloatArray) -> FloatArray:
         mutual = _nearest(displaced, spikes)[there] == np.arange(spikes.size)
         moved[mutual] = (displaced[there] - spikes)[mutual] / PART
     return moved
+
+
+def _followed(ours: FloatArray, theirs: FloatArray) -> NDArray[np.intp]:
+    """For each of ours the index of its pair among theirs, or -1."""
+    found = np.full(ours.size, -1, dtype=np.intp)
+    near_ours, near_theirs = _interval(ours), _interval(theirs)
+    offset, free = 0.0, 0
+    for i, time in enumerate(ours):
+        if i and time - ours[i - 1] > SILENCE * near_ours[i - 1]:
+            offset = 0.0
+        after = free + int(np.searchsorted(theirs[free:], time - offset))
+        around = [j for j in (after - 1, after) if free <= j < theirs.size]
+        if not around:
+            continue
+        j = min(around, key=lambda k: abs(time - offset - theirs[k]))
+        room = WITHIN * min(near_ours[i], near_theirs[j])
+        if abs(time - offset - theirs[j]) <= room:
+            found[i], free = j, j + 1
+            offset = time - theirs[j]
+    return found
 
 
 def _nearest(of: FloatArray, among: FloatArray) -> NDArray[np.intp]:

@@ -176,7 +176,10 @@ class Narrator:
         searched = execution.needs.detect_on is not None
         if searched or "V_C1" in execution.needs.stored:
             from tactile_lab.analysis.beside import Beside
+            from tactile_lab.analysis.twin import ELSEWHERE
 
+            if execution.scene.protocol.name in ELSEWHERE:
+                return
             self._model = Beside(execution.scene, searched=searched)
 
     def __call__(self, event: Event) -> None:

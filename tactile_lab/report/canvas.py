@@ -44,10 +44,14 @@ STYLE: Any = {
 }
 
 
+WIDTH, HEIGHT = 7.2, 3.7
+"""Of a figure with one panel, inches."""
 HEADING = "heading"
 """Names the heading's parts in SVG: a page with a heading of its own hides them."""
 HEAD_HEIGHT = 0.62
 """Room the heading takes at the top, inches."""
+BOX = (0.72, 0.5, WIDTH - 1.02, HEIGHT - 0.5 - HEAD_HEIGHT)
+"""Left, bottom, width and height of that panel, inches."""
 
 
 def blank(width: float, height: float) -> Figure:

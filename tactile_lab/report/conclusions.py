@@ -158,7 +158,9 @@ def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     if not changes:
         return Conclusion()
     said = ["; ".join(sentences) + "."]
-    said += [_sensitivity(c) for c in changes if c["sensitivity_A_per_N"] is not None]
+    per_force = [_sensitivity(c) for c in changes if c["level_N"]]
+    if per_force:
+        said.append(f"Per force: {'; '.join(per_force)}.")
     if run.force_uncertainty is None:
         said.append(NO_UNCERTAINTY)
     values: dict[str, Any] = {"I_DS_changes": changes}
@@ -197,7 +199,7 @@ def _sensitivity(change: dict[str, Any]) -> str:
     value = change["sensitivity_A_per_N"] * 1e6
     known = change["sensitivity_uncertainty_A_per_N_95"]
     spread = "" if known is None else f" ± {known * 1e6:.2g}"
-    return f"{show(change['level_N'], 'N')}: {value:.3g}{spread} nA/mN."
+    return f"{show(change['level_N'], 'N')} {value:.3g}{spread} nA/mN"
 
 
 def _tau(trace: Trace, trials: Sequence[TrialFinding]) -> tuple[Estimate | None, str]:

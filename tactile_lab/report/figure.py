@@ -25,6 +25,11 @@ from tactile_lab.report.trial_finding import TrialFinding
 
 FloatArray = NDArray[np.float64]
 
+CAPTION = (
+    "(a) Force. (b) Voltages and drain current: mean and, shaded, the extremes within "
+    "each bin; dotted: the model driven by the applied current. (c) Spikes detected "
+    "on V_K (ticks) and the instantaneous rate 1/ISI (dots). Grey bands: holds."
+)
 WIDTH = 7.2
 LEFT, RIGHT = 0.72, 0.3
 FOOT, HEAD, GAP = 0.5, HEAD_HEIGHT, 0.18
@@ -53,6 +58,8 @@ def figure(findings: Findings) -> Figure:
     _force(panels["a"], run)
     if voltages:
         _voltages(panels["b"], voltages, run.trace("V_C1", model=True))
+        if run.protocol == "monitor" and run.circuit is not None:
+            _critical(panels["b"], run.circuit.critical_V_C1)
     if drain:
         _drain(panels["i"], drain)
     if spikes:
@@ -185,6 +192,16 @@ def _voltages(panel: Axes, traces: list[Trace], model: Trace | None) -> None:
     if len(traces) > 1:
         panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
     panel.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+
+
+def _critical(panel: Axes, V_C1: float) -> None:
+    """Where V_C1 makes the sensor fire: what somebody who trims V_GS looks at."""
+    panel.axhline(V_C1, color=palette.V_C1.light, lw=0.8, ls=(0, (4, 2)), zorder=2)
+    panel.annotate(
+        f"fires below {show(V_C1, 'V')}", (0.01, V_C1), (0, -3),
+        xycoords=panel.get_yaxis_transform(), textcoords="offset points", va="top",
+        size=7, color=palette.V_C1.light,
+    )  # fmt: skip
 
 
 def _drain(panel: Axes, trace: Trace) -> None:

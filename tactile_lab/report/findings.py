@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from tactile_lab.analysis.drain_current import drain_current
-from tactile_lab.analysis.twin import Twin
+from tactile_lab.analysis.twin import ELSEWHERE, Twin
 from tactile_lab.errors import TactileLabError
 from tactile_lab.report.conclusion import Conclusion
 from tactile_lab.report.conclusions import conclude
@@ -35,10 +35,6 @@ class Findings:
     notes: tuple[str, ...]
     conclusion: Conclusion
     twin: Twin | None
-
-
-ELSEWHERE = frozenset({"wiring_check"})
-"""Protocols that put the probes elsewhere: nothing follows from V_C1 alone."""
 
 
 def find(run: RunData) -> Findings:

@@ -181,6 +181,8 @@ def _told(applied: AppliedCurrent) -> tuple[str, ...]:
         f"coil current: levels as the source read them back, {applied.edges} of "
         f"{steps - 1} steps timed by the shunt"
     )
+    if applied.lead and applied.edges < steps - 1:
+        said += f", the others moved alike ({show(applied.lead, 's', 2)} earlier)"
     ratio = applied.shunt_over_source
     if ratio is not None:
         said += (

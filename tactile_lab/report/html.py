@@ -11,32 +11,22 @@ from collections.abc import Iterable, Mapping
 from html import escape
 
 from tactile_lab.quantity import show
-from tactile_lab.report import palette, twin_figure
+from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT, HEADING
 from tactile_lab.report.findings import Findings
 from tactile_lab.report.style import STYLE
-from tactile_lab.report.summary import CAPTIONS
 from tactile_lab.report.table import NONE, table
 from tactile_lab.report.trial_finding import TrialFinding
 from tactile_lab.report.twinned import sentences
 
-CAPTION = (
-    "(a) Force. (b) Voltages and drain current: mean and, shaded, the extremes within "
-    "each bin; dotted: the model driven by the applied current. (c) Spikes detected "
-    "on V_K (ticks) and the instantaneous rate 1/ISI (dots). Grey bands: holds."
-)
 
-
-def page(
-    findings: Findings, svg: str, summary: str | None = None, twin: str | None = None
-) -> str:
+def page(findings: Findings, pictures: Mapping[str, tuple[str, str]]) -> str:
     """The report as one HTML page.
 
     Args:
         findings: what to say.
-        svg: the figure, as matplotlib wrote it in the light palette.
-        summary: a second figure likewise, or None.
-        twin: the figure of the model beside the run likewise, or None.
+        pictures: SVG text as matplotlib wrote it in the light palette, and caption,
+            by the figure's name.
     """
     run = findings.run
     mark = (
@@ -57,11 +47,11 @@ def page(
         _list("warning", "Warnings", run.warnings),
         _list("conclusion", "Result", findings.conclusion.sentences),
         _results(findings),
-        "" if summary is None else _figure(findings, summary, _caption(findings)),
-        _figure(findings, svg, CAPTION),
+        _figure(findings, pictures.get("summary")),
+        _figure(findings, pictures.get("figure")),
         _beside(findings),
-        "" if twin is None else _figure(findings, twin, twin_figure.CAPTION),
-        _drift(findings),
+        _figure(findings, pictures.get("twin")),
+        _drift(findings, pictures.get("drift")),
         _fits(findings.trials),
         _certificate(findings),
         _list("assumption", "Assumptions", (*run.assumptions, *findings.notes)),
@@ -131,17 +121,16 @@ def _legend(findings: Findings) -> str:
     )
 
 
-def _figure(findings: Findings, svg: str, caption: str) -> str:
-    described = f"{findings.run.title}: force, voltages and spikes against time"
+def _figure(findings: Findings, picture: tuple[str, str] | None) -> str:
+    if picture is None:
+        return ""
+    svg, caption = picture
+    described = f"{findings.run.title}: {caption}"
     inline = _themed(svg[svg.index("<svg") :])
     inline = inline.replace(
         "<svg", f'<svg role="img" aria-label="{escape(described)}"', 1
     )
     return f"<figure>{inline}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-def _caption(findings: Findings) -> str:
-    return CAPTIONS.get(findings.run.protocol, "")
 
 
 def _beside(findings: Findings) -> str:
@@ -175,15 +164,20 @@ def _cropped(match: re.Match[str]) -> str:
     return f'{match[1]} viewBox="0 {top:g} {match[2]} {float(match[3]) - top:g}"'
 
 
-def _drift(findings: Findings) -> str:
-    """Rest V_C1 before every trial, where each starts from rest."""
-    rest = [t.trial.rest for t in findings.trials if t.trial.rest is not None]
-    if len(rest) < 2 or not any(t.pause for t in findings.run.trials):
+def _drift(findings: Findings, picture: tuple[str, str] | None) -> str:
+    """Rest V_C1 before every trial."""
+    if picture is None:
         return ""
-    shown = ", ".join(show(r, "V") for r in rest)
-    spread = show(max(rest) - min(rest), "V", 3)
-    return _list(
-        "drift", "V_C1 at rest before each trial", (f"{shown}: a spread of {spread}.",)
+    judged = [t.trial for t in findings.trials if t.trial.drift is not None]
+    rest = [t.rest for t in judged if t.rest is not None]
+    most = max((t.drift for t in judged if t.drift is not None), key=abs)
+    said = (
+        f"V_C1 rested between {show(min(rest), 'V')} and {show(max(rest), 'V')}. Less "
+        "what the film remembers of earlier forces it drifted by "
+        f"{show(most, 'V', 2)} at most."
+    )
+    return _list("drift", "V_C1 at rest before each trial", (said,)) + _figure(
+        findings, picture
     )
 
 

@@ -36,7 +36,7 @@ def responses(run: RunData, trials: Sequence[TrialFinding], trace: Trace) -> lis
     return found
 
 
-def _known(run: RunData, found: Gain) -> Estimate:
+def known_gain(run: RunData, found: Gain) -> Estimate:
     """The gain with its noise and the force's uncertainty."""
     gain = Estimate.of(found.gain, found.error, LARGE)
     if run.force_uncertainty is None:
@@ -55,7 +55,7 @@ def sine_sweep(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         return Conclusion(("No frequency was completed.",))
     beside = run.trace("V_C1", model=True)
     expected = responses(run, trials, beside) if beside is not None else []
-    known = [(g, _known(run, g)) for g in found]
+    known = [(g, known_gain(run, g)) for g in found]
     said = "; ".join(
         f"{g.frequency:.3g} Hz {u.value:.3g} ± {(u.high - u.low) / 2:.2g} V/N at "
         f"{np.degrees(g.phase):.0f}°"

@@ -19,7 +19,9 @@ PANEL = 1.2
 CAPTION = (
     "Measured less model, the model driven by the applied current. (a) V_C1. (b) Times "
     "of matched spikes. (c) Rate 1/ISI. Shaded: the tolerance, what the scope's codes, "
-    "the clocks and the stated uncertainty of the force leave open (95 %)."
+    "the clocks and the stated uncertainty of the force leave open (95 %). Short peaks "
+    "at steps of the force are the field's lag behind the current, which the model "
+    "does not know."
 )
 
 
@@ -92,7 +94,7 @@ def _voltage(panel: Axes, residual: Residual, axis: Axis) -> None:
 
 def _offsets(panel: Axes, matched: Matched, axis: Axis) -> None:
     _points(panel, axis, matched.measured, matched.offsets, matched.tolerance, 1e3)
-    panel.set_ylabel("Spike time (ms)")
+    panel.set_ylabel("Spikes (ms)")
 
 
 def _rates(panel: Axes, matched: Matched, axis: Axis) -> None:
@@ -111,7 +113,7 @@ def _points(
     at = axis.closed(time)
     panel.vlines(
         at, -tolerance * scale, tolerance * scale, color=palette.TWIN.light,
-        alpha=0.35, lw=3, zorder=2,
+        alpha=0.35, lw=3 if at.size < 60 else 1, zorder=2,
     )  # fmt: skip
     panel.plot(
         at, value * scale, "o", color=palette.RATE.light, ms=2.4, mew=0, zorder=3

@@ -7,13 +7,11 @@ from pathlib import Path
 
 from tactile_lab.report.bench_conclusions import write_calibration_file
 from tactile_lab.report.canvas import save
-from tactile_lab.report.figure import figure
+from tactile_lab.report.figures import figures
 from tactile_lab.report.findings import Findings, find
 from tactile_lab.report.html import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
-from tactile_lab.report.summary import summary
-from tactile_lab.report.twin_figure import twin_figure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,7 +30,8 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
 
     A field calibration also gets calibration.csv, for a bench file to name.
     Protocols whose answer is not a trace also get summary.png and summary.svg, runs
-    with a model beside them twin.png and twin.svg.
+    with a model beside them twin.png and twin.svg, runs with rests before their trials
+    drift.png and drift.svg.
 
     Args:
         folder: exists; files of these names are replaced.
@@ -47,16 +46,15 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
     # the numbers first: they survive if drawing should fail
     results.write_text(as_json(findings), encoding="utf-8")
     write_calibration_file(folder, findings.run)
-    png, svg = save(figure(findings), folder / "figure", pdf=pdf)
+    pictures = {}
+    for drawn in figures(findings):
+        _, svg = save(drawn.figure, folder / drawn.stem, pdf=pdf)
+        pictures[drawn.stem] = svg, drawn.caption
     html = folder / "report.html"
-    second = summary(findings)
-    other = None if second is None else save(second, folder / "summary", pdf=pdf)[1]
-    third = twin_figure(findings)
-    beside = None if third is None else save(third, folder / "twin", pdf=pdf)[1]
-    html.write_text(page(findings, svg, other, beside), encoding="utf-8")
+    html.write_text(page(findings, pictures), encoding="utf-8")
     return Report(
         findings=findings,
-        png=png,
+        png=folder / "figure.png",
         svg=folder / "figure.svg",
         html=html,
         results=results,

@@ -60,3 +60,19 @@ def test_steps_below_two_codes_keep_the_host_s_time():
 def test_nothing_applied_is_nothing():
     found = applied_current([], [], [], shunt())
     assert found.steps.shape == (0, 2)
+
+
+def test_steps_the_shunt_cannot_show_come_as_early_as_the_others():
+    came = np.arange(8.0)
+    levels = np.array([0.0, 0.5, 0.51, 1.0, 0.5, 0.0, 0.3, 0.6])
+    time = np.arange(0, 9, 1e-3) + 5e-4
+    value = levels[np.searchsorted(came, time, side="right") - 1]
+
+    def shunt(start, end):
+        inside = (time >= start) & (time < end)
+        return time[inside], value[inside]
+
+    found = applied_current(came + 0.03, levels, levels * np.nan, shunt)
+    assert found.edges == 6
+    assert found.lead == pytest.approx(0.03, abs=1.5e-3)
+    assert found.steps[1:, 0] == pytest.approx(came[1:], abs=2e-3)

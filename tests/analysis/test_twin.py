@@ -114,6 +114,23 @@ def test_a_small_shift_is_found_as_an_offset(times, part):
     assert found.offsets == pytest.approx(shift, abs=1e-12)
 
 
+def test_a_train_that_runs_faster_is_followed_beyond_an_interval():
+    theirs = np.cumsum(np.linspace(0.05, 0.2, 40))
+    ours = theirs * 0.97 - 0.01
+    found = match(ours, theirs)
+    assert found.missed == found.extra == 0
+    assert found.offsets == pytest.approx(ours - theirs)
+    assert found.offsets.min() < -0.1
+    assert found.rate_error == pytest.approx(1 / 0.97 - 1)
+
+
+def test_after_a_silence_the_offset_begins_anew():
+    theirs = np.cumsum([0.1] * 20)
+    both = np.concatenate([theirs, theirs + 30])
+    found = match(np.concatenate([theirs * 0.96, theirs * 0.96 + 30]), both)
+    assert found.missed == found.extra == 0
+
+
 @given(TRAIN, st.data())
 def test_a_lost_spike_is_missed_and_a_false_one_is_extra(times, data):
     lost = data.draw(st.integers(0, times.size - 1))
