@@ -11,11 +11,16 @@ from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
 
 
-def check_bench(request: Request) -> Checked | Refused:
-    """Who answers on a request's bench, or why it cannot be used."""
+def check_bench(request: Request, *, realtime: bool = True) -> Checked | Refused:
+    """Who answers on a request's bench, or why it cannot be used.
+
+    Args:
+        request: names the bench.
+        realtime: pace a simulated bench by the wall clock.
+    """
     try:
         scene = request.load()
-        return check(scene, open_bench(scene, realtime=True))
+        return check(scene, open_bench(scene, realtime=realtime))
     except (TactileLabError, OSError) as error:
         return Refused(Fault("The bench cannot be used.", str(error)))
     except Exception as error:  # a driver of the user's own may raise anything

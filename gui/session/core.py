@@ -49,6 +49,7 @@ class Core(QObject):
     Args:
         out: folder for run folders.
         separate: benches are driven in a process of its own.
+        realtime: a simulated bench is paced by the wall clock.
 
     Attributes:
         bench_overrides: ``bench.key=value`` texts that change the connected bench.
@@ -64,7 +65,9 @@ class Core(QObject):
     twinned = Signal(object)
     queue_changed = Signal()
 
-    def __init__(self, out: Path, *, separate: bool = True) -> None:
+    def __init__(
+        self, out: Path, *, separate: bool = True, realtime: bool = True
+    ) -> None:
         super().__init__()
         self.out = out
         self.state = State.DISCONNECTED
@@ -91,7 +94,7 @@ class Core(QObject):
         self.lines: list[Line] = []
         self.coil = CoilWatch()
         self.inbox: SimpleQueue[Told] = SimpleQueue()
-        self.link = Link(self.inbox, separate=separate)
+        self.link = Link(self.inbox, separate=separate, realtime=realtime)
         self.monitor = Monitor(self.link)
         self.folder: Path | None = None
         self._run: RunAfar | None = None

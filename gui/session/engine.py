@@ -38,10 +38,15 @@ LEAVE = 60.0
 
 
 class Engine:
-    """Serves one window through `pipe`."""
+    """Serves one window.
 
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
+    Args:
+        pipe: to the window.
+        realtime: pace a simulated bench by the wall clock.
+    """
+
+    def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
+        self._pipe, self._realtime = pipe, realtime
         self._sending = threading.Lock()
         self._runs: dict[int, Running] = {}
 
@@ -66,7 +71,9 @@ class Engine:
         match command:
             case StartRun(run=number):
                 self._runs = {n: r for n, r in self._runs.items() if r.alive}
-                self._runs[number] = Running(command, self._teller(number))
+                self._runs[number] = Running(
+                    command, self._teller(number), realtime=self._realtime
+                )
                 self._runs[number].start()
             case StopRun(run=number, reason=reason):
                 if number in self._runs:
@@ -80,9 +87,12 @@ class Engine:
             case MakePlan(serial=serial, request=request):
                 start(lambda: self.tell(0, _planned(serial, request)), "plan")
             case CheckBench(request=request):
-                start(lambda: self.tell(0, check_bench(request)), "check")
+                start(lambda: self._check(request), "check")
             case MakeTwin():
                 start(lambda: self.tell(0, _twins(command)), "twin of a run")
+
+    def _check(self, request: Request) -> None:
+        self.tell(0, check_bench(request, realtime=self._realtime))
 
     def _teller(self, number: int) -> Callable[[Told], None]:
         return lambda told: self.tell(number, told)
@@ -96,7 +106,7 @@ class Engine:
                 pass  # `serve` sees the end of the pipe and stops every run
 
 
-def main(pipe: Connection) -> None:
+def main(pipe: Connection, realtime: bool = True) -> None:
     """Serve in a process of its own.
 
     Ctrl-C and a closed terminal reach the window too, which decides; SIGTERM ends as
@@ -106,7 +116,7 @@ def main(pipe: Connection) -> None:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
-    Engine(pipe).serve()
+    Engine(pipe, realtime=realtime).serve()
 
 
 def _leave(number: int, frame: object) -> None:

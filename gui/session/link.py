@@ -78,10 +78,13 @@ class Link:
         inbox: where everything that belongs to no run is put.
         separate: in a process of its own; else in a thread, for tests that reach into
             the simulated far ends.
+        realtime: pace a simulated bench by the wall clock.
     """
 
-    def __init__(self, inbox: Inbox, *, separate: bool = True) -> None:
-        self._inbox, self._separate = inbox, separate
+    def __init__(
+        self, inbox: Inbox, *, separate: bool = True, realtime: bool = True
+    ) -> None:
+        self._inbox, self._separate, self._realtime = inbox, separate, realtime
         self._pipe: Connection | None = None
         self._process: BaseProcess | threading.Thread | None = None
         self._runs: dict[int, RunAfar] = {}
@@ -139,13 +142,14 @@ class Link:
         ours, theirs = context.Pipe()
         if self._separate:
             self._process = context.Process(
-                target=engine.main, args=(theirs,), daemon=True
+                target=engine.main, args=(theirs, self._realtime), daemon=True
             )
             # daemonic: a window that ends without `close` still sends it SIGTERM
             self._process.start()
             theirs.close()
         else:
-            self._process = start(engine.Engine(theirs).serve, "engine")
+            served = engine.Engine(theirs, realtime=self._realtime)
+            self._process = start(served.serve, "engine")
         self._pipe = ours
         start(lambda: self._read(ours), "link")
         return ours

@@ -44,10 +44,13 @@ class Running:
     Args:
         asked: what to run.
         tell: tells the window, from any thread.
+        realtime: pace a simulated bench by the wall clock.
     """
 
-    def __init__(self, asked: StartRun, tell: Callable[[Told], None]) -> None:
-        self._asked, self._tell = asked, tell
+    def __init__(
+        self, asked: StartRun, tell: Callable[[Told], None], *, realtime: bool = True
+    ) -> None:
+        self._asked, self._tell, self._realtime = asked, tell, realtime
         self._execution: Execution | None = None
         self._twin: LiveTwin | None = None
         self._stop_asked: str | None = None
@@ -101,7 +104,7 @@ class Running:
             execution = Execution(
                 self._asked.request.load(),
                 self._asked.out,
-                realtime=True,
+                realtime=self._realtime,
                 emit=self._emit,
                 notes=self._asked.notes,
                 ask=self._ask,
