@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from tactile_lab.acquisition.live import Bins
 from tactile_lab.acquisition.rate import Rate
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
+from tactile_lab.errors import RecordingError
 from tactile_lab.trial import Outcome
 
 
@@ -65,8 +67,10 @@ class Account:
         return self.journal
 
     def state(self, state: events.RunState, text: str) -> None:
-        """The run entered a state."""
-        self.note(str(state), text)
+        """The run entered a state; that is told even where it cannot be stored."""
+        # a record that fails is told by what fails in it, and must not hold up a stop
+        with suppress(RecordingError):
+            self.note(str(state), text)
         self.emit(events.StateChanged(state, text))
 
     def note(self, kind: str, text: str) -> None:

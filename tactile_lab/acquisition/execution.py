@@ -169,8 +169,10 @@ class Execution:
     def run(self) -> Executed:
         """Run to the end; the coil is safe and the folder closed when this returns.
 
+        A record that could not be completed is a fault of the run: how it ended tells.
+
         Raises:
-            RecordingError: the record could not be completed; what it has is kept.
+            RecordingError: the run could not be begun in its folder.
         """
         began = time.monotonic()
         self._emit(events.FolderMade(self.folder.path))
@@ -186,7 +188,7 @@ class Execution:
         self._runner = runner
         ending = runner.run()
         took = time.monotonic() - began
-        self._close(runner, ending, took)
+        ending = self._close(runner, ending, took)
         proof = self._certificate
         return Executed(
             folder=self.folder.path,
@@ -219,8 +221,8 @@ class Execution:
         )
         return self._journal
 
-    def _close(self, runner: Runner, ending: Ending, took: float) -> None:
-        """Complete the record and say in it how the run ended."""
+    def _close(self, runner: Runner, ending: Ending, took: float) -> Ending:
+        """Complete the record and say in it how the run ended, which may fail, too."""
         status = STATUS[ending.state]
         before = runner.instruments.settings
         after = runner.instruments.settings_after
@@ -237,14 +239,20 @@ class Execution:
             "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
             "overrange": sorted(runner.intake.overrange),
         }
-        if ending.failure and not isinstance(ending.failure, TactileLabError):
-            told = "".join(traceback.format_exception(ending.failure))
-            self.folder.write_text("traceback.txt", told)
-        if self._journal is None:
-            self.folder.finish(status, **entries)
-        else:
-            self._journal.close(status, runner.intake.produced, **entries)
-            self._certificate = write_certificate(self.folder.path)
+        try:
+            if ending.failure and not isinstance(ending.failure, TactileLabError):
+                told = "".join(traceback.format_exception(ending.failure))
+                self.folder.write_text("traceback.txt", told)
+            if self._journal is None:
+                self.folder.finish(status, **entries)
+                return ending
+            try:
+                self._journal.close(status, runner.intake.produced, **entries)
+            finally:
+                self._certificate = write_certificate(self.folder.path)
+        except TactileLabError as failure:
+            return ending.faulted_by(failure)
+        return ending
 
     def _task(self) -> Task:
         scene, needed = self.scene, self.needs

@@ -103,10 +103,11 @@ class Runner:
             except BaseException as error:
                 state, failure = events.RunState.FAULTED, error
                 reason = f"{type(error).__name__}: {error}"
-            self._account.state(events.RunState.STOPPING, "making the coil safe")
-            self._lease.end()
-            off = self.instruments.close()
-            self._tell_changes()
+            try:
+                self._account.state(events.RunState.STOPPING, "making the coil safe")
+            finally:  # whatever a watcher does
+                self._lease.end()
+                off = self.instruments.close()
             self._last_words()
             self._account.state(state, reason or off.text)
         return Ending(state, off, reason, failure, self._stop.signal)
@@ -383,6 +384,7 @@ class Runner:
     def _last_words(self) -> None:
         """Store what the instruments still delivered while they were closed."""
         try:
+            self._tell_changes()
             self._take_blocks()
             self._account.readings(self.instruments)
             self._account.spikes(self.intake.end())

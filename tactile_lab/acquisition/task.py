@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
@@ -11,6 +11,7 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Channel, OffReport
+from tactile_lab.errors import TactileLabError
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -63,6 +64,14 @@ class Ending:
     reason: str | None = None
     failure: BaseException | None = None
     signal: int | None = None
+
+    def faulted_by(self, failure: TactileLabError) -> Ending:
+        """The same end where something failed after it; an earlier fault stays."""
+        if self.state is RunState.FAULTED:
+            return self
+        return replace(
+            self, state=RunState.FAULTED, reason=str(failure), failure=failure
+        )
 
     @property
     def exit_code(self) -> int:

@@ -223,6 +223,10 @@ class Recorder:
         spikes = self.spikes_stored
         try:
             self._guard(self._close)
+        except RecordingError as failure:
+            status = "faulted"
+            entries["reason"] = entries.get("reason") or str(failure)
+            raise
         finally:
             counters = {
                 column.signal: {

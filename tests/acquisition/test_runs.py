@@ -1,5 +1,8 @@
 """Whole runs on the simulated bench: real drivers, simulated far ends, real files."""
 
+import shutil
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,8 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.scene.load import load
+from tactile_lab.store.columns import SampleColumn
+from tactile_lab.store.verify import verify
 
 
 def codes(ran):
@@ -216,6 +221,55 @@ def test_a_protocol_that_fails_in_the_middle_leaves_the_coil_off(run_scene, tmp_
     assert ran.done.ending.off.verified
     assert "the protocol has a bug" in ran.done.ending.reason
     assert "in trials" in (ran.folder / "traceback.txt").read_text()
+
+
+def test_a_full_disk_ends_the_run_with_the_coil_off_and_the_data_kept(
+    run_scene, short, monkeypatch
+):
+    def fill(execution, event):
+        if isinstance(event, events.Progress) and event.elapsed > 0.7:
+            usage = SimpleNamespace(free=1_000_000)
+            monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
+
+    ran = run_scene(*short, watch=fill)
+    assert ran.done.ending.exit_code == 3
+    assert ran.done.ending.off.verified
+    assert "Free some space" in ran.done.ending.reason
+    with ran.stored() as run:
+        assert run.status == "faulted"
+        assert len(run.signal("V_K")) >= 0.5e6
+    # the last spikes may have waited for the disk when it gave up: that is told
+    found = {finding.where for finding in verify(ran.folder).findings}
+    assert found <= {"data.h5 /spikes"}
+
+
+def test_a_watcher_that_fails_at_the_stop_does_not_leave_the_coil_on(run_scene, short):
+    seen = []
+
+    def break_down(execution, event):
+        if isinstance(event, events.StateChanged) and event.state == "stopping":
+            seen.append(execution)
+            raise ValueError("a window with a bug")
+
+    with pytest.raises(ValueError, match="a window with a bug"):
+        run_scene(*short, watch=break_down)
+    assert seen[0].coil_state.off.verified
+
+
+def test_a_disk_that_fails_at_the_very_end_is_no_complete_run(
+    run_scene, short, monkeypatch
+):
+    def refuse(self):
+        raise OSError(28, "No space left on device")
+
+    def fail_last(execution, event):
+        if isinstance(event, events.StateChanged) and event.state == "stopping":
+            monkeypatch.setattr(SampleColumn, "write_pyramid", refuse)
+
+    ran = run_scene(*short, watch=fail_last)
+    assert ran.done.ending.exit_code == 3
+    assert "No space left" in ran.done.ending.reason
+    assert ran.stored().info["status"] == "faulted"
 
 
 def test_a_force_beyond_the_coil_is_refused_before_anything_exists(tmp_path):
