@@ -64,6 +64,8 @@ class Outcome:
         rest: mean of each measured signal just before the trial, by name.
         traces: decimated measured signals by name: shape (n, 2), s and SI unit.
         skipped: coil set-points that were skipped because they came too late.
+        codes: one code of the converter for each measured signal, SI; empty where it
+            is not known, as in a plan.
         drift: change of the rest V_C1 since the first trial that looked at it, V, less
             what the film still remembers of the forces; None where V_C1 is not
             measured. It is stored with the trial, as is the rest V_C1 itself.
@@ -77,6 +79,7 @@ class Outcome:
     rest: dict[str, float] = field(default_factory=dict)
     traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     skipped: int = 0
+    codes: dict[str, float] = field(default_factory=dict)
     drift: float | None = None
 
 

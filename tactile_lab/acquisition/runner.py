@@ -179,8 +179,20 @@ class Runner:
             rest=rest,
             traces=self._live.traces(start, start + trial.length),
             skipped=0 if coil is None else coil.skipped - skipped,
+            codes=self._codes(),
             drift=drift,
         )
+
+    def _codes(self) -> dict[str, float]:
+        """One code of each measured signal, SI."""
+        scope = self.instruments.scope
+        stream = None if scope is None else scope.stream
+        if stream is None:
+            return {}
+        return {
+            channel.signal: abs(stream.volts_per_code(row)[0]) * (1 << stream.shift)
+            for row, channel in enumerate(stream.channels)
+        }
 
     def _errand(self, work: Callable[[], T]) -> T:
         """What a person comes back with; simulated time stands still meanwhile."""

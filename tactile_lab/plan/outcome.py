@@ -49,6 +49,7 @@ class ModelOutcome(Outcome):
             ("index", index),
             ("start", step.start),
             ("skipped", 0),
+            ("codes", {}),
             ("_scene", scene),
             ("_step", step),
             ("_steps", steps),

@@ -16,6 +16,8 @@ PerForce = Annotated[float, Unit("V/N", above=0.0)]
 
 MOST_EXTENSIONS = 6
 """After so many extensions V_C1 is taken to have drifted, not to be recovering."""
+CODE = 20e-3
+"""One code of V_C1 where it is not known, V."""
 LOOK = 0.2
 """Time the bench streams to look at V_C1 before it goes on, s."""
 
@@ -35,9 +37,9 @@ class Recovering(ForceProtocol):
     residual: SmallVoltage = Field(
         default=1e-3, description="V_P that may be left when the next trial starts"
     )
-    settled: SmallVoltage = Field(
-        default=20e-3,
-        description="How near V_C1 must be to its first rest value: about one code",
+    settled: SmallVoltage | None = Field(
+        default=None,
+        description="How near V_C1 must be to its first rest value; one code if empty",
     )
 
     def recovery_time(self, force: float) -> float:
@@ -58,7 +60,8 @@ class Recovering(ForceProtocol):
             seen = yield Trial(
                 force=Waveform.constant(0.0), duration=LOOK, label="look at rest"
             )
-            if not abs(resting(seen) - first) > self.settled:
+            near = self.settled or seen.codes.get("V_C1", CODE)
+            if not abs(resting(seen) - first) > near:
                 return
             yield pause(self.tau)
 

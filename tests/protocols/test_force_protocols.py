@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -105,6 +106,19 @@ def test_recovery_is_extended_until_v_c1_is_back():
     assert [t.label for t in trials] == [
         "100 mN", "recovery", "look at rest", "recovery", "look at rest", "200 mN",
     ]  # fmt: skip
+
+
+def test_back_at_rest_means_within_one_code_of_the_channel():
+    looks = iter([4.30, 4.34])
+
+    def answer(trial):
+        if trial.label == "look at rest":
+            seen = outcome_of(trial, rest=next(looks))
+            return replace(seen, codes={"V_C1": 50e-3})
+        return outcome_of(trial, rest=4.347)
+
+    trials = drive(RateForce(levels=(0.1, 0.2)), answer)
+    assert [t.label for t in trials] == ["100 mN", "recovery", "look at rest", "200 mN"]
 
 
 def test_a_rest_that_never_comes_back_is_waited_for_only_so_long():

@@ -2,11 +2,13 @@ import numpy as np
 import pytest
 
 from tactile_lab.plan.timeline import timeline
+from tactile_lab.plugins import protocol_names, scene_names
 from tactile_lab.scene.load import load
 
 SHIPPED = (
     "hold_10s", "fig5b", "rate_force", "staircase", "repeat", "bipolar", "sine_sweep",
     "threshold_search", "calibrate_field", "force_check", "wiring_check", "monitor",
+    "waveform",
 )  # fmt: skip
 
 
@@ -41,3 +43,8 @@ def test_the_force_ends_at_zero(name):
     last = planned.steps[-1].trial
     assert (last.current or last.force).value[-1] == pytest.approx(0.0, abs=1e-15)
     assert np.all(np.isfinite(planned.force.value))
+
+
+def test_every_protocol_that_ships_has_a_scene():
+    played = {load(name).protocol.name for name in scene_names()}
+    assert played == set(protocol_names())
