@@ -23,6 +23,8 @@ HEADERS = (
     ("VGS", "IDS"),
 )
 """First lines a transfer curve may have: ours and a parameter analyser's."""
+NO_NUMBER = 9e37
+"""SCPI instruments send 9.9e37 for an overflow and 9.91e37 for no number."""
 FEWEST = 6
 SUBTHRESHOLD_END = 2.75
 ABOVE_FLOOR = 5.0
@@ -58,14 +60,35 @@ class Transfer:
         return values
 
 
-def read_transfer(path: Path) -> tuple[FloatArray, FloatArray]:
-    """(V_GS in V, I_DS in A) from a CSV with one of the headers in `HEADERS`.
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A transfer curve as read.
+
+    Attributes:
+        V_GS: V.
+        I_DS: A.
+        left_out: lines of the file that held no number, or an instrument's sign for
+            none.
+    """
+
+    V_GS: FloatArray
+    I_DS: FloatArray
+    left_out: tuple[int, ...]
+
+
+def read_transfer(path: Path) -> Curve:
+    """The curve in a CSV with one of the headers in `HEADERS`.
+
+    Rows with NaN, an infinity, or what SCPI instruments send for them (9.9e37 and
+    9.91e37) are left out.
 
     Raises:
         SceneError: the file cannot be read as such.
     """
-    _, rows, _ = read_columns(path, HEADERS)
-    return rows[:, 0], rows[:, 1]
+    _, rows, lines = read_columns(path, HEADERS, gaps=True)
+    good = np.all(np.abs(rows) < NO_NUMBER, axis=1)
+    left_out = tuple(lines[i] for i in np.flatnonzero(~good))
+    return Curve(rows[good, 0], rows[good, 1], left_out)
 
 
 def fit_transfer(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.terminal import print_json, refusing, warn
 
 
 @click.command()
@@ -36,6 +36,8 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
                 f"{folder} cannot be written: {reason.strerror}. Name another folder "
                 "with --out."
             ) from reason
+    for text in (*written.findings.run.warnings, *written.findings.missing):
+        warn(text)
     if as_json:
         print_json(results(written.findings))
         return

@@ -331,10 +331,13 @@ def _report(done: Executed) -> Report | None:
     from tactile_lab.report.write import write
 
     try:
-        return write(done.folder, read(done.folder))
+        report = write(done.folder, read(done.folder))
     except (TactileLabError, OSError) as error:
         warn(f"the report could not be written: {error}")
         return None
+    for text in report.findings.missing:
+        warn(text)
+    return report
 
 
 def _print(done: Executed, report: Report | None, took: float) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.terminal import print_json, refusing, warn
 
 
 @click.command()
@@ -30,13 +30,22 @@ def command(curve: Path, between: tuple[str, str] | None, as_json: bool) -> None
         limits = None
         if between is not None:
             limits = (parse(between[0], "V"), parse(between[1], "V"))
-        fit = fit_transfer(*read_transfer(curve), between=limits)
+        read = read_transfer(curve)
+        if read.left_out:
+            where = ", ".join(map(str, read.left_out[:5]))
+            more = ", ..." if len(read.left_out) > 5 else ""
+            warn(
+                f"{curve}: rows without a number are left out: {len(read.left_out)} "
+                f"(line {where}{more})"
+            )
+        fit = fit_transfer(read.V_GS, read.I_DS, between=limits)
     found = {"I_S_A": fit.I_S, "m": fit.m, "swing_V_per_decade": fit.swing}
     if as_json:
         print_json(
             {
                 **{name: estimate.to_dict() for name, estimate in found.items()},
                 "points": fit.points,
+                "lines_left_out": list(read.left_out),
                 "between_V": list(fit.range),
                 "scatter": fit.scatter,
             }

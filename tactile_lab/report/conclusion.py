@@ -17,7 +17,17 @@ class Conclusion:
     Attributes:
         sentences: for people.
         values: for machines, plain values with units in the keys.
+        missing: what the run was for and does not tell, and why, one sentence each.
     """
 
     sentences: tuple[str, ...] = ()
     values: dict[str, Any] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+
+    def __add__(self, other: Conclusion) -> Conclusion:
+        """Both, one after the other."""
+        return Conclusion(
+            (*self.sentences, *other.sentences),
+            {**self.values, **other.values},
+            (*self.missing, *other.missing),
+        )

@@ -28,16 +28,39 @@ from tactile_lab.report.wiring import wiring_check
 
 LATE = 0.15
 """A coil set over a serial line is late: the first part of a hold still rises, s."""
+FROM_SPIKES = frozenset({"hold", "rate_force", "repeat", "threshold_search"})
+"""Protocols that are run for the spikes."""
+NOT_SEARCHED = (
+    "No result: spikes were not looked for. Put spikes into record.signals; that needs "
+    "V_K (or V_C2, by its resets) on a channel."
+)
 
 
 def conclude(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """The conclusion of the run's protocol; an empty one where it has none."""
     how = _BY_PROTOCOL.get(run.protocol)
-    own = Conclusion() if how is None or not trials else how(run, trials)
-    before = force_at_zero(run)
-    return Conclusion(
-        (*own.sentences, *before.sentences), {**own.values, **before.values}
+    own = Conclusion()
+    if run.protocol in FROM_SPIKES and not run.searched:
+        own = Conclusion(missing=(NOT_SEARCHED,))
+    elif how is not None and trials:
+        own = how(run, trials)
+    elif how is not None:
+        own = Conclusion(missing=("No trial was completed: there is no result.",))
+    return own + force_at_zero(run)
+
+
+def _hold(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
+    held = [t for t in trials if t.trial.hold is not None]
+    fit = next((t.adaptation for t in held if t.adaptation is not None), None)
+    if fit is None:
+        why = held[0].why_not if held else "no hold was completed"
+        return Conclusion((), {"time_constant_s": None}, (f"No time constant: {why}.",))
+    tau = fit.time_constant
+    sentence = (
+        f"The rate falls with a time constant of {tau.value:.3g} s ({tau.low:.3g} to "
+        f"{tau.high:.3g} s, 95 %)."
     )
+    return Conclusion((sentence,), {"time_constant_s": tau.to_dict()})
 
 
 def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
@@ -46,7 +69,7 @@ def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         found = onset(forces, [t.response.spikes for t in trials])
     except NotIdentifiableError as reason:
         return Conclusion(
-            (f"No critical force: {reason}.",), {"critical_force_N": None}
+            (), {"critical_force_N": None}, (f"No critical force: {reason}.",)
         )
     ramp, hold = (run.parameters.get(name, "?") for name in ("ramp", "hold"))
     sentence = (
@@ -85,10 +108,7 @@ def _rate_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         f"The highest rates are {min(ratios):.2f} to {max(ratios):.2f} of what Eq. "
         "(15) gives for the current at the end of the ramp, which knows no adaptation."
     )
-    return Conclusion(
-        (*critical.sentences, sentence),
-        {**critical.values, "peak_rate_over_eq15": ratios},
-    )
+    return critical + Conclusion((sentence,), {"peak_rate_over_eq15": ratios})
 
 
 def _with_slope(
@@ -103,18 +123,15 @@ def _with_slope(
             run.force_uncertainty,
         )
     except NotIdentifiableError as reason:
-        said, value = f"No slope: {reason}.", None
-    else:
-        low, high = slope.low * 1e-3, slope.high * 1e-3
-        said = (
-            f"Above onset the highest rate rises by {slope.value * 1e-3:.3g} Hz/mN "
-            f"({low:.3g} to {high:.3g} Hz/mN, 95 %) on average; the curve bends."
+        return critical + Conclusion(
+            (), {"slope_Hz_per_N": None}, (f"No slope: {reason}.",)
         )
-        value = slope.to_dict()
-    return Conclusion(
-        (*critical.sentences, said),
-        {**critical.values, "slope_Hz_per_N": value},
+    low, high = slope.low * 1e-3, slope.high * 1e-3
+    said = (
+        f"Above onset the highest rate rises by {slope.value * 1e-3:.3g} Hz/mN "
+        f"({low:.3g} to {high:.3g} Hz/mN, 95 %) on average; the curve bends."
     )
+    return critical + Conclusion((said,), {"slope_Hz_per_N": slope.to_dict()})
 
 
 def _repeat(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
@@ -122,7 +139,8 @@ def _repeat(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     rates = [t.response.peak_rate for t in trials]
     values: dict[str, Any] = {"spikes": counts, "peak_rates_Hz": rates}
     if rates[0] is None or len(counts) < 2:
-        return Conclusion(("The first presentation gave no rate.",), values)
+        why = "No decrement: the first presentation gave no rate."
+        return Conclusion((), values, (why,))
     rated = [r for r in rates if r is not None]
     sentence = (
         f"Peak rate from one presentation to the next: "
@@ -137,7 +155,7 @@ def _repeat(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
 def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     trace = run.trace("I_DS")
     if trace is None:
-        return Conclusion()
+        return Conclusion(missing=("No drain current: V_C1 was not recorded.",))
     changes: list[dict[str, Any]] = []
     sentences = []
     margin = BOXCAR_3DB / 20
@@ -156,7 +174,7 @@ def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
             f"{show(during, 'A', 3)}"
         )
     if not changes:
-        return Conclusion()
+        return Conclusion(missing=("No drain current: no force was completed.",))
     said = ["; ".join(sentences) + "."]
     per_force = [_sensitivity(c) for c in changes if c["level_N"]]
     if per_force:
@@ -164,16 +182,17 @@ def _bipolar(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     if run.force_uncertainty is None:
         said.append(NO_UNCERTAINTY)
     values: dict[str, Any] = {"I_DS_changes": changes}
+    missing = []
     tau, why_not = _tau(trace, trials)
     if tau is None:
-        said.append(f"tau: {why_not}.")
+        missing.append(f"No tau: {why_not}.")
     else:
         said.append(
             f"The decay gives tau = {tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} "
             "s, 95 %)."
         )
         values["tau_s"] = tau.to_dict()
-    return Conclusion(tuple(said), values)
+    return Conclusion(tuple(said), values, tuple(missing))
 
 
 def _change(run: RunData, level: float | None, change: float) -> dict[str, Any]:
@@ -226,6 +245,7 @@ def _mean(time: np.ndarray, values: np.ndarray, start: float, end: float) -> flo
 
 
 _BY_PROTOCOL: dict[str, Callable[[RunData, Sequence[TrialFinding]], Conclusion]] = {
+    "hold": _hold,
     "threshold_search": _critical_force,
     "rate_force": _rate_force,
     "repeat": _repeat,

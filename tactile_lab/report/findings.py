@@ -26,6 +26,7 @@ class Findings:
         run: the run, with I_DS among its traces where it can be derived.
         trials: one finding per trial that is no pause.
         notes: statements on derived quantities, one sentence each.
+        missing: what could not be told, and why, one sentence each.
         conclusion: what the protocol was run for.
         twin: the model beside the run, or None.
     """
@@ -33,6 +34,7 @@ class Findings:
     run: RunData
     trials: tuple[TrialFinding, ...]
     notes: tuple[str, ...]
+    missing: tuple[str, ...]
     conclusion: Conclusion
     twin: Twin | None
 
@@ -44,36 +46,41 @@ def find(run: RunData) -> Findings:
     statement, never an error: what can be told is told.
     """
     notes: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
     beside = None
     if run.protocol not in ELSEWHERE:
-        run, beside, notes = _derived(run)
+        run, beside, notes, missing = _derived(run)
     trials = tuple(TrialFinding.of(trial) for trial in _shown(run.trials))
     try:
         conclusion = conclude(run, trials)
     except TactileLabError as reason:
-        conclusion = Conclusion((f"No conclusion: {reason}",))
+        conclusion = Conclusion(missing=(f"No conclusion: {reason}",))
     return Findings(
         run=run,
         trials=trials,
         notes=notes,
+        missing=(*conclusion.missing, *missing),
         conclusion=conclusion,
         twin=beside,
     )
 
 
-def _derived(run: RunData) -> tuple[RunData, Twin | None, tuple[str, ...]]:
-    """The run with I_DS and the model beside it, and what to say of them."""
+def _derived(
+    run: RunData,
+) -> tuple[RunData, Twin | None, tuple[str, ...], tuple[str, ...]]:
+    """The run with I_DS and the model beside it, what to say of them, what failed."""
     notes: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
     beside = None
     try:
         run, notes = _with_drain_current(run)
     except TactileLabError as reason:
-        notes = (f"No I_DS: {reason}",)
+        missing = (f"No I_DS: {reason}",)
     try:
         run, beside = with_twin(run)
     except TactileLabError as reason:
-        notes = (*notes, f"The model could not run beside: {reason}")
-    return run, beside, notes
+        missing = (*missing, f"No model beside the run: {reason}")
+    return run, beside, notes, missing
 
 
 def _shown(trials: Sequence[TrialData]) -> list[TrialData]:

@@ -45,6 +45,7 @@ def page(findings: Findings, pictures: Mapping[str, tuple[str, str]]) -> str:
         "</header>",
         _key_numbers(findings),
         _list("warning", "Warnings", run.warnings),
+        _list("warning", "Not determined", findings.missing),
         _list("conclusion", "Result", findings.conclusion.sentences),
         _results(findings),
         _figure(findings, pictures.get("summary")),

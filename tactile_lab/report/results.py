@@ -53,6 +53,7 @@ def results(findings: Findings) -> dict[str, Any]:
         "twin": None if findings.twin is None else _twin(findings.twin),
         "accuracy": run.accuracy or None,
         "notes": list(findings.notes),
+        "missing": list(findings.missing),
         "warnings": list(run.warnings),
         "assumptions": list(run.assumptions),
         "parameters": dict(run.parameters),

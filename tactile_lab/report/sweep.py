@@ -49,10 +49,10 @@ def sine_sweep(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """Gain and phase of V_C1 per frequency, and of the model."""
     measured = run.trace("V_C1")
     if measured is None:
-        return Conclusion()
+        return Conclusion(missing=("No gain: V_C1 was not recorded.",))
     found = responses(run, trials, measured)
     if not found:
-        return Conclusion(("No frequency was completed.",))
+        return Conclusion(missing=("No gain: no frequency was completed.",))
     beside = run.trace("V_C1", model=True)
     expected = responses(run, trials, beside) if beside is not None else []
     known = [(g, known_gain(run, g)) for g in found]

@@ -47,13 +47,14 @@ def read_text(path: Path, what: str = "File") -> str:
 
 
 def read_columns(
-    path: Path, headers: Sequence[tuple[str, ...]]
+    path: Path, headers: Sequence[tuple[str, ...]], *, gaps: bool = False
 ) -> tuple[tuple[str, ...], NDArray[np.float64], list[int]]:
     """Numeric columns of a CSV file.
 
     Args:
         path: the file; lines that are empty or start with # are passed over.
         headers: allowed headers; the first line must be one of them.
+        gaps: take values that are not finite as they are, for who can do without.
 
     Returns:
         The header found, an array of shape (rows, columns), and each row's line number.
@@ -81,7 +82,7 @@ def read_columns(
                         f"{wanted}."
                     )
                 continue
-            rows.append(_numbers(cells, header, at))
+            rows.append(_numbers(cells, header, at, gaps))
             lines.append(reader.line_num)
     except csv.Error as reason:
         raise SceneError(f"{path}, line {reader.line_num}: {reason}.") from reason
@@ -90,7 +91,9 @@ def read_columns(
     return header, np.array(rows, dtype=np.float64), lines
 
 
-def _numbers(cells: list[str], header: tuple[str, ...], at: str) -> list[float]:
+def _numbers(
+    cells: list[str], header: tuple[str, ...], at: str, gaps: bool
+) -> list[float]:
     if len(cells) != len(header):
         raise SceneError(
             f"{at}: {len(cells)} values where {len(header)} are needed "
@@ -104,7 +107,7 @@ def _numbers(cells: list[str], header: tuple[str, ...], at: str) -> list[float]:
             raise SceneError(
                 f'{at}: {name} is "{cell[:40]}", not a number.'
             ) from reason
-        if not math.isfinite(number):
+        if not (gaps or math.isfinite(number)):
             raise SceneError(f"{at}: {name} is {cell}; give a finite number.")
         row.append(number)
     return row

@@ -52,13 +52,18 @@ def test_it_reads_csv_of_ours_and_of_an_analyser(tmp_path):
         path = tmp_path / "curve.csv"
         path.write_text(f"{header}\n" + "\n".join(f"{v},{i}" for v, i in
                         zip(V, curve(), strict=True)))  # fmt: skip
-        volts, amperes = read_transfer(path)
-        assert fit_transfer(volts, amperes).m.value == pytest.approx(5.646)
+        read = read_transfer(path)
+        assert read.left_out == ()
+        assert fit_transfer(read.V_GS, read.I_DS).m.value == pytest.approx(5.646)
 
 
-def test_nan_in_the_file_is_named_with_its_line(tmp_path):
+def test_rows_without_a_number_are_left_out_and_named(tmp_path):
     path = tmp_path / "curve.csv"
-    path.write_text("VG,ID\n0,1e-12\n1,nan\n")
+    path.write_text("VG,ID\n0,1e-12\n1,nan\n2,3e-12\n3,9.91e37\n4,-inf\n")
+    read = read_transfer(path)
+    assert read.left_out == (3, 5, 6)
+    assert read.V_GS.tolist() == [0.0, 2.0]
+    path.write_text("VG,ID\n0,1e-12\n1,high\n")
     with pytest.raises(SceneError, match="line 3"):
         read_transfer(path)
 

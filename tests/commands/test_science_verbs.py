@@ -74,5 +74,25 @@ def test_transfer_refuses_a_bad_file_and_a_bad_unit(tmp_path):
     path.write_text("VG,ID\n0,1e-12\n1,nan\n")
     done = call("transfer", path)
     assert done.exit_code == 2
-    assert "line 3" in done.stderr
+    assert "rows without a number are left out: 1 (line 3)" in done.stderr
+    assert "6 are needed" in done.stderr
     assert call("transfer", path, "--between", "1 A", "2 V").exit_code == 2
+
+
+def test_a_run_without_v_k_says_what_it_cannot_tell_and_keeps_the_rest(tmp_path):
+    done = call(
+        "run", "hold_10s", "--set", 'protocol.hold="0.5 s"', "--set",
+        'protocol.rest="0 s"', "--set", 'record.signals=["V_C1"]', "--set",
+        'record.sample_rate="50 kS/s"', "--out", tmp_path,
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "warning: No result: spikes were not looked for" in done.stderr
+    (folder,) = tmp_path.iterdir()
+    found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    assert found["missing"][0].startswith("No result: spikes were not looked for")
+    assert found["twin"]["voltages"]["V_C1"]["rms_V"] < 0.05
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Not determined" in page
+    again = call("report", folder)
+    assert again.exit_code == 0
+    assert "spikes were not looked for" in again.stderr

@@ -277,6 +277,46 @@ def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
     assert summary(report.findings).axes[0].collections, "error bars"
 
 
+def test_too_few_spikes_to_fit_are_said(rate_force, tmp_path):
+    held = replace(rate_force, protocol="hold", trials=rate_force.trials[2:3])
+    report = write(tmp_path, held)
+    (said,) = report.findings.missing
+    assert said.startswith("No time constant: not identifiable: ")
+    found = json.loads(report.results.read_text(encoding="utf-8"))
+    assert found["missing"] == [said]
+    assert found["conclusion"]["time_constant_s"] is None
+    assert found["trials"][0]["spikes"] > 3, "what there is, is kept"
+    assert "Not determined" in report.html.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("protocol", "says"),
+    [
+        ("hold", "spikes were not looked for"),
+        ("rate_force", "spikes were not looked for"),
+        ("repeat", "spikes were not looked for"),
+        ("threshold_search", "spikes were not looked for"),
+        ("bipolar", "No drain current"),
+        ("sine_sweep", "No gain"),
+    ],
+)
+def test_a_run_without_its_signal_says_so_and_claims_nothing(
+    rate_force, protocol, says
+):
+    blind = replace(rate_force, protocol=protocol, searched=False, traces=())
+    found = find(blind)
+    assert says in found.missing[0]
+    assert not found.conclusion.sentences
+
+
+def test_forces_that_all_fire_give_no_critical_force_but_their_rates(rate_force):
+    fired = replace(rate_force, trials=rate_force.trials[2:])
+    found = find(fired)
+    assert "every force made the sensor fire" in found.missing[0]
+    assert found.conclusion.values["critical_force_N"] is None
+    assert found.conclusion.values["peak_rate_over_eq15"]
+
+
 def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_path):
     first, second = rate_force.traces
     ragged = replace(
@@ -287,6 +327,7 @@ def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_pa
         rate_force, traces=(ragged, second), circuit=replace(Circuit(), V_S=1e-3)
     )
     report = write(tmp_path, broken)
-    assert any("No I_DS" in note for note in report.findings.notes)
+    assert any("No I_DS" in text for text in report.findings.missing)
+    assert "Not determined" in report.html.read_text(encoding="utf-8")
     assert sum(t.response.spikes for t in report.findings.trials) > 30
     assert report.html.exists()
