@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel
 from gui.lanes.compare import MARKS, Comparison, Member
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, empty, label
-from gui.review.runs import Entry
+from gui.review.entries import Entry
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
 

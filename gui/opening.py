@@ -15,9 +15,9 @@ from gui.lanes.decimate import FloatArray
 from gui.lanes.expected import PlanSource
 from gui.lanes.source import LiveSource, Source
 from gui.panels import Panels
+from gui.review.entries import Entry, entries
 from gui.review.finding import Finding, facts_of, of_outcome, of_run
 from gui.review.fitting import Fitting
-from gui.review.runs import Entry, entries
 from gui.session.messages import Level, Planned, Twins
 from gui.session.request import Request
 from gui.session.threads import start

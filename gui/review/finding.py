@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,6 +126,14 @@ def facts_of(source: RunSource) -> str:
         str(info.get("coil") or "").partition(" | ")[0],
         f"{show(float(info.get('sample_rate_Hz') or 0), 'S/s')} per channel.",
     ]
-    if loss.get("samples") is not None:
-        facts.append(f"Loss: {loss['samples']} samples, {loss.get('spikes')} spikes.")
+    facts.append(loss_text(loss))
     return "<br>".join(fact for fact in facts if fact)
+
+
+def loss_text(loss: Mapping[str, Any]) -> str:
+    """What was lost, as far as it can be told."""
+    samples, spikes = loss.get("samples"), loss.get("spikes")
+    if samples is None:
+        return ""
+    also = "" if spikes is None else f", {spikes} spikes"
+    return f"Loss: {samples} samples{also}."

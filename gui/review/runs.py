@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QFrame,
@@ -20,10 +17,9 @@ from PySide6.QtWidgets import (
 
 from gui.look.theme import Theme
 from gui.parts import Segments, column, empty, label, push, scrolling, set_role
+from gui.review.entries import SHOWN, Entry
+from gui.review.thumbnails import Thumbnails, ThumbnailView
 from gui.state import minutes
-
-SHOWN = 60
-"""Most runs listed at once."""
 
 PILLS = {
     "complete": ("ok", "pill-ok"),
@@ -34,68 +30,6 @@ PILLS = {
 }
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A run folder as its `run.json` describes it."""
-
-    folder: Path
-    title: str
-    scene: str
-    status: str
-    started: str
-    duration: float
-    simulated: bool
-
-    @property
-    def text(self) -> str:
-        """What the search looks at."""
-        return f"{self.folder.name} {self.title} {self.scene} {self.status}".lower()
-
-    def shown_under(self, choice: int) -> bool:
-        """Whether the filter shows it: 0 all, 1 complete, 2 simulated, 3 faults."""
-        return (
-            True,
-            self.status == "complete",
-            self.simulated,
-            self.status not in ("complete", "running"),
-        )[choice]
-
-
-def entries(out: Path) -> list[Entry]:
-    """The runs in `out`, newest first; folders that are no runs are passed over."""
-    found = []
-    if not out.is_dir():
-        return []
-    for file in sorted(out.glob("*/run.json"), reverse=True)[: 4 * SHOWN]:
-        try:
-            info = json.loads(file.read_text(encoding="utf-8"))
-            found.append(
-                Entry(
-                    file.parent,
-                    str(info.get("title") or info.get("protocol") or "run"),
-                    str(info.get("scene") or ""),
-                    str(info["status"]),
-                    _when(str(info.get("started") or "")),
-                    float(info.get("duration_s") or info.get("planned_s") or 0.0),
-                    bool(info.get("simulated")),
-                )
-            )
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
-    return found
-
-
-def _when(text: str) -> str:
-    try:
-        at = datetime.fromisoformat(text)
-    except ValueError:
-        return ""
-    today = datetime.now(at.tzinfo).date()
-    days = (today - at.date()).days
-    day = {0: "today", 1: "yesterday"}.get(days, f"{at:%d %b}")
-    return f"{day} {at:%H:%M}"
-
-
 class RunCard(QFrame):
     """One run: name, status, when, how long; a tick to compare."""
 
@@ -103,9 +37,10 @@ class RunCard(QFrame):
     chosen = Signal(object)
     ticked = Signal()
 
-    def __init__(self, entry: Entry) -> None:
+    def __init__(self, entry: Entry, theme: Theme) -> None:
         super().__init__()
         self.entry = entry
+        self.thumbnail = ThumbnailView(theme)
         self.setProperty("role", "card")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -126,7 +61,9 @@ class RunCard(QFrame):
         words.addLayout(first)
         words.addWidget(label(when, "muted"))
         row = QHBoxLayout(self)
-        row.setContentsMargins(12, 8, 10, 8)
+        row.setContentsMargins(8, 7, 10, 7)
+        row.setSpacing(10)
+        row.addWidget(self.thumbnail)
         row.addLayout(words, 1)
         row.addWidget(self.tick)
 
@@ -170,6 +107,9 @@ class RunsView(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.cards: list[RunCard] = []
+        self._theme = theme
+        self.thumbnails = Thumbnails()
+        self.thumbnails.made.connect(self._show_thumbnail)
         self._entries: list[Entry] = []
         self._chosen: Entry | None = None
         self._current: Path | None = None
@@ -234,13 +174,15 @@ class RunsView(QWidget):
             if e.shown_under(chosen) and all(w in e.text for w in words)
         ]
         for entry in fitting[:SHOWN]:
-            card = RunCard(entry)
+            card = RunCard(entry, self._theme)
+            card.thumbnail.show_thumbnail(self.thumbnails.of(entry.folder))
             card.tick.setChecked(entry.folder in ticked)
             card.opened.connect(self.opened)
             card.chosen.connect(self._choose)
             card.ticked.connect(self._buttons)
             self.cards.append(card)
             self._rows.addWidget(card)
+        self._ask_thumbnails()
         if not fitting:
             text = "No run fits." if self._entries else "No runs yet."
             self._rows.addWidget(label(text, "muted"))
@@ -249,6 +191,21 @@ class RunsView(QWidget):
         self._count.setText(f"{many} run{'' if many == 1 else 's'}")
         self.show_current(self._current)
         self._buttons()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Pictures are made for those who look."""
+        super().showEvent(event)
+        self._ask_thumbnails()
+
+    def _ask_thumbnails(self) -> None:
+        if self.isVisible():
+            ended = [c.entry for c in self.cards if c.entry.status != "running"]
+            self.thumbnails.ask([entry.folder for entry in ended])
+
+    def _show_thumbnail(self, folder: Path) -> None:
+        for card in self.cards:
+            if card.entry.folder == folder:
+                card.thumbnail.show_thumbnail(self.thumbnails.of(folder))
 
     def _choose(self, entry: Entry) -> None:
         self._chosen = entry

@@ -59,11 +59,16 @@ class Form(QWidget):
         self._shown = self.texts()
         self.changed.emit()
 
+    def propose(self, texts: dict[str, str]) -> None:
+        """Put texts into fields; can be undone."""
+        for field in self.fields:
+            if field.parameter.key in texts:
+                field.set_text(texts[field.parameter.key])
+        self._edited()
+
     def reset(self) -> None:
         """Put every parameter back to its default; can be undone."""
-        for field in self.fields:
-            field.set_text(field.default)
-        self._edited()
+        self.propose({field.parameter.key: field.default for field in self.fields})
 
     @property
     def problem(self) -> str:

@@ -17,6 +17,7 @@ from gui.session.request import Request
 from gui.session.session import Queued, Session
 from gui.setup.estimate import EstimateView
 from gui.setup.form import Form
+from gui.setup.preset_button import PresetButton
 from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
 from gui.setup.texts import FieldError
@@ -55,6 +56,9 @@ class SetupPanel(QFrame):
         self.source = label("", "small")
         self.preview = WaveformPreview(theme)
         self.form = Form()
+        self.star = PresetButton(
+            theme, self.form, session.out.resolve().parent / "presets", self.request
+        )
         self.estimate = EstimateView()
         self.problem = label("", "error", wrap=True)
         self.warnings = label("", "warning", wrap=True)
@@ -64,6 +68,7 @@ class SetupPanel(QFrame):
         self._lay_out()
         self.picker.activated.connect(self._picked)
         self.form.changed.connect(self._form_changed)
+        self.star.failed.connect(self._show_problem)
         self.run.clicked.connect(self.start)
         self.queue_button.clicked.connect(self.enqueue)
         self.queue.removed.connect(session.unqueue)
@@ -158,6 +163,7 @@ class SetupPanel(QFrame):
         self.form.lock(locked)
         self.picker.setEnabled(not locked)
         self._reset.setEnabled(not locked)
+        self.star.setEnabled(not locked)
         reason = self._blocked()
         self.run.setEnabled(not reason)
         self.run.setToolTip(reason or "Run what the form says (Ctrl+R)")
@@ -181,6 +187,7 @@ class SetupPanel(QFrame):
     def _planned(self, planned: Planned) -> None:
         expectation = planned.expectation
         self._show_problem(planned.problem)
+        self.star.mark()
         if expectation is not None:
             self.preview.show_preview(expectation.preview)
             self.estimate.show_estimate(expectation.estimate)
@@ -236,14 +243,15 @@ class SetupPanel(QFrame):
         elided(self.source, f"scene: {name}")
 
     def _lay_out(self) -> None:
-        self._star = IconButton(self._theme, "folder", "Open a scene (Ctrl+O)")
-        self._star.clicked.connect(self.scene_wanted)
+        self._open = IconButton(self._theme, "folder", "Open a scene (Ctrl+O)")
+        self._open.clicked.connect(self.scene_wanted)
         self._reset = IconButton(self._theme, "undo", "Reset to defaults")
         self._reset.clicked.connect(self.form.reset)
         head = QHBoxLayout()
         head.addWidget(label("Protocol", "title"))
         head.addStretch(1)
-        head.addWidget(self._star)
+        head.addWidget(self.star)
+        head.addWidget(self._open)
         head.addWidget(self._reset)
         buttons = QHBoxLayout()
         buttons.setSpacing(8)

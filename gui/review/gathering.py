@@ -1,0 +1,109 @@
+"""What the results tell of the run on screen: its steps, fits, report and loss."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject
+
+from gui.lanes.source import LiveSource, Source
+from gui.review.conclusion import conclusion_of
+from gui.review.finding import Finding, facts_of, loss_text, of_outcome, of_run
+from gui.review.fitting import Fitting
+from gui.review.results import ResultsView
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.errors import RunFolderError
+from tactile_lab.trial import Outcome
+
+if TYPE_CHECKING:
+    from gui.lanes.stored import RunSource
+    from tactile_lab.acquisition.execution import Executed
+
+
+class Gathering(QObject):
+    """Collects steps and keeps the results view up to date.
+
+    Attributes:
+        findings: what each step gave.
+        folder: of the run on screen; None before it is on disk.
+    """
+
+    def __init__(self, view: ResultsView, parent: QObject) -> None:
+        super().__init__(parent)
+        self.findings: list[Finding] = []
+        self.folder: Path | None = None
+        self._view = view
+        self._whole = False
+        self._total = 0
+        self._fitting = Fitting(self)
+        self._fitting.fitted.connect(view.show_fit)
+
+    def begin(self, steps: int, *, fires: bool) -> None:
+        """A run of so many steps begins; `fires`: its spikes are looked for."""
+        self.findings, self.folder, self._whole = [], None, False
+        self._total = steps
+        self._view.show_kind(fires=fires)
+        self._view.show_facts("", report=False)
+        self._view.show_statements(())
+        self._show(running=True)
+        self._fitting.ask((), None)
+
+    def step(self, outcome: Outcome, source: LiveSource | None) -> None:
+        """A step has ended."""
+        found = of_outcome(outcome)
+        if found is not None:
+            self.findings.append(found)
+        self._show(running=True)
+        self._fitting.ask(self.findings, source)
+        if source is not None:
+            self._view.show_loop(source.loop)
+
+    def end(self, done: Executed, source: LiveSource | None) -> None:
+        """The run is on disk now."""
+        self.folder = done.folder
+        self._whole = done.ending.state is RunState.COMPLETE
+        self._show(running=False)
+        self._fitting.ask(self.findings, source)
+        facts = [
+            f"<b>{done.folder.name}</b>",
+            done.ending.off.text.partition(" | ")[0],
+            loss_text(done.loss),
+        ]
+        self._view.show_facts("<br>".join(filter(None, facts)), report=False)
+
+    def reported(self, folder: Path, source: Source | None) -> None:
+        """The run's report is written, and the model has come to the end."""
+        if folder == self.folder:
+            self._fitting.ask(self.findings, source)
+            self._view.report.setVisible((folder / "report.html").exists())
+            self._conclude(folder)
+
+    def stored(self, source: RunSource) -> None:
+        """A run from disk is on screen."""
+        self.findings, self.folder = of_run(source), source.path
+        self._whole = source.info.get("status") == "complete"
+        self._view.show_kind(fires="spikes" in source.signals)
+        self._show(running=False)
+        self._fitting.ask(self.findings, source)
+        self._view.show_loop(source.loop)
+        report = (source.path / "report.html").exists()
+        self._view.show_facts(facts_of(source), report=report)
+        self._view.show_statements(())
+        if report:
+            self._conclude(source.path)
+
+    def compare_with_model(self, source: Source) -> None:
+        """The model beside a run from disk has been computed."""
+        self._fitting.ask(self.findings, source)
+
+    def _conclude(self, folder: Path) -> None:
+        try:
+            self._view.show_statements(conclusion_of(folder).statements)
+        except RunFolderError:
+            self._view.show_statements(())  # reports of former versions have none
+
+    def _show(self, *, running: bool) -> None:
+        self._view.show_findings(
+            self.findings, total=self._total, running=running, whole=self._whole
+        )

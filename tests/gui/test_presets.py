@@ -1,0 +1,57 @@
+"""Presets: parameters kept under a name, as scenes that run by themselves."""
+
+from pathlib import Path
+
+import pytest
+
+from gui.setup.presets import parameters, presets, save_preset
+from tactile_lab.errors import SceneError
+from tactile_lab.scene.load import load
+
+
+def test_preset_is_a_scene_of_its_protocol(tmp_path: Path) -> None:
+    scene = load("demo", ["protocol.hold=3 s"])
+    file = save_preset(tmp_path, "long hold", scene)
+    assert presets(tmp_path, "pulses") == {"long hold": file}
+    assert presets(tmp_path, "hold") == {}
+    assert load(file).protocol == scene.protocol
+    assert parameters(file)["hold"] == 3.0
+
+
+@pytest.mark.parametrize("name", ["", "../out", "a/b", "." * 3])
+def test_names_that_are_no_file_names_are_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SceneError, match="cannot be called"):
+        save_preset(tmp_path, name, load("demo"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_star_keeps_marks_and_takes_up_parameters(lab) -> None:
+    setup = lab.window.setup
+    before = setup.form.texts()
+    setup.form.propose({"hold": "700 ms"})
+    setup.star.save("a bit longer")
+    assert setup.star.shown() == "a bit longer"
+    setup.form.undo.undo()
+    assert setup.form.texts() == before and setup.star.shown() == ""
+    (file,) = (lab.folder / "presets" / "pulses").iterdir()
+    setup.star.use(file)
+    assert setup.form.field("hold").text == "700 ms"
+    setup.form.undo.undo()
+    assert setup.form.texts() == before, "taking up a preset can be undone"
+    setup.star.open_menu()
+    setup.star.name.setText("../nowhere")
+    setup.star.name.returnPressed.emit()
+    assert "cannot be called" in setup.problem.text()
+    setup.plan_now()
+
+
+def test_unusable_preset_is_told_and_not_taken_up(lab) -> None:
+    setup = lab.window.setup
+    before = setup.form.texts()
+    file = lab.folder / "presets" / "pulses" / "broken.toml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text('[protocol]\nname = "pulses"\nhold = "3 V"\n')
+    setup.star.use(file)
+    assert setup.form.texts() == before and "hold" in setup.problem.text()
+    file.unlink()
+    setup.plan_now()
