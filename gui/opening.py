@@ -5,19 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, Signal
 
 from gui.choosing import choose_run, choose_scene
 from gui.comparing import load_comparison
 from gui.lanes.compare import Comparison
-from gui.lanes.decimate import FloatArray
 from gui.lanes.expected import PlanSource
-from gui.lanes.source import LiveSource, Source
+from gui.lanes.source import LiveSource
 from gui.panels import Panels
 from gui.review.entries import Entry, entries
-from gui.review.finding import Finding, facts_of, of_outcome, of_run
-from gui.review.fitting import Fitting
+from gui.review.gathering import Gathering
 from gui.session.messages import Level, Planned, Twins
 from gui.session.request import Request
 from gui.session.threads import start
@@ -50,10 +47,7 @@ class Opening(QObject):
         self._panels = panels
         self.run: RunSource | Comparison | None = None
         self.ending = ""
-        self.findings: list[Finding] = []
-        self._folder: Path | None = None
-        self._fitting = Fitting(self)
-        self._fitting.fitted.connect(panels.review.results.show_fit)
+        self.gathering = Gathering(panels.review.results, self)
         self._tracks: object = None
         self.loaded.connect(self._show_run)
         self.failed.connect(self.say)
@@ -70,8 +64,10 @@ class Opening(QObject):
         view = panels.centre.view
         view.changed.connect(lambda: bar.look_at(view.start + view.width / 2))
         bar.closed.connect(self.close_run)
-        panels.review.results.report_asked.connect(self._open_report)
-        panels.review.export.clicked.connect(self._open_folder)
+        panels.review.results.report_asked.connect(self.gathering.open_report)
+        panels.review.export.clicked.connect(
+            lambda: self.gathering.open_folder(panels.session.out)
+        )
 
     # --- asked by the user
 
@@ -172,54 +168,29 @@ class Opening(QObject):
         panels.centre.tools.follow.setChecked(True)
         panels.centre.tools.widths.choose(1)
         if not panels.session.monitor.alive:
-            self.findings, self.ending = [], ""
-            self._fit(None)
-            panels.review.results.show_facts("", report=False)
-            self._show_findings(running=True)
+            self.ending = ""
+            expectation = panels.session.expectation
+            steps = expectation.estimate.trials if expectation else 0
+            searched = expectation is None or expectation.needs.detect_on is not None
+            self.gathering.begin(steps, fires=searched)
         self.changed.emit()
-
-    def _fit(self, source: Source | None) -> None:
-        self._fitting.ask(self.findings, source)
-
-    def _show_loop(self, loop: FloatArray) -> None:
-        self._panels.review.results.show_loop(loop)
 
     def trial_ended(self, outcome: Outcome) -> None:
         """Add a step to the results."""
-        found = of_outcome(outcome)
-        if found is not None:
-            self.findings.append(found)
-        self._show_findings(running=True)
-        self._fit(self._panels.session.source)
-        if self._panels.session.source is not None:
-            self._show_loop(self._panels.session.source.loop)
+        self.gathering.step(outcome, self._panels.session.source)
 
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
         self.ending = f"{done.ending.state} · {done.folder.name} · {done.spikes} spikes"
-        self._folder = done.folder
         source = self._panels.session.source
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
-        self._show_findings(running=False)
-        self._fit(source)
-        lost = done.loss.get("samples")
-        said = done.ending.off.text.partition(" | ")[0]
-        facts = [f"<b>{done.folder.name}</b>", said]
-        if lost is not None:
-            facts.append(
-                f"Loss: {lost} samples, {done.loss.get('spikes') or 0} spikes."
-            )
-        self._panels.review.results.show_facts("<br>".join(facts), report=False)
+        self.gathering.end(done, source)
         self.list_runs()
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""
-        if folder == self._folder:
-            self._fit(self.run or self._panels.session.source)
-            self._panels.review.results.report.setVisible(
-                (folder / "report.html").exists()
-            )
+        self.gathering.reported(folder, self.run or self._panels.session.source)
 
     def twin_made(self, twins: Twins) -> None:
         """Put the model beside the run on disk, if that is still on screen."""
@@ -236,7 +207,7 @@ class Opening(QObject):
         if self.run is not None and self.run.take_fetched():
             if self.run.tracks is not self._tracks:
                 self._tracks = self.run.tracks
-                self._fit(self.run)
+                self.gathering.compare_with_model(self.run)
             self.show_lanes()
             self._panels.centre.stack.refresh()
             self._panels.centre.stack.show_values()
@@ -270,7 +241,7 @@ class Opening(QObject):
             self.say("A run is in progress; old runs open when it has ended.")
             return
         self.leave_run()
-        self.run, self._folder = source, source.path
+        self.run = source
         panels.session.run_name = f"Looking at {source.path.name}"
         view = panels.centre.view
         view.set_now(source.reach, source.length)
@@ -284,7 +255,7 @@ class Opening(QObject):
         panels.session.make_twin(source.path, source.current, source.length)
         status = str(source.info.get("status"))
         self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
-        self._results_of(source)
+        self.gathering.stored(source)
         panels.review.runs.show_current(source.path)
         panels.centre.progress.show_run(
             panels.session.snapshot(), source.holds, source.length, source.reach,
@@ -308,24 +279,6 @@ class Opening(QObject):
         centre.view.show_all()
         centre.tools.widths.choose(3)
         self.changed.emit()
-
-    def _results_of(self, source: RunSource) -> None:
-        self.findings = of_run(source)
-        self._show_findings(running=False)
-        self._fit(source)
-        self._show_loop(source.loop)
-        report = (source.path / "report.html").exists()
-        self._panels.review.results.show_facts(facts_of(source), report=report)
-
-    def _show_findings(self, *, running: bool) -> None:
-        expectation = self._panels.session.expectation
-        total = expectation.estimate.trials if expectation else 0
-        self._panels.review.results.show_findings(
-            self.findings,
-            total=total,
-            running=running,
-            whole=self.ending.startswith("complete"),
-        )
 
     def _queue_scene(self, path: Path) -> None:
         from gui.session.session import Queued
@@ -355,12 +308,3 @@ class Opening(QObject):
         self._panels.centre.notice.setText(problem)
         self._panels.centre.notice.setStyleSheet("")
         self._panels.centre.notice.show()
-
-    def _open_report(self) -> None:
-        if self._folder is not None:
-            file = self._folder / "report.html"
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(file.resolve())))
-
-    def _open_folder(self) -> None:
-        folder = self._folder or self._panels.session.out
-        QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder.resolve())))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, QUrl
+from PySide6.QtGui import QDesktopServices
 
 from gui.lanes.source import LiveSource, Source
 from gui.review.conclusion import conclusion_of
@@ -97,6 +98,15 @@ class Gathering(QObject):
         """The model beside a run from disk has been computed."""
         self._fitting.ask(self.findings, source)
 
+    def open_report(self) -> None:
+        """Open the report of the run on screen in the browser."""
+        if self.folder is not None:
+            _open(self.folder / "report.html")
+
+    def open_folder(self, out: Path) -> None:
+        """Open the folder of the run on screen, else that of all runs."""
+        _open(self.folder or out)
+
     def _conclude(self, folder: Path) -> None:
         try:
             self._view.show_statements(conclusion_of(folder).statements)
@@ -107,3 +117,7 @@ class Gathering(QObject):
         self._view.show_findings(
             self.findings, total=self._total, running=running, whole=self._whole
         )
+
+
+def _open(path: Path) -> None:
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))

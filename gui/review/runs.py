@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QLineEdit,
+    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
@@ -45,14 +46,17 @@ class RunCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAccessibleName(f"{entry.title}, {entry.status}, {entry.started}")
-        self.setToolTip(f"{entry.folder.name}\nEnter or double click opens it")
+        self.setToolTip(
+            f"{entry.title}\n{entry.folder.name}\nEnter or double click opens it"
+        )
         self.tick = QCheckBox()
         self.tick.setAccessibleName(f"Compare {entry.folder.name}")
         self.tick.toggled.connect(self.ticked)
         word, role = PILLS.get(entry.status, (entry.status, "pill"))
         first = QHBoxLayout()
-        first.addWidget(label(entry.title, "strong"))
-        first.addStretch(1)
+        title = label(entry.title, "strong")
+        title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        first.addWidget(title, 1)
         first.addWidget(label(word, role))
         kind = "sim" if entry.simulated else "bench"
         when = f"{entry.started} · {minutes(entry.duration)} · {kind}"
