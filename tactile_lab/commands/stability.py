@@ -33,6 +33,7 @@ def command(out: Path | None, names: tuple[str, ...], cap: float, alone: bool) -
             os.environ.setdefault(name, "1")
         from tactile_lab.model.compare.extremes import extremes
 
+        _compile()
         lines, bad = [], 0
         for build in extremes():
             case = build()
@@ -59,6 +60,16 @@ RIVALS = ("RK45", "DOP853", "LSODA", "Radau", "BDF", "CVODE BDF", "Euler")
 
 MOST_SEGMENTS = 10_000
 """More are not given to the others, which restart at each, nor to the stiffness."""
+
+
+def _compile() -> None:
+    """Compilation is no part of any time in the table."""
+    from tactile_lab.model.circuit import Circuit
+    from tactile_lab.model.simulate import simulate
+    from tactile_lab.waveform import Waveform
+
+    for circuit in (Circuit(), Circuit(saturation=True)):
+        simulate(circuit, Waveform.constant(0.1), until=0.1)
 
 
 def _line(case: Extreme, cap: float, alone: bool) -> tuple[str, str]:

@@ -352,7 +352,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     carry += late
                     transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
                     S[RESUME], v = par[T_EPS], par[V_FIRE]
-                    last = False
+                    last, tries = False, 0
                 if last:
                     s = T
                 h = h_next

@@ -7,7 +7,6 @@ those of Birkoben et al., Sci. Rep. 10, 2020.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -125,44 +124,14 @@ def rest_V_C1(circuit: Circuit, V_P: float = 0.0) -> float:
 def rest_point(circuit: Circuit) -> tuple[float, float]:
     """V_C1 and V_C2 at equilibrium, V; V_C2 as if it did not fire."""
     if circuit.saturation:
-        return _rest_of_both(circuit)
+        # compiled: a thousand evaluations
+        from tactile_lab.model.packed import parameters
+        from tactile_lab.model.rest_pair import rest_of_both
+
+        V_C1, V_C2 = rest_of_both(parameters(circuit))
+        return float(V_C1), float(V_C2)
     V_C1 = rest_V_C1(circuit)
     return V_C1, rest_V_C2(circuit, V_C1)
-
-
-def _rest_of_both(circuit: Circuit) -> tuple[float, float]:
-    """Where T1 saturates, the root of Eqs. (16) and (18) together.
-
-    Each falls strictly with its own voltage: one bisection inside another.
-    """
-    c = circuit
-
-    def V_C2(y: float) -> float:
-        def slope(v: float) -> float:
-            return float(T1_currents(c, y, v)[0]) + c.I_bias - v / c.R_L
-
-        reach = c.R_L * (abs(c.I_bias) + c.I_T1s)
-        return _root(slope, min(0.0, y) - reach, c.V_S + reach)
-
-    def slope(y: float) -> float:
-        return float(V_C1_slope(c, 0.0, y)) * c.C1 + float(
-            T1_currents(c, y, V_C2(y))[1]
-        )
-
-    y = _root(slope, -c.V_T, c.V_S + c.V_T)
-    return y, V_C2(y)
-
-
-def _root(falling: Callable[[float], float], low: float, high: float) -> float:
-    """Where a falling function passes 0, by bisection to the last digit."""
-    while True:
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            return middle
-        if falling(middle) > 0.0:
-            low = middle
-        else:
-            high = middle
 
 
 def fires_at_rest(circuit: Circuit) -> bool:

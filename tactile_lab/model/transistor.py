@@ -19,12 +19,12 @@ from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import DIRECT, PARAMETERS, V_S, omega
 from tactile_lab.model.node_a import V_T
 
-I_S1, R_E, PER_F, PER_R, T1_C1, T1_C2, T1_BIAS, E_DROP, E_LOG = range(
-    PARAMETERS, PARAMETERS + 9
+I_S1, R_E, PER_F, PER_R, T1_C1, T1_C2, T1_BIAS, E_DROP, E_LOG, SATURATES = range(
+    PARAMETERS, PARAMETERS + 10
 )
-"""Where `par` holds I_T1s, R3, 1/beta_F, 1/beta_R, C1, C2, I_bias, and of the emitter's
-equation a R3 I_T1s and ln(a R3 I_T1s/V_T) with a = 1 + 1/beta_F."""
-ALL_PARAMETERS = PARAMETERS + 9
+"""Where `par` holds I_T1s, R3, 1/beta_F, 1/beta_R, C1, C2, I_bias, a R3 I_T1s and
+ln(a R3 I_T1s/V_T) with a = 1 + 1/beta_F, and whether T1 saturates at all."""
+ALL_PARAMETERS = PARAMETERS + 10
 EXPONENT_CAP = 230.0
 TO_A, TO_C2, A_BY_1, A_BY_2, C2_BY_1, C2_BY_2 = range(6)
 

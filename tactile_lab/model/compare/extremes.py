@@ -102,6 +102,26 @@ def extremes() -> Iterator[Callable[[], Extreme]]:
     yield partial(_case, "direct T1, 200 mN", direct, _step(0.2), 0.4, "refuse", True)
     never = Circuit(V_reset=3.213 - 1e-12)
     yield partial(_case, "V_reset 1 pV below", never, _step(0.2), 0.4, "refuse", True)
+    yield from _saturated()
+
+
+def _saturated() -> Iterator[Callable[[], Extreme]]:
+    """T1 saturates: V_C2 empties into node A as that collapses, and clamps."""
+    T1 = Circuit(saturation=True)
+    for F in (0.2, 0.3, 1.0, 10.0, -10.0):
+        yield partial(_case, f"saturated, jump {F:+g} N", T1, _step(F), 0.2)
+    cold = Start(V_P=0.0, V_C1=0.0, V_C2=3.0)
+    yield partial(_case, "saturated, cold, C2 full", T1, _step(0.2), 0.2, start=cold)
+    fast = Circuit(saturation=True, C2=20e-15)
+    yield partial(_case, "saturated, C2 = 20 fF", fast, _step(0.2, 1e-4), 4e-3)
+    light = Circuit(saturation=True, C1=1e-15)
+    yield partial(_case, "saturated, C1 = 1 fF", light, _step(0.2), 0.2)
+    still = Waveform.constant(0)
+    yield partial(_case, "saturated, 1e6 s of silence", T1, still, 1e6, "finite")
+    firing = Circuit(saturation=True, V_GS=1.6)
+    yield partial(
+        _case, "saturated, 1e6 s of firing", firing, still, 1e6, "refuse", True
+    )
 
 
 def grazing(gap: float) -> Extreme:

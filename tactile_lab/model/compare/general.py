@@ -96,8 +96,8 @@ def fixed_step(problem: Problem, order: int, dt: float, cap: float) -> Answer:
     steps = problem.until / dt
     if steps * 6e-8 * order > cap:
         raise OutOfTimeError(f"would take more than {cap:g} s")
-    if problem.circuit.reset_time > 0:
-        raise SolverError("resets that take time are not written for fixed steps")
+    if problem.circuit.reset_time > 0 or problem.circuit.saturation:
+        raise SolverError("resets that take time and saturation have no fixed steps")
     segments = np.array(problem.segments)
     spikes = np.empty(2_000_000)
     y = np.array(problem.first)

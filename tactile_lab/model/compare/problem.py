@@ -18,8 +18,10 @@ from tactile_lab.model.equations import V_P as closed_V_P
 from tactile_lab.model.equations import rest_point
 from tactile_lab.model.integrator import TAU_L, Q_at
 from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
+from tactile_lab.model.packed import parameters
+from tactile_lab.model.pair import flow
 from tactile_lab.model.simulate import Start
-from tactile_lab.model.solver import parameters
+from tactile_lab.model.transistor import SATURATES, TO_A, TO_C2
 from tactile_lab.waveform import Waveform
 
 
@@ -121,6 +123,11 @@ def right_hand_side(
 ) -> None:
     """Eqs. (7), (8) and (16) to (18), V/s, compiled for everybody."""  # fmt: skip
     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
+    if par[SATURATES] != 0.0:
+        both = np.empty(6)
+        flow(B, y1, y2, held, par, both)
+        out[0], out[1] = both[TO_A], both[TO_C2]
+        return
     out[0] = slope_at(B, y1, par)
     out[1] = 0.0 if held else (Q_at(y1, par) - y2) / par[TAU_L]
 

@@ -29,8 +29,8 @@ def netlist(problem: Problem, reltol: float, step: float, output: str) -> str:
     stage is a hysteretic switch across C2.
     """
     c = problem.circuit
-    if c.t1 != "emitter_resistor" or c.reset_time > 0:
-        raise SolverError("the netlist has the emitter resistor and no reset time only")
+    if c.t1 != "emitter_resistor" or c.reset_time > 0 or c.saturation:
+        raise SolverError("the netlist has Eq. (17) with R3 and no reset time only")
     points = [(t0, V0, p) for t0, _, V0, p in problem.segments]
     edges = " ".join(f"{t:.17g} {F:.17g}" for t, F in _force_points(problem))
     V_C1, V_C2 = problem.first
