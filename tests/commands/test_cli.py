@@ -69,6 +69,8 @@ def test_help_answers_in_under_300_ms():
         )
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         took.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+        if took[-1] < 0.3:
+            break
     assert min(took) < 0.3
 
 
@@ -112,11 +114,10 @@ def test_plan_opens_nothing_and_draws_only_when_asked():
     assert "drivers.bench" not in names
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8"])
-def test_a_pipe_that_lacks_our_characters_is_no_error(encoding):
+def test_a_pipe_that_lacks_our_characters_is_no_error():
     done = subprocess.run(
         [sys.executable, "-m", "tactile_lab", "plan", "v_c1_only"],
-        env={**os.environ, "PYTHONIOENCODING": encoding},
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
         capture_output=True,
         check=False,
     )

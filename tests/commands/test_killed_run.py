@@ -18,10 +18,11 @@ from tactile_lab.store.run import Run
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 def test_a_killed_run_is_seen_recovered_and_sound(tmp_path):
     command = [sys.executable, "-c", "from tactile_lab.cli import main; main()", "run"]
-    command += ["--realtime", "--no-report", "--out", str(tmp_path)]
+    command += ["--no-report", "--out", str(tmp_path)]
+    command += ["--set", 'protocol.levels=["100 mN"]', "--set", "protocol.hold=300 s"]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL) as program:
         seen, path = 0, None
-        until = time.monotonic() + 60
+        until = time.monotonic() + 100
         while seen < 600_000 and time.monotonic() < until:
             time.sleep(0.1)
             path = next(iter(tmp_path.glob("*/data.h5")), None)
