@@ -125,6 +125,10 @@ class Protocol(BaseModel):
         """Signals acquired where the bench has them, and missed without complaint."""
         return ()
 
+    def on_sensor(self, tau: float, volts_per_newton: float) -> Protocol:
+        """The same for a film that leaks with `tau` s and gives so many V/N."""
+        return self
+
     def located(self, folder: Any) -> Protocol:
         """The same protocol with file parameters resolved against `folder` (a Path)."""
         return self

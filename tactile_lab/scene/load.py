@@ -94,6 +94,7 @@ def resolve(
     except (ParameterError, ValueError) as reason:
         raise complaint(("sensor",), str(reason), blame) from reason
     protocol, source = _protocol(frozen.get("protocol"), folder, blame)
+    protocol = protocol.on_sensor(circuit.tau, abs(circuit.k_F))
     record = validated(Record, frozen.get("record", {}), ("record",), blame)
     if not record.signals:
         if "signals" in frozen.get("record", {}):

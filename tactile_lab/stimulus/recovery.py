@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field
 
@@ -14,6 +14,8 @@ from tactile_lab.waveform import Waveform
 
 PerForce = Annotated[float, Unit("V/N", above=0.0)]
 
+TABLE_1_TAU, TABLE_1_PER_FORCE = 8.69, 1.529750693
+"""Of Table 1's sensor, s and V/N: where a protocol is used without a scene."""
 MOST_EXTENSIONS = 6
 """After so many extensions V_C1 is taken to have drifted, not to be recovering."""
 CODE = 20e-3
@@ -30,9 +32,11 @@ class Recovering(ForceProtocol):
     afterwards and the recovery extended until V_C1 is back.
     """
 
-    tau: Duration = Field(default=8.69, description="Leakage time of the AlScN film")
-    volts_per_newton: PerForce = Field(
-        default=1.529750693, description="V_P per force, Eqs. (3)-(6)"
+    tau: Duration | None = Field(
+        default=None, description="Leakage time of the film; the sensor's if empty"
+    )
+    volts_per_newton: PerForce | None = Field(
+        default=None, description="V_P per force, Eqs. (3)-(6); the sensor's if empty"
     )
     residual: SmallVoltage = Field(
         default=1e-3, description="V_P that may be left when the next trial starts"
@@ -44,9 +48,18 @@ class Recovering(ForceProtocol):
 
     def recovery_time(self, force: float) -> float:
         """Time until |V_P| is below the residual after a change by `force` N, s."""
-        return self.tau * math.log(
-            max(self.volts_per_newton * abs(force) / self.residual, math.e)
-        )
+        volts = (self.volts_per_newton or TABLE_1_PER_FORCE) * abs(force)
+        return self._leak * math.log(max(volts / self.residual, math.e))
+
+    def on_sensor(self, tau: float, volts_per_newton: float) -> Self:
+        """With what the scene does not say taken from the sensor."""
+        known = {"tau": tau, "volts_per_newton": volts_per_newton}
+        left = {name: v for name, v in known.items() if getattr(self, name) is None}
+        return self.model_copy(update=left)
+
+    @property
+    def _leak(self) -> float:
+        return self.tau or TABLE_1_TAU
 
     def recover(self, force: float, first: float | None) -> Steps:
         """Pauses after `force` N until V_C1 is back at `first` V (None: not looked at).
@@ -63,7 +76,7 @@ class Recovering(ForceProtocol):
             near = self.settled or seen.codes.get("V_C1", CODE)
             if not abs(resting(seen) - first) > near:
                 return
-            yield pause(self.tau)
+            yield pause(self._leak)
 
 
 def resting(outcome: Outcome) -> float:

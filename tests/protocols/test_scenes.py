@@ -48,3 +48,13 @@ def test_the_force_ends_at_zero(name):
 def test_every_protocol_that_ships_has_a_scene():
     played = {load(name).protocol.name for name in scene_names()}
     assert played == set(protocol_names())
+
+
+def test_recovery_lasts_as_long_as_the_scene_s_own_film_needs():
+    slow = load("rate_force", ["sensor.tau=20 s"]).protocol
+    usual = load("rate_force").protocol
+    assert slow.recovery_time(0.2) / usual.recovery_time(0.2) == pytest.approx(
+        20 / 8.69
+    )
+    told = load("rate_force", ["sensor.tau=20 s", "protocol.tau=5 s"]).protocol
+    assert told.recovery_time(0.2) / usual.recovery_time(0.2) == pytest.approx(5 / 8.69)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.cli import main
+from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.scene.bench_file import BenchTable
 from tactile_lab.scene.complaint import known_keys
 from tactile_lab.scene.load import load, load_bench
@@ -17,11 +18,14 @@ from tactile_lab.signals import SIGNALS
 DOCS = Path(__file__).parents[2] / "docs"
 SCENES = (DOCS / "scenes.md").read_text(encoding="utf-8")
 JSON = (DOCS / "json.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```toml\n# (scene|bench)\n(.*?)```", SCENES, re.DOTALL)
+PROTOCOLS = (DOCS / "protocols.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(
+    r"```toml\n# (scene|bench)\n(.*?)```", SCENES + PROTOCOLS, re.DOTALL
+)
 
 
 def test_every_toml_block_says_what_it_is():
-    assert len(BLOCKS) == SCENES.count("```toml") >= 5
+    assert len(BLOCKS) == (SCENES + PROTOCOLS).count("```toml") >= 5
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
@@ -43,6 +47,18 @@ def test_an_example_loads(number, tmp_path):
 )
 def test_every_key_of_a_table_is_documented(table):
     assert [key for key in known_keys(table, ()) if f"`{key}`" not in SCENES] == []
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_every_parameter_of_a_protocol_is_in_its_section_or_the_shared_one(name):
+    shared, *sections = re.split(r"^## `", PROTOCOLS, flags=re.MULTILINE)
+    (own,) = (s for s in sections if s.startswith(f"{name}`"))
+    parameters = protocol_class(name).parameters()
+    assert [key for key in parameters if f"`{key}`" not in shared + own] == []
+
+
+def test_every_scene_that_ships_is_listed():
+    assert [name for name in scene_names() if f"`{name}`" not in PROTOCOLS] == []
 
 
 def test_every_key_of_a_bench_file_is_in_the_example():
