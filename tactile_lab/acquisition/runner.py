@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeVar
 
 import numpy as np
 
@@ -20,10 +19,8 @@ from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
-from tactile_lab.acquisition.person import PLACES, Errand
-from tactile_lab.acquisition.provenance import changed
-from tactile_lab.acquisition.scope_thread import ScopeThread
-from tactile_lab.acquisition.search import REST, SpikeSearch
+from tactile_lab.acquisition.person import PLACES
+from tactile_lab.acquisition.serving import GRACE, Serving, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.acquisition.task import Ending, Task
 from tactile_lab.bench import Bench, Stream
@@ -33,20 +30,8 @@ from tactile_lab.trial import Outcome, Trial
 BASELINE = 0.1
 """Seconds of rest recorded before the first trial and after each recovery."""
 
-PULSE = 0.25
-"""Longest time between two signs of life of the loop, s."""
-
-GRACE = 2.0
-"""Seconds samples may be late at the end of a trial before the scope is given up."""
-
 LATE = 0.75
 """Part of a hold after which a person's reading is taken to be made."""
-
-T = TypeVar("T")
-
-
-class StopAskedError(Exception):
-    """Somebody asked the run to stop."""
 
 
 class Runner:
@@ -79,7 +64,16 @@ class Runner:
         self._emit = emit
         self._lease = Lease(bench.clock)
         self.instruments = Instruments.of(bench, stop, self._lease)
-        self._told = 0.0
+        self._serving = Serving(
+            task,
+            bench.clock,
+            self.instruments,
+            self.intake,
+            self._account,
+            stop,
+            self._lease,
+            emit,
+        )
         self._place_probes = bench.place_probes
         self._probes = "circuit"
 
@@ -108,24 +102,24 @@ class Runner:
             finally:  # whatever a watcher does
                 self._lease.end()
                 off = self.instruments.close()
-            self._last_words()
+            self._serving.last_words()
             self._account.state(state, reason or off.text)
         return Ending(state, off, reason, failure, self._stop.signal)
 
     def _connect(self) -> None:
         self._account.state(events.RunState.CONNECTING, "opening instruments")
-        self.instruments.open(self._serve)
+        self.instruments.open(self._serving.serve)
         for text in self._task.doubts(self.instruments.settings):
             self._account.warn(text)
-        self._start_stream()
+        self._serving.start_stream()
         coil = self.instruments.coil
         if coil is not None:
             coil.energise()
-            self._serve(lambda: coil.live)
+            self._serving.serve(lambda: coil.live)
         self._account.state(events.RunState.RUNNING, "running")
 
     def _play_all(self) -> None:
-        self._rest_until(self._clock.now() + BASELINE)
+        self._serving.rest_until(self._clock.now() + BASELINE)
         trials = self._task.trials()
         outcome: Outcome | None = None
         try:
@@ -139,7 +133,7 @@ class Runner:
             pass
         finally:
             trials.close()
-        self._stop_stream()
+        self._serving.stop_stream()
 
     def _play(self, index: int, trial: Trial) -> Outcome:
         """Play one trial while everything streams."""
@@ -154,11 +148,11 @@ class Runner:
         skipped = self._play_current(trial, begin, math.inf if asked else end)
         scope = self.instruments.scope
         if scope is None:
-            self._rest_until(end)
+            self._serving.rest_until(end)
         else:
             scope.poll_at(end)
             target = start + trial.length - 2 * self._task.interval
-            self._serve(lambda: self.intake.reached >= target, end + GRACE)
+            self._serving.serve(lambda: self.intake.reached >= target, end + GRACE)
             if self.intake.reached < target:
                 raise InstrumentError(
                     f"The scope is {target - self.intake.reached:.3g} s of samples "
@@ -194,21 +188,11 @@ class Runner:
             for row, channel in enumerate(stream.channels)
         }
 
-    def _errand(self, work: Callable[[], T]) -> T:
-        """What a person comes back with; simulated time stands still meanwhile."""
-        errand = Errand(work)
-        if not self._clock.simulated:
-            self._serve(lambda: errand.ended)
-        while not errand.ended_within(PULSE):
-            if self._stop.requested:
-                raise StopAskedError
-        return errand.result()
-
     def _ask_field(self, asked: AskedField, trial: Trial, start: float) -> None:
         """Have a person read the field of the trial that began at `start` s."""
         coil = self.instruments.coil
         current = 0.0 if coil is None or coil.last is None else coil.last.setpoint
-        field, doubt = self._errand(lambda: asked.read(current))
+        field, doubt = self._serving.errand(lambda: asked.read(current))
         if doubt is not None:
             self._account.warn(doubt)
         held_from, held_to = trial.hold or (0.0, trial.length)
@@ -228,12 +212,12 @@ class Runner:
     def _pause(self, index: int, trial: Trial) -> Outcome:
         """A planned recovery: the coil holds, nothing is streamed or stored."""
         begin, start = self._begin(index, trial)
-        self._stop_stream()
+        self._serving.stop_stream()
         self._play_current(trial, begin, begin + trial.length)
-        self._rest_until(begin + trial.length)
+        self._serving.rest_until(begin + trial.length)
         self._account.pause(start, self._account.now)
-        self._start_stream()
-        self._rest_until(self._clock.now() + BASELINE)
+        self._serving.start_stream()
+        self._serving.rest_until(self._clock.now() + BASELINE)
         return Outcome(
             trial=trial,
             index=index,
@@ -245,19 +229,19 @@ class Runner:
     def _move_probes(self, where: str) -> None:
         """Have the probes put elsewhere; nothing is streamed meanwhile."""
         start = self._account.now
-        self._stop_stream()
+        self._serving.stop_stream()
         if self._place_probes is not None:
             self._place_probes(where)
         elif self._task.ask is not None:
             ask = self._task.ask
-            self._errand(lambda: ask(PLACES[where]))
+            self._serving.errand(lambda: ask(PLACES[where]))
         else:
             raise RefusedError(f"Nobody is there to ask: {PLACES[where]}")
         self._probes = where
         self._account.pause(start, self._account.now)
-        self._start_stream()
+        self._serving.start_stream()
         # the newest samples lag by a poll: none from before the move count as rest
-        self._rest_until(self._clock.now() + 2 * BASELINE)
+        self._serving.rest_until(self._clock.now() + 2 * BASELINE)
 
     def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
         """Begin a trial now: its start in clock time and in run time, s."""
@@ -279,126 +263,8 @@ class Runner:
         coil.play(current.shifted(begin), end)
         return coil.skipped
 
-    def _start_stream(self) -> None:
-        scope = self.instruments.scope
-        if scope is None:
-            if self._account.journal is None:
-                self._account.begin(None)
-            return
-        scope.stream_from(self._task.channels, self._task.interval)
-        self._serve(lambda: scope.stream is not None)
-        stream = scope.stream
-        if stream is None:
-            raise RefusedError("The scope did not start its stream.")
-        search = self._task.search
-        if search is not None and search.must_learn:
-            self._learn(search, scope, stream)
-        journal = self._account.journal or self._account.begin(stream)
-        start = self._account.axis(stream.started)
-        if search is None:
-            self.intake.begin(stream, start, journal)
-            return
-        detector, row = search.detector(stream), search.row(stream)
-        self.intake.begin(stream, start, journal, detector, row)
-
-    def _learn(self, search: SpikeSearch, scope: ScopeThread, stream: Stream) -> None:
-        """Have the search learn from the first samples while they wait.
-
-        The record names the threshold from its first byte on, so it begins after
-        this; no sample is lost, for none is taken.
-        """
-        wanted = max(1, round(REST / stream.interval))
-        until = self._clock.now() + REST + GRACE
-        self._serve(lambda: scope.ahead >= wanted, until)
-        if scope.ahead == 0:
-            raise InstrumentError(
-                f"The scope has sent no samples for {REST + GRACE:g} s, so no spike "
-                "threshold could be estimated. Set detect.threshold."
-            )
-        search.learn(stream, scope.look_ahead(search.row(stream)))
-        text = search.told(stream)
-        self._account.note("detection", text)
-        self._emit(events.Message("info", text))
-
-    def _stop_stream(self) -> None:
-        scope = self.instruments.scope
-        if scope is None:
-            return
-        stream = scope.stream
-        scope.halt()
-        self._serve(lambda: scope.stream is None)
-        if stream is not None:
-            start = self._account.axis(stream.started)
-            self._account.align(start, self.intake.reached, stream.uncertainty)
-        self._account.spikes(self.intake.end())
-
     def _note_edges(self, start: float) -> None:
         """Let the trial that began at `start` s of run time tell where clocks lie."""
         if "coil_current" in self._live.signals:
             end = self.intake.reached
             self._account.note_edges(self._live.between(start, end, "coil_current"))
-
-    def _rest_until(self, when: float) -> None:
-        self._serve(lambda: self._clock.now() >= when, when)
-
-    def _serve(self, done: Callable[[], bool], until: float | None = None) -> None:
-        """Do all that comes up until `done()`, or until clock time `until`, s.
-
-        Raises:
-            StopAskedError: somebody asked to stop.
-            TactileLabError: an instrument or the recorder failed.
-        """
-        scope = self.instruments.scope
-        while True:
-            self._lease.renew()
-            self._take_blocks()
-            self._account.readings(self.instruments)
-            if self._stop.requested:
-                raise StopAskedError
-            self.instruments.raise_failure()
-            if done():
-                return
-            wake = self._clock.now() + PULSE
-            if until is not None:
-                if self._clock.now() >= until:
-                    return
-                wake = min(wake, until)
-            self._clock.wait_for(
-                lambda: bool(
-                    done()
-                    or self._stop.requested
-                    or self.instruments.failed
-                    or (scope and self.intake.streaming and scope.waiting > 0)
-                ),
-                wake,
-            )
-
-    def _take_blocks(self) -> None:
-        scope = self.instruments.scope
-        if not self.intake.streaming:
-            return
-        while scope is not None and (block := scope.take()) is not None:
-            self._account.spikes(self.intake.add(block))
-            for reading in self.intake.take_field():
-                self._account.field(reading.time, reading.value)
-            self._lease.renew()
-            if self.intake.reached - self._told >= PULSE:
-                self._told = self.intake.reached
-                self._emit(events.Progress(self._told, self._task.expected))
-
-    def _tell_changes(self) -> None:
-        """Say which settings are not as they were when the run began."""
-        found = self.instruments
-        for text in changed(found.settings, found.settings_after):
-            self._account.note("warning", text)
-            self._emit(events.Message("warning", text))
-
-    def _last_words(self) -> None:
-        """Store what the instruments still delivered while they were closed."""
-        try:
-            self._tell_changes()
-            self._take_blocks()
-            self._account.readings(self.instruments)
-            self._account.spikes(self.intake.end())
-        except TactileLabError as failure:
-            self._emit(events.Message("error", str(failure)))

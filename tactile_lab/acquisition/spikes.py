@@ -107,7 +107,7 @@ class Detector:
                 codes, done, first, self._sign, self._threshold, self._release,
                 self._refractory, self._state, self._times, self._found,
             )  # fmt: skip
-            if count or not parts:
+            if count:
                 parts.append(self._found[:count].view(SPIKE, np.ndarray).copy())
         self._next = first + codes.size
         if not parts:

@@ -30,7 +30,7 @@ class Ran:
 def run_scene(tmp_path):
     """Run a scene by name with overrides, SI overrides as text, to the end."""
 
-    def run(*overrides, scene="demo", bench=None, watch=None, realtime=False):
+    def run(*overrides, scene="demo", bench=None, watch=None):
         loaded = load(scene, overrides)
         told = []
 
@@ -40,9 +40,7 @@ def run_scene(tmp_path):
                 watch(execution, event)
 
         made = bench(loaded) if bench is not None else None
-        execution = Execution(
-            loaded, tmp_path / "runs", bench=made, realtime=realtime, emit=emit
-        )
+        execution = Execution(loaded, tmp_path / "runs", bench=made, emit=emit)
         return Ran(execution.run(), told)
 
     return run

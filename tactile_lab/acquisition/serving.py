@@ -1,0 +1,202 @@
+"""What goes on while the deciding loop waits: samples, readings, failures, a stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.account import Account
+from tactile_lab.acquisition.instruments import Instruments
+from tactile_lab.acquisition.intake import Intake
+from tactile_lab.acquisition.person import Errand
+from tactile_lab.acquisition.provenance import changed
+from tactile_lab.acquisition.scope_thread import ScopeThread
+from tactile_lab.acquisition.search import REST, SpikeSearch
+from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.acquisition.task import Task
+from tactile_lab.bench import Stream
+from tactile_lab.clock import Clock
+from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
+
+PULSE = 0.25
+"""Longest time between two signs of life of the loop, s."""
+
+GRACE = 2.0
+"""Seconds samples may be late before the scope is given up."""
+
+T = TypeVar("T")
+
+
+class StopAskedError(Exception):
+    """Somebody asked the run to stop."""
+
+
+class Serving:
+    """Serves the instruments of one run whenever its loop waits for something.
+
+    Args:
+        task: what the run does.
+        clock: the bench's time.
+        instruments: their threads.
+        intake: takes the samples.
+        account: writes down what happens.
+        stop: asks for the end.
+        lease: renewed as long as this lives.
+        emit: is told what happens.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        clock: Clock,
+        instruments: Instruments,
+        intake: Intake,
+        account: Account,
+        stop: StopRequest,
+        lease: Lease,
+        emit: events.Emit,
+    ) -> None:
+        self._task = task
+        self._clock = clock
+        self._instruments = instruments
+        self._intake = intake
+        self._account = account
+        self._stop = stop
+        self._lease = lease
+        self._emit = emit
+        self._told = 0.0
+
+    def serve(self, done: Callable[[], bool], until: float | None = None) -> None:
+        """Do all that comes up until `done()`, or until clock time `until`, s.
+
+        Raises:
+            StopAskedError: somebody asked to stop.
+            TactileLabError: an instrument or the recorder failed.
+        """
+        scope = self._instruments.scope
+        while True:
+            self._lease.renew()
+            self._take_blocks()
+            self._account.readings(self._instruments)
+            if self._stop.requested:
+                raise StopAskedError
+            self._instruments.raise_failure()
+            if done():
+                return
+            wake = self._clock.now() + PULSE
+            if until is not None:
+                if self._clock.now() >= until:
+                    return
+                wake = min(wake, until)
+            self._clock.wait_for(
+                lambda: bool(
+                    done()
+                    or self._stop.requested
+                    or self._instruments.failed
+                    or (scope and self._intake.streaming and scope.waiting > 0)
+                ),
+                wake,
+            )
+
+    def rest_until(self, when: float) -> None:
+        """Wait until clock time `when`, s."""
+        self.serve(lambda: self._clock.now() >= when, when)
+
+    def errand(self, work: Callable[[], T]) -> T:
+        """What a person comes back with; simulated time stands still meanwhile."""
+        errand = Errand(work)
+        if not self._clock.simulated:
+            self.serve(lambda: errand.ended)
+        while not errand.ended_within(PULSE):
+            if self._stop.requested:
+                raise StopAskedError
+        return errand.result()
+
+    def start_stream(self) -> None:
+        """Have the scope stream, if there is one, and begin the record with it.
+
+        Raises:
+            RefusedError: the scope did not start.
+        """
+        scope = self._instruments.scope
+        if scope is None:
+            if self._account.journal is None:
+                self._account.begin(None)
+            return
+        scope.stream_from(self._task.channels, self._task.interval)
+        self.serve(lambda: scope.stream is not None)
+        stream = scope.stream
+        if stream is None:
+            raise RefusedError("The scope did not start its stream.")
+        search = self._task.search
+        if search is not None and search.must_learn:
+            self._learn(search, scope, stream)
+        journal = self._account.journal or self._account.begin(stream)
+        start = self._account.axis(stream.started)
+        if search is None:
+            self._intake.begin(stream, start, journal)
+            return
+        detector, row = search.detector(stream), search.row(stream)
+        self._intake.begin(stream, start, journal, detector, row)
+
+    def stop_stream(self) -> None:
+        """Have the stream end, take the last of it, and align it in time."""
+        scope = self._instruments.scope
+        if scope is None:
+            return
+        stream = scope.stream
+        scope.halt()
+        self.serve(lambda: scope.stream is None)
+        if stream is not None:
+            start = self._account.axis(stream.started)
+            self._account.align(start, self._intake.reached, stream.uncertainty)
+        self._account.spikes(self._intake.end())
+
+    def last_words(self) -> None:
+        """Store what the instruments still delivered while they were closed."""
+        try:
+            self._tell_changes()
+            self._take_blocks()
+            self._account.readings(self._instruments)
+            self._account.spikes(self._intake.end())
+        except TactileLabError as failure:
+            self._emit(events.Message("error", str(failure)))
+
+    def _learn(self, search: SpikeSearch, scope: ScopeThread, stream: Stream) -> None:
+        """Have the search learn from the first samples while they wait.
+
+        The record names the threshold from its first byte on, so it begins after
+        this; no sample is lost, for none is taken.
+        """
+        wanted = max(1, round(REST / stream.interval))
+        until = self._clock.now() + REST + GRACE
+        self.serve(lambda: scope.ahead >= wanted, until)
+        if scope.ahead == 0:
+            raise InstrumentError(
+                f"The scope has sent no samples for {REST + GRACE:g} s, so no spike "
+                "threshold could be estimated. Set detect.threshold."
+            )
+        search.learn(stream, scope.look_ahead(search.row(stream)))
+        text = search.told(stream)
+        self._account.note("detection", text)
+        self._emit(events.Message("info", text))
+
+    def _take_blocks(self) -> None:
+        scope = self._instruments.scope
+        if not self._intake.streaming:
+            return
+        while scope is not None and (block := scope.take()) is not None:
+            self._account.spikes(self._intake.add(block))
+            for reading in self._intake.take_field():
+                self._account.field(reading.time, reading.value)
+            self._lease.renew()
+            if self._intake.reached - self._told >= PULSE:
+                self._told = self._intake.reached
+                self._emit(events.Progress(self._told, self._task.expected))
+
+    def _tell_changes(self) -> None:
+        """Say which settings are not as they were when the run began."""
+        found = self._instruments
+        for text in changed(found.settings, found.settings_after):
+            self._account.warn(text)
