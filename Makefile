@@ -55,6 +55,8 @@ reports: $(DEV_STAMP)
 	$(BIN)/python tests/benchmarks/kill_store.py --kills 200 --out docs/kill-figures.md
 	$(BIN)/python tests/benchmarks/sustained.py --out docs/streaming-figures.md
 	$(BIN)/python tests/benchmarks/serial_bench.py --out docs/serial-figures.md
+	$(BIN)/python tests/benchmarks/scope_stream.py --out docs/scope-figures.md
+	$(BIN)/python tests/benchmarks/fault_table.py --out docs/fault-figures.md
 
 screenshots: $(DEV_STAMP)
 	$(BIN)/python -m gui.screenshots docs/pictures

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Any
 
 from drivers import picoscope_status as status
+from drivers.opened import Opened
 from drivers.picoscope_block import Trigger, capture
 from drivers.picoscope_ring import StreamRing
 from drivers.picoscope_setup import (
@@ -29,7 +29,7 @@ GUARANTEED = (31.25e6, 15.625e6, 7.8125e6, 7.8125e6)
 _MOST_PARTS = 8
 
 
-class PicoScope:
+class PicoScope(Opened):
     """A 3000-series PicoScope through PicoSDK's ps3000a library.
 
     Args:
@@ -75,18 +75,6 @@ class PicoScope:
         self._drained = False
         self._asked = 0.0
         self._failure: BaseException | None = None
-
-    def __enter__(self) -> PicoScope:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     @property
     def identity(self) -> str:

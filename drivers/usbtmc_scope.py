@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
+from drivers.opened import Opened
 from drivers.scope_dialect import ScopeDialect
 from drivers.scope_wiring import check_channels, described
 from drivers.usbtmc_link import UsbtmcLink
@@ -27,7 +27,7 @@ _MOST_ERRORS = 20
 _SETTLING, _PATIENCE = 0.2, 3.0
 
 
-class UsbtmcScope:
+class UsbtmcScope(Opened):
     """A SCPI oscilloscope that a dialect row describes, as a block-only `Scope`.
 
     Between records it is blind, so `capability.gapless` is false. The index of a
@@ -66,18 +66,6 @@ class UsbtmcScope:
         self._triggered_at: float | None = None
         self._armed_at = 0.0
         self._next = 0
-
-    def __enter__(self) -> UsbtmcScope:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     @property
     def identity(self) -> str:

@@ -122,6 +122,7 @@ def open_bench(
     coil_faults: Sequence[SerialFault] = (),
     meter_faults: Sequence[SerialFault] = (),
     world: PlantOptions | None = None,
+    make: Make | None = None,
 ) -> Bench:
     """Drivers and far ends of the instruments `scene` needs; nothing is opened.
 
@@ -132,6 +133,7 @@ def open_bench(
         coil_faults: the same for the current source.
         meter_faults: the same for the teslameter.
         world: physics with its wiring faults, instead of the scene's.
+        make: what scope there is, and how it is connected.
 
     Raises:
         SceneError: the bench file lacks an instrument the scene needs.
@@ -160,7 +162,7 @@ def open_bench(
         library = FakePs3000a(
             wired,
             clock,
-            Make(clock_error=scene.simulated.clock_error),
+            make or Make(clock_error=scene.simulated.clock_error),
             scope_faults,
         )
         # equal clocks let the driver find a single lost sample; unequal ones do not

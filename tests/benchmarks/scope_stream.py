@@ -1,6 +1,6 @@
 """How fast samples come through the PicoScope driver, and that none is lost unnoticed.
 
-Run ``python tests/benchmarks/scope_stream.py [seconds]``. Prints Markdown tables:
+    python tests/benchmarks/scope_stream.py [--seconds 5] [--out docs/scope-figures.md]
 
 1. unpaced: MS/s per input through the callback into blocks, on the Python library and
    on the C emulator (where there is a compiler), every sample's index checked;
@@ -10,14 +10,17 @@ Run ``python tests/benchmarks/scope_stream.py [seconds]``. Prints Markdown table
 
 from __future__ import annotations
 
+import argparse
 import ctypes
+import os
+import platform
 import shutil
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -162,11 +165,14 @@ def starved(fifo: int | None, pause: float) -> tuple[int, str]:
     return lib.device.dropped, said
 
 
-def main() -> None:
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 5.0
-    file = compiled()
-    print("Unpaced, 4 inputs, MS/s per input (median of", REPEATS, "runs), 0 lost\n")
-    print("| samples a poll | Python library | C emulator |\n|---|---|---|")
+def unpaced_table(file: Path | None) -> list[str]:
+    """Markdown of the first table."""
+    lines = [
+        f"Unpaced, 4 inputs, MS/s per input (median of {REPEATS} runs), 0 lost:",
+        "",
+        "| samples a poll | Python library | C emulator |",
+        "|---|---|---|",
+    ]
     for chunk in (1 << 12, 1 << 14, 1 << 16, 1 << 18):
         figures = []
         for kind in ("Python", "C"):
@@ -175,20 +181,38 @@ def main() -> None:
                 continue
             runs = [unpaced(kind, file, chunk) for _ in range(REPEATS)]
             figures.append(f"{statistics.median(runs):.0f}")
-        print(f"| {chunk} | {' | '.join(figures)} |")
-    print(f"\nPaced by the real clock, {seconds:g} s each, Python library\n")
-    print("| MS/s per input | inputs | lost | load | longest poll |")
-    print("|---|---|---|---|---|")
+        lines.append(f"| {chunk} | {' | '.join(figures)} |")
+    return lines
+
+
+def paced_table(seconds: float) -> list[str]:
+    """Markdown of the second table."""
+    lines = [
+        "",
+        f"Paced by the real clock, {seconds:g} s each, Python library:",
+        "",
+        "| MS/s per input | inputs | lost | load | longest poll |",
+        "|---|---|---|---|---|",
+    ]
     for rate, inputs in ((1e6, 4), (7.8125e6, 4), (15.625e6, 4), (31.25e6, 1)):
         try:
             lost, load, longest = paced(rate, inputs, seconds)
             row = f"{lost} | {load:.0%} | {longest * 1e3:.1f} ms"
         except SamplesLostError as error:
             row = f"reported: {error} | |"
-        print(f"| {rate / 1e6:g} | {inputs} | {row} |")
-    print("\nStarved on purpose, 4 inputs at 7.8125 MS/s, polls every 10 ms\n")
-    print("| kept for a late poll | one poll late by | dropped | the driver said |")
-    print("|---|---|---|---|")
+        lines.append(f"| {rate / 1e6:g} | {inputs} | {row} |")
+    return lines
+
+
+def starved_table() -> list[str]:
+    """Markdown of the third table."""
+    lines = [
+        "",
+        "Starved on purpose, 4 inputs at 7.8125 MS/s, polls every 10 ms:",
+        "",
+        "| kept for a late poll | one poll late by | dropped | the driver said |",
+        "|---|---|---|---|",
+    ]
     for fifo, pause in (
         (None, 0.05),
         (None, 0.2),
@@ -197,8 +221,42 @@ def main() -> None:
         (100_000, 0.05),
     ):
         dropped, said = starved(fifo, pause)
+        if dropped and said == "nothing":
+            raise SystemExit(f"{dropped} samples were lost without a word")
         kept = "1 Mi" if fifo is None else str(fifo)
-        print(f"| {kept} | {pause * 1e3:g} ms | {dropped} | {said} |")
+        lines.append(f"| {kept} | {pause * 1e3:g} ms | {dropped} | {said} |")
+    return lines
+
+
+def main() -> None:
+    """Measure, print, and write the tables."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--seconds", type=float, default=5.0)
+    options.add_argument("--out", type=Path)
+    chosen = options.parse_args()
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"],
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
+    lines = [
+        "# Samples through the PicoScope driver",
+        "",
+        f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
+        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}. Made by "
+        f"`tests/benchmarks/scope_stream.py --seconds {chosen.seconds:g}`: the driver "
+        "on its emulated library, through the C callback; the place of every block's "
+        "samples is checked.",
+        "",
+        *unpaced_table(compiled()),
+        *paced_table(chosen.seconds),
+        *starved_table(),
+    ]
+    text = "\n".join(lines) + "\n"
+    print(text)
+    if chosen.out is not None:
+        chosen.out.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Figures of the serial instruments: time to output-off, set-points a second, faults.
+"""Figures of the serial instruments: time to output-off, set-points a second.
 
     python tests/benchmarks/serial_bench.py [--kills N] [--out docs/serial-figures.md]
 
@@ -18,9 +18,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from datetime import date
 from pathlib import Path
-
-import serial_faults  # beside this file
 
 from drivers.coil_source import CoilSource
 from drivers.dialect import coil_dialect
@@ -137,12 +136,18 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=2.0)
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"],
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
     lines = [
         "# Serial instruments in figures",
         "",
-        f"`tests/benchmarks/serial_bench.py --kills {chosen.kills}`, "
-        f"{time.strftime('%Y-%m-%d')}, {platform.python_version()}, "
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}.",
+        f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
+        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}. Made by "
+        f"`tests/benchmarks/serial_bench.py --kills {chosen.kills}`.",
         "",
         "| owner's end | wire | kills | median to off, ms | worst, ms |",
         "|---|---|---|---|---|",
@@ -171,7 +176,6 @@ def main() -> None:
         rate, p50, p99 = rates(kind, baud, chosen.seconds)
         wire = f"{kind}, {baud} baud, 10 ms to act" if baud else f"{kind}, unpaced"
         lines.append(f"| {wire} | {rate:.0f} | {1e3 * p50:.2f} | {1e3 * p99:.2f} |")
-    lines += ["", *serial_faults.table()]
     text = "\n".join(lines) + "\n"
     print(text)
     if chosen.out is not None:
