@@ -30,6 +30,11 @@ RECONNECT = 1.0
 
 UNKNOWN = "OUTPUT STATE UNKNOWN - switch the coil source off at the instrument. "
 
+DOUBT = (
+    " It did not confirm every line, so its set-point may not be 0 A: look before you "
+    "switch it on by hand."
+)
+
 
 def switch_off(
     wire: CoilWire,
@@ -57,10 +62,10 @@ def switch_off(
         _ramp_down(wire, clock, setpoint, slew, exchange, trouble)
     steps = (*wire.row.stop_lines, wire.row.set_line(0.0), *wire.row.off)
     current: float | None = None
-    for _ in range(VERIFICATIONS):
+    for left in reversed(range(VERIFICATIONS)):
         if not wire.talk.reconnected(trouble, RECONNECT):
             break
-        wire.talk.insist(steps, trouble)
+        taken = wire.talk.insist(steps, trouble)
         wire.talk.link.pause(SETTLE)
         try:
             on = wire.output_is_on()
@@ -69,9 +74,10 @@ def switch_off(
             trouble.append(f"read-back: {reason}")
             continue
         if not on and abs(current) <= OFF_CURRENT:
-            return OffReport(
-                True, current, f"Output off, {show(current, 'A')} read back."
-            )
+            if left and not taken:
+                continue  # off, but the set-point may be another than 0 A
+            text = f"Output off, {show(current, 'A')} read back."
+            return OffReport(True, current, text + ("" if taken else DOUBT))
         state = "on" if on else "off"
         trouble.append(f"read-back: output {state}, {show(current, 'A')}")
     return OffReport(False, current, UNKNOWN + " | ".join(dict.fromkeys(trouble)))

@@ -112,14 +112,19 @@ class Conversation:
                 if not self.link.is_open:
                     return
 
-    def insist(self, lines: Iterable[str], trouble: list[str]) -> None:
-        """Send each line whatever happens; what went wrong is added to `trouble`."""
+    def insist(self, lines: Iterable[str], trouble: list[str]) -> bool:
+        """Send each line whatever happens; whether all were confirmed.
+
+        What went wrong is added to `trouble`.
+        """
+        before = len(trouble)
         for line in lines:
             try:
                 self.command(line)
             except InstrumentError as reason:
                 trouble.append(f"{line}: {reason}")
                 self._blindly(line, trouble)
+        return len(trouble) == before
 
     def clear_errors(self) -> None:
         """Read the error queue until it is empty."""
@@ -137,10 +142,8 @@ class Conversation:
         """Whether the link is open, after trying to open it for `patience` s."""
         if self.link.is_open:
             return True
-        why, known = "", self.link.identity
-        for attempt in range(1 + round(patience / RETRY)):
-            if attempt:
-                self.link.pause(RETRY)
+        known, until = self.link.identity, self.link.now + patience
+        while True:
             try:
                 self.link.open()
                 self.recognise()
@@ -149,9 +152,10 @@ class Conversation:
             except InstrumentError as reason:
                 self.link.close()  # a stranger is not to be told anything
                 self.link.identity = known
-                why = f"reconnect: {reason}"
-        trouble.append(why)
-        return False
+                if self.link.now + RETRY > until:
+                    trouble.append(f"reconnect: {reason}")
+                    return False
+            self.link.pause(RETRY)
 
     def _same_as(self, known: str | None) -> None:
         if known is not None and known != (found := self.link.identity):

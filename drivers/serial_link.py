@@ -171,6 +171,11 @@ class SerialLink:
         self._send("")
         self._send(line)
 
+    @property
+    def now(self) -> float:
+        """Clock time, s."""
+        return self._clock.now()
+
     def pause(self, seconds: float) -> None:
         """Let time pass, alive."""
         self._clock.sleep_until(self._clock.now() + seconds)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 import serial
+from serial.urlhandler import protocol_socket
 
 from drivers.dialect_row import Wire
 from tactile_lab.errors import InstrumentError, NotFoundError
@@ -20,6 +21,10 @@ with suppress(ImportError):  # Windows has no termios
 
 PORT_ERRORS = (serial.SerialException, OSError, TermiosError)
 """What pyserial raises when a port fails; `termios.error` is not an `OSError`."""
+
+
+CONNECT = 0.5
+"""Longest wait for a network port to accept, s; pyserial's own is ten times that."""
 
 
 def port_settings(port: str, wire: Wire) -> dict[str, Any]:
@@ -53,6 +58,7 @@ def open_port(port: str, wire: Wire, what: str) -> serial.Serial:
         NotFoundError: no such port, or no right to use it.
         InstrumentError: another program holds it.
     """
+    protocol_socket.POLL_TIMEOUT = CONNECT
     try:
         opened: serial.Serial = serial.serial_for_url(
             port, do_not_open=True, **port_settings(port, wire)

@@ -101,10 +101,12 @@ class ScopeThread(InstrumentThread):
     def make_safe_and_close(self) -> None:
         """Stop the stream and close."""
         try:
-            self.scope.stop()
-            if self.opened and self.failure is None:
-                self.settings_after = self.scope.settings()
-            self.scope.close()
+            try:
+                self.scope.stop()
+                if self.opened and self.failure is None:
+                    self.settings_after = self.scope.settings()
+            finally:
+                self.scope.close()
         except InstrumentError as failure:
             self.failure = self.failure or failure
         self.stream = None

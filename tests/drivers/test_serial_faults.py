@@ -188,6 +188,21 @@ def test_an_error_of_the_instrument_is_passed_on(serial_bench):
     assert it.coil.safe_off().verified
 
 
+@pytest.mark.parametrize("times", [1, None])
+def test_off_with_a_set_point_that_was_refused_says_so(serial_bench, times):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="refused", line=r"^CURR 0\.0{5}", times=times))
+    report = it.coil.safe_off()
+    assert report.verified and not it.source.output_on
+    if times is None:
+        assert it.source.setpoint > 0 and "set-point may not be 0 A" in report.text
+    else:
+        assert it.source.setpoint == 0.0 and "set-point" not in report.text
+
+
 def test_no_compliance_no_output(serial_bench):
     it = serial_bench
     it.coil.open()

@@ -1,6 +1,7 @@
 """The unchanged driver over a pseudo-terminal and TCP, on the real clock."""
 
 import itertools
+import socket
 import time
 
 import pytest
@@ -183,6 +184,20 @@ def test_seven_odd_one_reaches_pyserial(monkeypatch):
         meter.open()
     assert (asked["bytesize"], asked["parity"], asked["stopbits"]) == (7, "O", 1)
     assert asked["write_timeout"] and asked["exclusive"]
+
+
+def test_a_network_source_that_does_not_accept_holds_nobody_up(monkeypatch):
+    waited = []
+
+    def no_answer(address, timeout):
+        waited.append(timeout)
+        raise TimeoutError("timed out")
+
+    monkeypatch.setattr(socket, "create_connection", no_answer)
+    coil = CoilSource(ROW, "socket://bench.invalid:5025", CoilLimits(), RealClock())
+    with pytest.raises(NotFoundError, match="timed out"):
+        coil.open()
+    assert waited == [0.5]
 
 
 def test_pacing_takes_the_time_of_the_wire():
