@@ -100,7 +100,9 @@ class Protocol(BaseModel):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    signals: ClassVar[tuple[str, ...]] = ("force", "V_C1", "V_C2", "V_K", "spikes")
+    signals: ClassVar[tuple[str, ...]] = (
+        "force", "coil_current", "V_C1", "V_C2", "V_K", "spikes",
+    )  # fmt: skip
     """Signals recorded unless the scene says otherwise."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Signals the generator looks at in outcomes: acquired even when not recorded."""

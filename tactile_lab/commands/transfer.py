@@ -17,8 +17,16 @@ from tactile_lab.commands.terminal import print_json, refusing, warn
     metavar="LOW HIGH",
     help='V_GS to fit, such as --between "0.5 V" "2.5 V".',
 )
+@click.option(
+    "--figure",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Draw curve and fit as FILE.png and FILE.svg.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-def command(curve: Path, between: tuple[str, str] | None, as_json: bool) -> None:
+def command(
+    curve: Path, between: tuple[str, str] | None, figure: Path | None, as_json: bool
+) -> None:
     """Fit the subthreshold regime of CURVE, a CSV of V_GS and I_DS.
 
     The first line is "V_GS_V,I_DS_A" or an analyser's "VG,ID"; SI units.
@@ -39,6 +47,17 @@ def command(curve: Path, between: tuple[str, str] | None, as_json: bool) -> None
                 f"(line {where}{more})"
             )
         fit = fit_transfer(read.V_GS, read.I_DS, between=limits)
+        if figure is not None:
+            from tactile_lab.errors import SceneError
+            from tactile_lab.report.canvas import save
+            from tactile_lab.report.transfer_figure import transfer_figure
+
+            try:
+                save(transfer_figure(read, fit, curve.name), figure)
+            except OSError as reason:
+                raise SceneError(
+                    f"{figure} cannot be written: {reason.strerror}."
+                ) from reason
     found = {"I_S_A": fit.I_S, "m": fit.m, "swing_V_per_decade": fit.swing}
     if as_json:
         print_json(

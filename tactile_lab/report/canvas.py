@@ -79,35 +79,47 @@ def axes(
     return made
 
 
-def heading(figure: Figure, title: str, subtitle: str, *, simulated: bool) -> None:
-    """Title, a quiet second line, and the mark that tells simulated from measured."""
+def heading(
+    figure: Figure, title: str, subtitle: str, *, simulated: bool | None
+) -> None:
+    """Title, a quiet second line, and the mark that tells simulated from measured.
+
+    Args:
+        figure: to put them on.
+        title: bold.
+        subtitle: below it.
+        simulated: the mark; None for a figure that is neither or is not known to be.
+    """
     width, height = figure.get_size_inches()
     left, top = 0.12 / width, 1 - 0.12 / height
-    mark = SIMULATED.light if simulated else MEASURED.light
-    texts = (
+    texts = [
         figure.text(
             left, top, title, size=11, weight="bold", va="top", color=INK.light
         ),
         figure.text(
             left, top - 0.2 / height, subtitle, size=7.5, va="top", color=QUIET.light
         ),
-        figure.text(
-            1 - 0.12 / width,
-            top,
-            "SIMULATED BENCH" if simulated else "MEASURED",
-            size=7.5,
-            weight="bold",
-            ha="right",
-            va="top",
-            color=mark,
-            bbox={
-                "boxstyle": "round,pad=0.45",
-                "facecolor": "none",
-                "edgecolor": mark,
-                "linewidth": 0.9,
-            },
-        ),
-    )
+    ]
+    if simulated is not None:
+        mark = SIMULATED.light if simulated else MEASURED.light
+        texts.append(
+            figure.text(
+                1 - 0.12 / width,
+                top,
+                "SIMULATED BENCH" if simulated else "MEASURED",
+                size=7.5,
+                weight="bold",
+                ha="right",
+                va="top",
+                color=mark,
+                bbox={
+                    "boxstyle": "round,pad=0.45",
+                    "facecolor": "none",
+                    "edgecolor": mark,
+                    "linewidth": 0.9,
+                },
+            )
+        )
     for number, text in enumerate(texts):
         text.set_gid(f"{HEADING}-{number}")
 

@@ -21,6 +21,7 @@ from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
+from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Records, Run
 from tactile_lab.waveform import Waveform
 
@@ -28,8 +29,8 @@ FloatArray = NDArray[np.float64]
 
 CELLS = 4000
 """Cells of a trace over the whole run."""
-FINE = 512
-"""Samples of the shunt in one bin, to find edges: what the run's pyramid holds."""
+EDGE = 5e-4
+"""Bins of the shunt to find edges in, s."""
 
 
 def read(folder: Path) -> RunData:
@@ -161,10 +162,12 @@ def _applied(run: Run) -> AppliedCurrent:
     rows, shunt = run.current, None
     if "coil_current" in run.signals:
         signal = run.signal("coil_current")
+        # whole bins of the run's pyramid where they are fine enough
+        together = min(BIN, max(1, round(EDGE / signal.interval)))
 
         def shunt(start: float, end: float) -> tuple[FloatArray, FloatArray]:
             part = signal.between(start, end)
-            cells = max(1, (part.stop - part.start) // FINE)
+            cells = max(1, (part.stop - part.start) // together)
             seen = signal.envelope(part.start, part.stop, cells=cells)
             step = np.diff(seen.time[-2:]) if seen.time.size > 1 else 0.0
             return seen.time[:-1] + step / 2, seen.mean[:-1]  # the last may be short

@@ -66,6 +66,11 @@ def test_transfer_fits_a_csv(tmp_path):
     assert found["m"]["value"] == pytest.approx(5.646)
     said = call("transfer", path, "--between", "1 V", "2 V").stdout
     assert "11 points between 1 V and 2 V" in said
+    assert call("transfer", path, "--figure", tmp_path / "fig1c").exit_code == 0
+    assert (tmp_path / "fig1c.png").read_bytes().startswith(b"\x89PNG")
+    lost = call("transfer", path, "--figure", tmp_path / "none" / "fig1c")
+    assert lost.exit_code == 2
+    assert "cannot be written" in lost.stderr
 
 
 def test_transfer_refuses_a_bad_file_and_a_bad_unit(tmp_path):
