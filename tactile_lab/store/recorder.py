@@ -18,6 +18,7 @@ from tactile_lab.store.columns import Records, SampleColumn
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
 from tactile_lab.store.layout import RECORDS, Layout, declare
+from tactile_lab.store.pieces import Pieces
 from tactile_lab.trial import Outcome
 
 CADENCE = 0.5
@@ -58,13 +59,9 @@ class Recorder:
         self._file: h5py.File | None = None
         self._columns: tuple[SampleColumn, ...] = ()
         self._rows: tuple[int, ...] = ()
-        self._stream: Stream | None = None
-        self._expected = 0
-        self._pieces: list[tuple[int, int]] = []
-        self._segment: tuple[Any, ...] = ()
+        self._pieces = Pieces()
         self._flushed = time.monotonic()
         self._failed = False
-        self._taken = 0
         if not layout.signals and layout.detection is None:
             self._guard(lambda: self._open(None))
 
@@ -78,25 +75,15 @@ class Recorder:
         if self._file is None:
             self._guard(lambda: self._open(stream))
         self._rows = self.layout.rows(stream)
-        self._stream, self._expected = stream, 0
-        self._begin_piece(start)
+        self._pieces.stream(stream, start)
+        self._records["segments"].append(*self._pieces.segment)
 
     def append(self, block: Block) -> None:
         """Store a block; samples missing before it become a gap record."""
-        if self._stream is None:
-            raise RecordingError("Samples came before any stream had started.")
-        missing = block.first - self._expected
-        if missing < 0:
-            raise RecordingError(
-                f"Samples {block.first} to {self._expected - 1} came twice; the scope "
-                "driver repeats data. Restart the scope."
-            )
-        if missing:
-            _, start, interval, *_ = self._segment
-            at = start + (block.first - self._pieces[-1][0]) * interval
-            self._records["gaps"].append(self._taken, missing, at)
-            self._expected = block.first
-            self._begin_piece(at)
+        gap = self._pieces.skip_to(block.first)
+        if gap is not None:
+            self._records["gaps"].append(self._pieces.taken, *gap)
+            self._records["segments"].append(*self._pieces.segment)
         self._guard(lambda: self._append(block))
 
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
@@ -107,9 +94,9 @@ class Recorder:
             drift: of the scope's clock against the host's, s/s.
             uncertainty: of the aligned times, s.
         """
-        first, start, interval, host, _, _ = self._segment
-        self._segment = (first, start + offset, interval, host, drift, uncertainty)
-        self._guard(lambda: self._records["segments"].replace_last(*self._segment))
+        self._pieces.align(offset, drift, uncertainty)
+        row = self._pieces.segment
+        self._guard(lambda: self._records["segments"].replace_last(*row))
 
     def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
         """Store spikes detected on line.
@@ -119,10 +106,7 @@ class Recorder:
             found: shape (k,), dtype `acquisition.spikes.SPIKE`, sample indices
                 counted from the start of the stream.
         """
-        streamed = np.array([piece[0] for piece in self._pieces])
-        stored = np.array([piece[1] for piece in self._pieces])
-        which = np.searchsorted(streamed, found["sample"], side="right") - 1
-        samples = found["sample"] - streamed[which] + stored[which]
+        samples = self._pieces.stored(found["sample"])
         for sample, at, spike in zip(samples, times, found, strict=True):
             self._records["spikes"].append(
                 sample, at, spike["amplitude"], spike["width"]
@@ -256,26 +240,13 @@ class Recorder:
             self._durable = Durable(path)
         self._flush()
 
-    def _begin_piece(self, start: float) -> None:
-        """Samples from here on follow one another from `start` s on."""
-        assert self._stream is not None
-        self._pieces = [p for p in self._pieces if p[0] < self._expected]
-        self._pieces.append((self._expected, self._taken))
-        host = self._stream.started + self._expected * self._stream.interval
-        self._segment = (
-            self._taken, start, self._stream.interval, host, 0.0,
-            self._stream.uncertainty,
-        )  # fmt: skip
-        self._records["segments"].append(*self._segment)
-
     def _append(self, block: Block) -> None:
         over = sum(
             1 << bit for bit, row in enumerate(self._rows) if block.overrange[row]
         )
         if over:
-            self._records["overrange"].append(self._taken, block.samples, over)
-        self._expected += block.samples
-        self._taken += block.samples
+            self._records["overrange"].append(self._pieces.taken, block.samples, over)
+        self._pieces.take(block.samples)
         wrote = [
             column.append(block.codes[row])
             for column, row in zip(self._columns, self._rows, strict=True)
