@@ -16,7 +16,6 @@ from gui.panels import Panels
 from gui.review.entries import Entry, entries
 from gui.review.gathering import Gathering
 from gui.session.messages import Level, Planned, Twins
-from gui.session.request import Request
 from gui.session.threads import start
 from gui.showing import lanes_shown
 from gui.state import State
@@ -71,6 +70,10 @@ class Opening(QObject):
 
     # --- asked by the user
 
+    @property
+    def _busy(self) -> bool:
+        return self._panels.session.state in (State.RUNNING, State.ABORTING)
+
     def ask_scene(self) -> None:
         """Let the user choose a scene, and open it."""
         path = choose_scene(self._panels.centre.window())
@@ -86,9 +89,13 @@ class Opening(QObject):
     def open_path(self, path: Path) -> None:
         """Open a scene, a protocol file, a run folder or a run's data file."""
         if path.is_dir() or path.suffix in (".h5", ".json"):
-            self.open_run(path if path.is_dir() else path.parent)
-        elif self._panels.session.state in (State.RUNNING, State.ABORTING):
-            self._queue_scene(path)
+            folder = path if path.is_dir() else path.parent
+            if self._busy:
+                self._queue(str(folder / "scene.toml"), f"{folder.name[18:]} again")
+            else:
+                self.open_run(folder)
+        elif self._busy:
+            self._queue(str(path), path.stem)
         else:
             self.open_scene(str(path))
 
@@ -143,8 +150,7 @@ class Opening(QObject):
     def plan_arrived(self, planned: Planned) -> None:
         """Show the plan in the lanes, unless a run is on screen."""
         session = self._panels.session
-        busy = session.state in (State.RUNNING, State.ABORTING)
-        if planned.expectation is None or busy or self.run is not None:
+        if planned.expectation is None or self._busy or self.run is not None:
             return
         if session.source is None:
             self.show_lanes()
@@ -169,7 +175,7 @@ class Opening(QObject):
         panels.centre.tools.widths.choose(1)
         if not panels.session.monitor.alive:
             self.ending = ""
-            expectation = panels.session.expectation
+            expectation = panels.session.running
             steps = expectation.estimate.trials if expectation else 0
             searched = expectation is None or expectation.needs.detect_on is not None
             self.gathering.begin(steps, fires=searched)
@@ -236,7 +242,7 @@ class Opening(QObject):
 
     def _show_run(self, source: RunSource) -> None:
         panels = self._panels
-        if panels.session.state in (State.RUNNING, State.ABORTING):
+        if self._busy:
             source.close()
             self.say("A run is in progress; old runs open when it has ended.")
             return
@@ -265,7 +271,7 @@ class Opening(QObject):
 
     def _show_comparison(self, comparison: Comparison) -> None:
         session, centre = self._panels.session, self._panels.centre
-        if session.state in (State.RUNNING, State.ABORTING):
+        if self._busy:
             comparison.close()
             self.say("A run is in progress; runs are compared when it has ended.")
             return
@@ -280,21 +286,18 @@ class Opening(QObject):
         centre.tools.widths.choose(3)
         self.changed.emit()
 
-    def _queue_scene(self, path: Path) -> None:
-        from gui.session.session import Queued
-
-        session = self._panels.session
-        request = Request(str(path), (), session.bench_choice)
-        try:
-            request.load()
-        except (TactileLabError, OSError) as error:
-            self.say(str(error))
-            return
-        session.enqueue(Queued(path.stem, request, 0.0))
+    def _queue(self, scene: str, title: str) -> None:
+        problem = self._panels.session.enqueue_scene(scene, title)
+        if problem:
+            self.say(problem)
 
     def _again(self, entry: Entry) -> None:
-        self.close_run()
-        self.open_scene(str(entry.folder / "scene.toml"))
+        scene = str(entry.folder / "scene.toml")
+        if self._busy:
+            self._queue(scene, entry.title)
+        else:
+            self.close_run()
+            self.open_scene(scene)
 
     def _list(self, found: list[Entry]) -> None:
         self._panels.review.runs.show_entries(found)

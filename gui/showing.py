@@ -23,7 +23,7 @@ def lanes_shown(
         return lanes_for(WATCHED, twin=False)
     if run is not None:
         return lanes_for(run.signals, twin=run.tracks is not None)
-    expectation = session.expectation
+    expectation = session.plan_on_screen
     if expectation is None:
         return None
     needs, record = expectation.needs, expectation.record

@@ -33,14 +33,14 @@ def instruments(session: Core, coil: CoilView | None) -> tuple[InstrumentView, .
             views.append(_scope(session))
         elif role == "meter":
             views.append(_meter(session))
-    if session.expectation is not None and session.expectation.preview.traces:
+    if session.plan_on_screen is not None and session.plan_on_screen.preview.traces:
         lamp = Lamp.ACTIVE if session.state is State.RUNNING else Lamp.GOOD
         views.append(InstrumentView("Model", lamp, "preview in lanes", _twin(session)))
     return tuple(views)
 
 
 def _roles(session: Core) -> list[str]:
-    expectation = session.expectation
+    expectation = session.plan_on_screen
     if expectation is None:
         found = session.bench.found if session.bench is not None else ()
         return [one.role for one in found] or ["coil", "scope"]
@@ -84,7 +84,7 @@ def _coil(session: Core, coil: CoilView | None) -> InstrumentView:
 
 def _scope(session: Core) -> InstrumentView:
     lamp, words = _found(session, "scope")
-    expectation, value = session.expectation, "idle"
+    expectation, value = session.plan_on_screen, "idle"
     if lamp in (Lamp.ABSENT, Lamp.WAITING, Lamp.BAD):
         return InstrumentView(NAMES["scope"], lamp, words)
     if expectation is not None:
@@ -112,7 +112,7 @@ def _short(identity: str) -> str:
 
 
 def _twin(session: Core) -> str:
-    estimate = session.expectation
+    estimate = session.plan_on_screen
     if estimate is None:
         return "idle"
     return f"{estimate.preview.spikes.size} spikes"

@@ -12,12 +12,14 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import LiveSource
 from gui.session.coil import CoilWatch
+from gui.session.commands import MakePlan
 from gui.session.link import Link, RunAfar
 from gui.session.messages import (
     Checked,
     Errand,
     Level,
     Line,
+    Planned,
     Told,
 )
 from gui.session.monitor import Monitor
@@ -34,13 +36,19 @@ if TYPE_CHECKING:
 LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Queued:
-    """A run that waits for the one before it."""
+    """A run that waits for the one before it.
+
+    Attributes:
+        title: for people.
+        request: what to run.
+        expectation: its plan; None until it is computed.
+    """
 
     title: str
     request: Request
-    duration: float
+    expectation: Expectation | None = None
 
 
 class Core(QObject):
@@ -52,6 +60,9 @@ class Core(QObject):
         realtime: a simulated bench is paced by the wall clock.
 
     Attributes:
+        expectation: plan of what the form asks for; None until it is computed.
+        running: plan of the run in progress or the last one; None without one.
+        queue_held: whether the queue waits to be resumed, as it does after a STOP.
         bench_overrides: ``bench.key=value`` texts that change the connected bench.
     """
 
@@ -98,23 +109,40 @@ class Core(QObject):
         self.monitor = Monitor(self.link)
         self.folder: Path | None = None
         self._run: RunAfar | None = None
-        self._running: Expectation | None = None
+        self.running: Expectation | None = None
+        self.queue_held = False
         self._serial = 0
-        self._after_monitor: tuple[Request, str] | None = None
+        self._queue_serial = 0
+        self._queue_plans: dict[int, Queued] = {}
+        self._after_monitor: tuple[Request, str, Expectation | None] | None = None
         self._check_request: Request | None = None
 
-    def start(self, request: Request, title: str) -> None:
-        """Run `request` now, or as soon as the monitor has let go of the scope."""
+    @property
+    def plan_on_screen(self) -> Expectation | None:
+        """The plan of the run in progress, else that of the form."""
+        busy = self.state in (State.RUNNING, State.ABORTING)
+        return self.running if busy else self.expectation
+
+    def start(
+        self, request: Request, title: str, expectation: Expectation | None
+    ) -> None:
+        """Run `request` now, or as soon as the monitor has let go of the scope.
+
+        Args:
+            request: what to run.
+            title: for people.
+            expectation: its plan.
+        """
         if self.state is not State.READY or self.manual is not None:
             return
         if self.monitor.alive:
             self.monitor.stop()
-            self._after_monitor = (request, title)
+            self._after_monitor = (request, title, expectation)
             return
         self.fault, self.source, self.outcomes, self.trial = None, None, [], None
         self.elapsed, self.expected = 0.0, None
         self.run_name = title
-        self._running = self.expectation
+        self.running = expectation
         self._run = self.link.run(
             request, self.out, self.inbox, self.notes, report=self.reports
         )
@@ -123,6 +151,15 @@ class Core(QObject):
     def enqueue(self, item: Queued) -> None:
         """Have a run follow those before it; it starts at once if none is running."""
         self.queue.append(item)
+        if item.expectation is None:
+            self._queue_serial -= 1
+            self._queue_plans[self._queue_serial] = item
+            self.link.ask(MakePlan(self._queue_serial, item.request))
+        self.resume_queue()
+
+    def resume_queue(self) -> None:
+        """Let the queue go on after a STOP or a fault."""
+        self.queue_held = False
         self.queue_changed.emit()
         self._next_in_queue()
 
@@ -159,17 +196,39 @@ class Core(QObject):
         return None
 
     def _next_in_queue(self) -> None:
-        if self.state is State.READY and self.queue and self.manual is None:
-            item = self.queue.pop(0)
+        free = self.state is State.READY and self.manual is None
+        if not free or self.queue_held or not self.queue:
+            return
+        if self.queue[0].expectation is None:
+            return  # its plan is being computed
+        item = self.queue.pop(0)
+        self.queue_changed.emit()
+        self.start(item.request, item.title, item.expectation)
+
+    def _queue_planned(self, told: Planned) -> None:
+        """The plan of a waiting run is there; one that cannot run is taken out."""
+        item = self._queue_plans.pop(told.serial)
+        if item not in self.queue:
+            return
+        item.expectation = told.expectation
+        if told.expectation is None:
+            self.queue.remove(item)
+            text = f"{item.title} was taken out of the queue: {told.problem}"
+            self.log(Level.ERROR, "queue", text)
+        self.queue_changed.emit()
+        self._next_in_queue()
+
+    def _hold_queue(self) -> None:
+        if self.queue and not self.queue_held:
+            self.queue_held = True
             self.queue_changed.emit()
-            self.expectation = None
-            self.start(item.request, item.title)
 
     def _stop_source(self) -> None:
         if self.source is not None:
             self.source.running = False
 
     def _set_fault(self, fault: Fault) -> None:
+        self._hold_queue()
         self.fault = fault
         self.log(
             Level.ERROR, "safety", f"{fault.title} {fault.consequence}", safety=True

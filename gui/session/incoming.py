@@ -159,7 +159,7 @@ class Incoming(Core):
             self.log(Level.INFO, "runner", told.text.capitalize())
 
     def _begun(self, told: Begun) -> None:
-        expectation = self._running
+        expectation = self.running
         self.expected = expectation.estimate.duration if expectation else None
         self.coil.limits = told.limits or self.coil.limits
         self.coil.sign_of_life(read_back=True)
@@ -243,7 +243,9 @@ class Incoming(Core):
             self._next_in_queue()
 
     def _planned(self, told: Planned) -> None:
-        if told.serial == self._serial:
+        if told.serial in self._queue_plans:
+            self._queue_planned(told)
+        elif told.serial == self._serial:
             self.expectation, self.plan_problem = told.expectation, told.problem
             self.planned.emit(told)
             self.changed.emit()
@@ -257,9 +259,8 @@ class Incoming(Core):
             self.log(Level.ERROR, "monitor", self.monitor.problem)
             self.monitor.problem = ""
         if self._after_monitor is not None and not self.monitor.alive:
-            request, title = self._after_monitor
-            self._after_monitor = None
-            self.start(request, title)
+            wanted, self._after_monitor = self._after_monitor, None
+            self.start(*wanted)
 
     def _mind_manual(self, manual: ManualCoil) -> None:
         manual.alive()

@@ -57,6 +57,16 @@ class Session(Incoming):
             self.coil.use(None)
             self._enter(State.DISCONNECTED)
 
+    def enqueue_scene(self, scene: str, title: str) -> str:
+        """Have a scene follow the runs before it; why not, "" if it does."""
+        request = Request(scene, self.bench_overrides, self.bench_choice)
+        try:
+            request.load()
+        except (TactileLabError, OSError) as error:
+            return str(error)
+        self.enqueue(Queued(title, request))
+        return ""
+
     def plan(self, request: Request) -> None:
         """Have `request` planned; `planned` tells the result."""
         self._serial += 1
@@ -67,7 +77,11 @@ class Session(Incoming):
         self.link.ask(MakeTwin(folder, current, length))
 
     def stop(self, reason: str = "STOP in the window") -> None:
-        """Coil off, now. Reaches the coil's thread directly and never waits."""
+        """Coil off, now. Reaches the coil's thread directly and never waits.
+
+        Runs that wait in the queue are held until somebody resumes it.
+        """
+        self._hold_queue()
         if self._run is not None and self._run.alive:
             self._run.stop(reason)
             if self.state is State.RUNNING:

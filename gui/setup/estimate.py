@@ -14,6 +14,17 @@ if TYPE_CHECKING:
     from tactile_lab.plan.estimate import Estimate
 
 
+def words_of(estimate: Estimate) -> tuple[str, str, str, str]:
+    """Run time, samples, disk and share of the coil's heat budget, for a person."""
+    heat = 100 * estimate.heat / estimate.heat_budget
+    return (
+        minutes(estimate.duration),
+        show(estimate.samples_stored, "", 3),
+        show(estimate.disk, "B", 3),
+        f"{heat:.0f} %",
+    )
+
+
 class EstimateView(QWidget):
     """Four numbers with their names above."""
 
@@ -37,14 +48,7 @@ class EstimateView(QWidget):
             for value in self._values:
                 value.setText("—")
             return
-        heat = 100 * estimate.heat / estimate.heat_budget
-        texts = (
-            minutes(estimate.duration),
-            show(estimate.samples_stored, "", 3),
-            show(estimate.disk, "B", 3),
-            f"{heat:.0f} %",
-        )
-        for value, text in zip(self._values, texts, strict=True):
+        for value, text in zip(self._values, words_of(estimate), strict=True):
             value.setText(text)
         self._values[3].setToolTip(
             f"{estimate.heat:.2g} of {estimate.heat_budget:.3g} A²s; peak current "

@@ -73,7 +73,10 @@ class SetupPanel(QFrame):
         self.queue_button.clicked.connect(self.enqueue)
         self.queue.removed.connect(session.unqueue)
         self.queue.moved.connect(session.move_queued)
-        session.queue_changed.connect(lambda: self.queue.show_queue(session.queue))
+        self.queue.resumed.connect(session.resume_queue)
+        session.queue_changed.connect(
+            lambda: self.queue.show_queue(session.queue, held=session.queue_held)
+        )
         session.planned.connect(self._planned)
         theme.changed.connect(self._tint)
         self._tint()
@@ -135,7 +138,7 @@ class SetupPanel(QFrame):
         """Run what the form says."""
         if self._blocked():
             return
-        self._session.start(self.request(), self.title)
+        self._session.start(self.request(), self.title, self._session.expectation)
 
     def start_when_planned(self) -> None:
         """Have the plan that is being computed run, unless something is in its way."""
@@ -147,8 +150,7 @@ class SetupPanel(QFrame):
         if self.form.problem or self._session.plan_problem:
             return
         expectation = self._session.expectation
-        duration = expectation.estimate.duration if expectation else 0.0
-        self._session.enqueue(Queued(self.title, self.request(), duration))
+        self._session.enqueue(Queued(self.title, self.request(), expectation))
 
     @property
     def title(self) -> str:
@@ -270,7 +272,6 @@ class SetupPanel(QFrame):
         middle.addWidget(self.form)
         middle.addWidget(self.warnings)
         middle.addStretch(1)
-        middle.addWidget(self.queue)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(14, 10, 14, 12)
         whole.setSpacing(8)
@@ -281,6 +282,7 @@ class SetupPanel(QFrame):
         whole.addWidget(line())
         whole.addWidget(self.estimate)
         whole.addLayout(buttons)
+        whole.addWidget(self.queue)
         self._drop = label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small")
         whole.addWidget(self._drop)
         self.problem.hide()

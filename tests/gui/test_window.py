@@ -125,7 +125,7 @@ def test_queue_can_be_edited_while_running(lab) -> None:
     window, session = lab.window, lab.session
     lab.run()
     for name in ("one", "two", "three"):
-        session.enqueue(Queued(name, window.setup.request(), 1.0))
+        session.enqueue(Queued(name, window.setup.request()))
     session.move_queued(2, -1)
     session.unqueue(0)
     assert [item.title for item in session.queue] == ["three", "two"]
@@ -136,7 +136,7 @@ def test_queue_can_be_edited_while_running(lab) -> None:
     session.stop("the next one shall not follow")
     lab.until(lambda: session.state is State.READY)
     assert [item.title for item in session.queue] == ["three"] and not session.busy
-    session.enqueue(Queued("four", window.setup.request(), 1.0))
+    session.enqueue(Queued("four", window.setup.request()))
     lab.until(lambda: session.queue == [] and session.state is State.READY)
     assert session.folder != first
 
