@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from gui.dialogs.bench_text import Choice
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import column, label, push, set_role
+from gui.parts import column, empty, label, push, set_role
 from gui.review.conclusion import Conclusion
 
 COLUMNS = ("Input", "Signal", "Range", "Offset", "Shunt")
@@ -95,11 +95,7 @@ class Wiring(QWidget):
         return [f"{v.signal} {_word(v.ok)}: {v.text}" for v in found]
 
     def _show_verdicts(self) -> None:
-        while (item := self._verdicts.takeAt(0)) is not None:
-            widget = item.widget()
-            if widget is not None:
-                widget.setParent(None)
-                widget.deleteLater()
+        empty(self._verdicts)
         found = self._concluded
         verdicts = found.verdicts if found else ()
         tokens = self._theme.tokens

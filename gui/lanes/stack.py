@@ -46,6 +46,7 @@ class LaneStack(QFrame):
         while (item := self._layout.takeAt(0)) is not None:
             widget = item.widget()
             if widget is not None and widget is not self.navigator:
+                widget.hide()
                 widget.setParent(None)
                 widget.deleteLater()
         self.rows = []

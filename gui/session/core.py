@@ -124,14 +124,14 @@ class Core(QObject):
         return self.running if busy else self.expectation
 
     def start(
-        self, request: Request, title: str, expectation: Expectation | None
+        self, request: Request, title: str, expectation: Expectation | None = None
     ) -> None:
         """Run `request` now, or as soon as the monitor has let go of the scope.
 
         Args:
             request: what to run.
             title: for people.
-            expectation: its plan.
+            expectation: its plan; None if nobody planned it.
         """
         if self.state is not State.READY or self.manual is not None:
             return

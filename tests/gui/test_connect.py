@@ -85,7 +85,7 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
 ) -> None:
     window, session = lab.window, lab.session
     asked: list[Request] = []
-    monkeypatch.setattr(session, "start", lambda request, title: asked.append(request))
+    monkeypatch.setattr(session, "start", lambda request, *_: asked.append(request))
     window.actions_.connect_dialog()
     dialog = window.findChild(Connect)
     dialog.show_page(1)
