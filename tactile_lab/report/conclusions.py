@@ -20,6 +20,7 @@ from tactile_lab.report.bench_conclusions import (
     monitor,
 )
 from tactile_lab.report.conclusion import NO_UNCERTAINTY, Conclusion
+from tactile_lab.report.critical_gate import critical_gate
 from tactile_lab.report.preparation import force_at_zero
 from tactile_lab.report.run_data import RunData, Trace
 from tactile_lab.report.sweep import sine_sweep
@@ -80,13 +81,13 @@ def _critical_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         "critical_force_N": found.middle,
         "critical_force_half_width_N": found.half_width,
     }
-    known = run.uncertain(found.middle)
-    if known is None:
-        return Conclusion((sentence, NO_UNCERTAINTY), values)
-    whole = math.hypot(found.half_width, known)
-    values["critical_force_uncertainty_N_95"] = whole
-    said = f"With the calibration's uncertainty: ±{show(whole, 'N', 2)} (95 %)."
-    return Conclusion((sentence, said), values)
+    known, said = run.uncertain(found.middle), NO_UNCERTAINTY
+    if known is not None:
+        whole = math.hypot(found.half_width, known)
+        values["critical_force_uncertainty_N_95"] = whole
+        said = f"With the calibration's uncertainty: ±{show(whole, 'N', 2)} (95 %)."
+    gate = critical_gate(run, trials, found, known or 0.0)
+    return Conclusion((sentence, said), values) + gate
 
 
 def _rate_force(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:

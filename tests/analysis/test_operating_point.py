@@ -1,0 +1,49 @@
+from dataclasses import replace
+
+import pytest
+
+from tactile_lab.analysis.operating_point import V_GS_of_onset
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.waveform import Waveform
+
+
+def push(level):
+    return Waveform.pulse(level, ramp=0.25, hold=1.0)
+
+
+def bracket(circuit, low=0.05, high=0.15, width=5e-4):
+    """Strongest silent and weakest firing force of a circuit, as a search finds."""
+    while high - low > width:
+        tried = (low + high) / 2
+        fires = simulate(circuit, push(tried)).spike_times.size > 0
+        low, high = (low, tried) if fires else (tried, high)
+    return low, high
+
+
+@pytest.mark.parametrize("V_GS", [1.37, 1.4, 1.44])
+def test_the_critical_force_gives_v_gs_back_to_a_millivolt(V_GS):
+    silent, fires = bracket(Circuit(V_GS=V_GS))
+    low, high = V_GS_of_onset(Circuit(), push(silent), push(fires))
+    assert low < V_GS < high
+    assert high - low < 1e-3
+
+
+def test_the_force_s_error_widens_it_by_0_65_mn_a_millivolt():
+    silent, fires = bracket(Circuit())
+    low, high = V_GS_of_onset(Circuit(), push(silent), push(fires))
+    wide = V_GS_of_onset(Circuit(), push(silent), push(fires), force_error=0.65e-3)
+    assert low - wide[0] == pytest.approx(1e-3, rel=0.01)
+    assert wide[1] - high == pytest.approx(1e-3, rel=0.01)
+
+
+def test_trials_that_contradict_each_other_are_refused():
+    with pytest.raises(NotIdentifiableError, match="strongest silent one"):
+        V_GS_of_onset(Circuit(), push(0.12), push(0.08))
+
+
+def test_a_threshold_far_away_is_refused():
+    far = replace(Circuit(), V_th=3.9)
+    with pytest.raises(NotIdentifiableError, match="no V_GS from"):
+        V_GS_of_onset(far, push(0.001), push(0.002))
