@@ -260,8 +260,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                     continue
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, y1))
-                floor_1 = 2.5e-16 * (big_1 + 12.0 * depth)
-                floor_2 = 5e-16 * (big_2 + abs(par[V_FIRE]))
+                floor_1 = 5e-16 * (big_1 + 12.0 * depth)
+                floor_2 = 1e-15 * (big_2 + abs(par[V_FIRE]))
                 error_2 = left_2 + layer_2 + floor_2
                 if not held and not to_spike:
                     S[SEARCHES] += 1.0
@@ -284,10 +284,15 @@ def _build(stamp: int) -> Callable[..., Any]:
                     E, 1.0 + right[ORDER - 1, 1], right[ORDER - 1, 2],
                     right[2 * ORDER - 1, 1], 1.0 + right[2 * ORDER - 1, 2],
                 )  # fmt: skip
-                widen(
-                    E, carried(a, left_1) + layer_1 + floor_1,
-                    EPS * h if held else carried(b, left_2) + layer_2 + floor_2,
-                )  # fmt: skip
+                stays_1 = carried(a, left_1) + layer_1 + floor_1
+                stays_2 = EPS * h
+                if not held:
+                    # V_C2 follows what is wrong with V_C1 during the step
+                    stays_2 = carried(b, left_2) + layer_2 + floor_2
+                    stays_2 += abs(right[2 * ORDER - 1, 1]) * max(
+                        0.05 * left_1, stays_1
+                    )
+                widen(E, stays_1, stays_2)
                 if keep_1:
                     n = counts[ROWS_1]
                     step_rows = more_rows(step_rows, n)
@@ -348,8 +353,15 @@ def _build(stamp: int) -> Callable[..., Any]:
                         S[TOO_FAST] = 1.0
                         status = FAST
                         break
+                    # the rest starts there, not where the step ended
                     y += f[TO_A] * late
-                    carry += late
+                    node[Y_LARGEST_ERROR] = max(
+                        node[Y_LARGEST_ERROR],
+                        math.sqrt(E[E_11]) + abs(f[TO_A] * late),
+                    )
+                    following = s + (carry + late)
+                    carry = (s - following) + (carry + late)
+                    s = following
                     transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
                     S[RESUME], v = par[T_EPS], par[V_FIRE]
                     last, tries = False, 0
