@@ -35,7 +35,8 @@ class Stage:
         self.app: QApplication = application([])
         self.theme = Theme("light")
         self.theme.apply()
-        self.session = Session(out)
+        # in this process, where a plug can be pulled
+        self.session = Session(out, separate=False)
         self.window = Window(self.session, self.theme)
         self.window.resize(*SIZE)
         self.window.show()
