@@ -40,14 +40,14 @@ SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
 
 
 class Bench:
-    """The window with stop-watches."""
+    """The window with stop-watches; `how` the session drives its benches."""
 
-    def __init__(self, out: Path) -> None:
+    def __init__(self, out: Path, **how: bool) -> None:
         sys.setswitchinterval(1e-3)
         self.app = application([])
         theme = Theme("light")
         theme.apply()
-        self.session = Session(out)
+        self.session = Session(out, **how)
         self.session.reports = False
         self.window = Window(self.session, theme)
         self.window.resize(1720, 1080)
@@ -160,9 +160,9 @@ def _waited() -> float:
         return 0.0
 
 
-def memory() -> float:
-    """Resident memory, MB."""
-    for line in Path("/proc/self/status").read_text().splitlines():
+def memory(pid: int | str = "self") -> float:
+    """Resident memory of a process, MB."""
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
         if line.startswith("VmRSS"):
             return int(line.split()[1]) / 1024
     return float("nan")
