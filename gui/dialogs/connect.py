@@ -37,7 +37,7 @@ from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 if TYPE_CHECKING:
     from gui.opening import Opening
     from gui.panels import Panels
-    from tactile_lab.acquisition.execution import Executed
+    from tactile_lab.acquisition.ending import Executed
 
 WIRING, FIELD = "wiring_check", "calibrate_field"
 

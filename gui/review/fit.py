@@ -18,7 +18,7 @@ from gui.lanes.source import Source
 from gui.review.finding import Finding, finding
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
-from tactile_lab.analysis.twin import match
+from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import NotIdentifiableError
 
 COLUMNS = 2000

@@ -19,7 +19,7 @@ from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
-    from tactile_lab.acquisition.execution import Executed
+    from tactile_lab.acquisition.ending import Executed
 
 
 class Gathering(QObject):

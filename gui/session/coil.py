@@ -9,7 +9,7 @@ from gui.state import CoilView
 from tactile_lab.bench import CoilLimits, OffReport
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.execution import CoilState
+    from tactile_lab.acquisition.ending import CoilState
 
 
 class CoilWatch:

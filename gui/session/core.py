@@ -30,8 +30,8 @@ from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
-    from gui.session.expect import Expectation
-    from tactile_lab.acquisition.execution import CoilState
+    from gui.session.expectation import Expectation
+    from tactile_lab.acquisition.ending import CoilState
 
 LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
 

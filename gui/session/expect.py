@@ -2,44 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from gui.lanes.expected import Hold, Preview
+from gui.session.expectation import Expectation
 from tactile_lab.acquisition.runner import BASELINE
-from tactile_lab.plan.estimate import Estimate
-from tactile_lab.plan.needs import Needs
 from tactile_lab.plan.plan import Plan, plan
 from tactile_lab.scene.scene import Scene
-from tactile_lab.scene.tables import Record
 
 MODELLED = ("V_C1", "V_C2", "V_K", "I_DS")
 SPACING = 1e-3
 MOST = 400_000
-
-
-@dataclass(frozen=True, eq=False)
-class Expectation:
-    """A scene that can be run, and what it will do.
-
-    Attributes:
-        record: what is asked for.
-        needs: what it opens and keeps.
-        estimate: its cost.
-        preview: what the model expects.
-        warnings: where the bench cannot deliver what is asked.
-        leaves_out: (what, why).
-        assumptions: what the numbers rest on.
-    """
-
-    record: Record
-    needs: Needs
-    estimate: Estimate
-    preview: Preview
-    warnings: tuple[str, ...]
-    leaves_out: tuple[tuple[str, str], ...]
-    assumptions: tuple[str, ...]
 
 
 def expect(scene: Scene) -> Expectation:

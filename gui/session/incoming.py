@@ -34,7 +34,7 @@ from tactile_lab.bench import OffReport
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.execution import Executed
+    from tactile_lab.acquisition.ending import Executed
 
 LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
 

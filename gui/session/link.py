@@ -18,7 +18,7 @@ from gui.session.threads import start
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
-    from tactile_lab.acquisition.execution import CoilState
+    from tactile_lab.acquisition.ending import CoilState
 
 Inbox = SimpleQueue[Told]
 

@@ -17,8 +17,8 @@ from tactile_lab.bench import CoilLimits, OffReport
 
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
-    from gui.session.expect import Expectation
-    from tactile_lab.acquisition.execution import CoilState, Executed
+    from gui.session.expectation import Expectation
+    from tactile_lab.acquisition.ending import CoilState, Executed
 
 
 class Level(Enum):

@@ -29,7 +29,8 @@ from tactile_lab.errors import TactileLabError
 
 if TYPE_CHECKING:
     from gui.session.twin import LiveTwin
-    from tactile_lab.acquisition.execution import Executed, Execution
+    from tactile_lab.acquisition.ending import Executed
+    from tactile_lab.acquisition.execution import Execution
 
 EVERY = 0.02
 """Seconds between two looks at the newest samples and at the coil."""

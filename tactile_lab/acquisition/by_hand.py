@@ -23,7 +23,7 @@ from tactile_lab.errors import SceneError
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.execution import CoilState
+    from tactile_lab.acquisition.ending import CoilState
 
 FOR_EVER = 1e9
 
@@ -75,7 +75,7 @@ class ManualCoil:
     @property
     def state(self) -> CoilState:
         """What is known of the coil now."""
-        from tactile_lab.acquisition.execution import CoilState
+        from tactile_lab.acquisition.ending import CoilState
 
         thread, last = self.thread, self.thread.last
         sent = None if last is None else last.setpoint

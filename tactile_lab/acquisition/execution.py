@@ -12,13 +12,13 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
+from tactile_lab.acquisition.ending import CoilState, Ending, Executed
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.provenance import (
@@ -30,8 +30,8 @@ from tactile_lab.acquisition.provenance import (
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.acquisition.stop import StopRequest
-from tactile_lab.acquisition.task import Ending, Task
-from tactile_lab.bench import Bench, OffReport, Stream
+from tactile_lab.acquisition.task import Task
+from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.plan.calibrated import check_coil
 from tactile_lab.plan.limited import limited
@@ -53,44 +53,6 @@ STATUS: dict[events.RunState, Status] = {
     events.RunState.FAULTED: "faulted",
 }
 """What a run's folder calls the states a run can end in."""
-
-
-@dataclass(frozen=True)
-class CoilState:
-    """What is known of the coil now.
-
-    Attributes:
-        live: the output is on.
-        setpoint: last sent, A.
-        measured: last read back, A.
-        off: how it was left; None while the run lasts.
-    """
-
-    live: bool
-    setpoint: float | None
-    measured: float | None
-    off: OffReport | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Executed:
-    """A run that has ended.
-
-    Attributes:
-        folder: where it lies.
-        ending: state, reason, exit code, how the coil was left.
-        spikes: detected on line.
-        loss: samples and spikes lost; None where it cannot be told.
-        duration: of the experiment, s.
-        took: wall time, s.
-    """
-
-    folder: Path
-    ending: Ending
-    spikes: int
-    loss: Mapping[str, int | None]
-    duration: float
-    took: float
 
 
 class Execution:

@@ -15,6 +15,7 @@ import numpy as np
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
 from tactile_lab.acquisition.asked_field import AskedField
+from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
@@ -22,7 +23,7 @@ from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import PLACES
 from tactile_lab.acquisition.serving import GRACE, Serving, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
-from tactile_lab.acquisition.task import Ending, Task
+from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
 from tactile_lab.trial import Outcome, Trial

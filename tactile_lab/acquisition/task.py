@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
-from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import Channel, OffReport
-from tactile_lab.errors import TactileLabError
+from tactile_lab.bench import Channel
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -45,41 +43,3 @@ class Task:
     drift: Drift | None = None
     ask: Ask | None = None
     asked_field: AskedField | None = None
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How a run ended.
-
-    Attributes:
-        state: complete, aborted or faulted.
-        off: how the coil was left.
-        reason: why it ended early; None if complete.
-        failure: the error behind a fault.
-        signal: POSIX signal that asked for the end, if one did.
-    """
-
-    state: RunState
-    off: OffReport
-    reason: str | None = None
-    failure: BaseException | None = None
-    signal: int | None = None
-
-    def faulted_by(self, failure: TactileLabError) -> Ending:
-        """The same end where something failed after it; an earlier fault stays."""
-        if self.state is RunState.FAULTED:
-            return self
-        return replace(
-            self, state=RunState.FAULTED, reason=str(failure), failure=failure
-        )
-
-    @property
-    def exit_code(self) -> int:
-        """0 complete, 3 faulted, 4 safe state not verified, 128 + signal."""
-        if not self.off.verified:
-            return 4
-        if self.state is RunState.COMPLETE:
-            return 0
-        if self.signal is not None:
-            return 128 + self.signal
-        return 130 if self.state is RunState.ABORTED else 3

@@ -15,13 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactile_lab.acquisition import events
+from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.provenance import keep_scene, origin, temperature
 from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.acquisition.stop import StopRequest
-from tactile_lab.acquisition.task import Ending, Task
+from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import SceneError
 from tactile_lab.plan.plan import plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_lab.analysis.follow import Follower
-from tactile_lab.analysis.twin import match
+from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.twin import PART, Measured
+from tactile_lab.analysis.spike_pairs import PART
+from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import PARAMETERS, Circuit
 from tactile_lab.model.equations import I_C

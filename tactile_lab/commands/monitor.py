@@ -16,7 +16,7 @@ from tactile_lab.commands.run import SIGNALS, caught_signals, noted
 from tactile_lab.commands.terminal import fail, refusing, scene_options, warn
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.task import Ending
+    from tactile_lab.acquisition.ending import Ending
     from tactile_lab.acquisition.watching import Watching
 
 ENDLESS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')

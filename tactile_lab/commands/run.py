@@ -25,8 +25,9 @@ from tactile_lab.commands.terminal import (
 )
 
 if TYPE_CHECKING:
+    from tactile_lab.acquisition.ending import Executed
     from tactile_lab.acquisition.events import Event
-    from tactile_lab.acquisition.execution import Executed, Execution
+    from tactile_lab.acquisition.execution import Execution
     from tactile_lab.analysis.beside import Beside
     from tactile_lab.bench import Bench
     from tactile_lab.report.write import Report

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tactile_lab.analysis.twin import Matched, Residual
+from tactile_lab.analysis.spike_pairs import Matched
+from tactile_lab.analysis.twin import Residual
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT, axes, blank, heading
 from tactile_lab.report.figure import FOOT, GAP, LEFT, RIGHT, WIDTH

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactile_lab.analysis.twin import PART, Measured, Twin, twin
+from tactile_lab.analysis.spike_pairs import PART
+from tactile_lab.analysis.twin import Measured, Twin, twin
 from tactile_lab.report.run_data import RunData, Trace
 from tactile_lab.waveform import Waveform
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.acquisition import events
-from tactile_lab.acquisition.execution import Executed, Execution
+from tactile_lab.acquisition.ending import Executed
+from tactile_lab.acquisition.execution import Execution
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tactile_lab.analysis.identify import identify
-from tactile_lab.analysis.twin import PART, Measured
+from tactile_lab.analysis.spike_pairs import PART
+from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate

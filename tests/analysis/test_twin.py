@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactile_lab.analysis.twin import PART, Measured, match, twin
+from tactile_lab.analysis.spike_pairs import PART, match
+from tactile_lab.analysis.twin import Measured, twin
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate

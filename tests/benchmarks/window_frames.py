@@ -31,7 +31,7 @@ from gui.session.messages import Samples, Told
 from gui.session.session import Session
 from gui.state import State
 from gui.window import Window
-from tactile_lab.acquisition.execution import CoilState
+from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.live import Bins, Live
 from tactile_lab.bench import Block, Channel, Stream
 

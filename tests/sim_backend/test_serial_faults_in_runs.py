@@ -8,8 +8,9 @@ import pytest
 
 from sim_backend.bench import open_bench
 from sim_backend.faults import SerialFault
+from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Executed, Execution
+from tactile_lab.acquisition.execution import Execution
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 

@@ -1,0 +1,87 @@
+"""What is known of a run from outside: its coil while it lasts, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.bench import OffReport
+from tactile_lab.errors import TactileLabError
+
+
+@dataclass(frozen=True)
+class CoilState:
+    """What is known of the coil now.
+
+    Attributes:
+        live: the output is on.
+        setpoint: last sent, A.
+        measured: last read back, A.
+        off: how it was left; None while the run lasts.
+    """
+
+    live: bool
+    setpoint: float | None
+    measured: float | None
+    off: OffReport | None
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended.
+
+    Attributes:
+        state: complete, aborted or faulted.
+        off: how the coil was left.
+        reason: why it ended early; None if complete.
+        failure: the error behind a fault.
+        signal: POSIX signal that asked for the end, if one did.
+    """
+
+    state: RunState
+    off: OffReport
+    reason: str | None = None
+    failure: BaseException | None = None
+    signal: int | None = None
+
+    def faulted_by(self, failure: TactileLabError) -> Ending:
+        """The same end where something failed after it; an earlier fault stays."""
+        if self.state is RunState.FAULTED:
+            return self
+        return replace(
+            self, state=RunState.FAULTED, reason=str(failure), failure=failure
+        )
+
+    @property
+    def exit_code(self) -> int:
+        """0 complete, 3 faulted, 4 safe state not verified, 128 + signal."""
+        if not self.off.verified:
+            return 4
+        if self.state is RunState.COMPLETE:
+            return 0
+        if self.signal is not None:
+            return 128 + self.signal
+        return 130 if self.state is RunState.ABORTED else 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Executed:
+    """A run that has ended.
+
+    Attributes:
+        folder: where it lies.
+        ending: state, reason, exit code, how the coil was left.
+        spikes: detected on line.
+        loss: samples and spikes lost; None where it cannot be told.
+        duration: of the experiment, s.
+        took: wall time, s.
+    """
+
+    folder: Path
+    ending: Ending
+    spikes: int
+    loss: Mapping[str, int | None]
+    duration: float
+    took: float

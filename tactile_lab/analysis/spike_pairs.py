@@ -1,0 +1,166 @@
+"""Measured spikes paired with predicted ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+WITHIN = 0.5
+"""A spike may lie off its expected place by this part of the interval around it."""
+SILENCE = 3.0
+"""A gap so many times longer than the interval before begins a new burst."""
+PART = 0.05
+"""Of the force's band by which it is moved: so little that each spike is known again;
+what it does is taken to grow in proportion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Measured spikes paired with predicted ones.
+
+    Attributes:
+        measured: shape (k,), times of the pairs' measured spikes, s.
+        offsets: shape (k,), measured less predicted, s.
+        missed: predicted spikes without a measured one.
+        extra: measured spikes without a predicted one.
+        rate_error: shape (j,), relative error of 1/ISI where two neighbours on both
+            sides are paired: measured over predicted less 1.
+        rated: shape (j,), times of the later of those neighbours, s.
+        tolerance: shape (k,), s: what the clocks and the uncertainty of the force leave
+            open, either sign; not a number where another force has no such spike.
+        rate_tolerance: shape (j,), the same for the rate error.
+    """
+
+    measured: FloatArray
+    offsets: FloatArray
+    missed: int
+    extra: int
+    rate_error: FloatArray
+    rated: FloatArray
+    tolerance: FloatArray
+    rate_tolerance: FloatArray
+
+    @property
+    def within(self) -> float:
+        """Part of the pairs whose offset lies within the tolerance, 0 to 1."""
+        told = np.isfinite(self.tolerance)
+        inside = np.abs(self.offsets[told]) <= self.tolerance[told]
+        return float(np.mean(inside)) if inside.size else float("nan")
+
+    @property
+    def sentence(self) -> str:
+        """For a person: "26 of 26 spikes matched, median offset 1.2 ms"."""
+        measured = self.measured.size + self.extra
+        text = f"{self.measured.size} of {measured} spikes matched"
+        if self.missed:
+            text += f", {self.missed} predicted ones missing"
+        if self.offsets.size:
+            middle = f"{np.median(self.offsets) * 1e3:.2g}".replace("-", "−")
+            largest = np.max(np.abs(self.offsets)) * 1e3
+            text += f", offset {middle} ms (median), {largest:.2g} ms at most"
+        if self.rate_error.size:
+            middle = f"{np.median(self.rate_error) * 100:.2g}".replace("-", "−")
+            text += f", rate error {middle} % (median)"
+        return text
+
+
+def match(
+    measured: ArrayLike,
+    predicted: ArrayLike,
+    displaced: Sequence[ArrayLike] = (),
+    clock: float = 0.0,
+) -> Matched:
+    """Pair spikes in order, each where the pair before lets expect it.
+
+    A train that runs a little faster leaves the other behind by and by, so each spike
+    is looked for at the offset of the last pair, after a long silence at none. It must
+    lie there within half the shorter of the intervals around either spike, so that a
+    pair never reaches across a neighbour.
+
+    Args:
+        measured: s, ascending.
+        predicted: s, ascending.
+        displaced: predicted under forces moved by `PART` of their band, for the
+            tolerance.
+        clock: how far measured times may lie from the force's, s.
+    """
+    ours = np.asarray(measured, dtype=np.float64)
+    theirs = np.asarray(predicted, dtype=np.float64)
+    if ours.size == 0 or theirs.size == 0:
+        nothing = np.empty(0)
+        return Matched(
+            nothing, nothing, theirs.size, ours.size, *(nothing for _ in range(4))
+        )
+    to_theirs = _followed(ours, theirs)
+    paired = to_theirs >= 0
+    offsets = ours - theirs[to_theirs]
+    index = np.flatnonzero(paired)
+    both = paired[1:] & paired[:-1] & (np.diff(to_theirs) == 1)
+    rate_error = np.diff(theirs[to_theirs])[both] / np.diff(ours)[both] - 1
+    shifts = [_shift(theirs, np.asarray(d, np.float64)) for d in displaced]
+    spread = np.sqrt(sum((s**2 for s in shifts), np.full(theirs.size, clock**2)))
+    bend = sum(
+        ((np.diff(s) / np.diff(theirs)) ** 2 for s in shifts),
+        np.zeros(max(theirs.size - 1, 0)),
+    )
+    return Matched(
+        ours[index],
+        offsets[index],
+        int(theirs.size - index.size),
+        int(ours.size - index.size),
+        rate_error,
+        ours[1:][both],
+        spread[to_theirs[index]],
+        np.sqrt(bend)[to_theirs[:-1][both]],
+    )
+
+
+def _shift(spikes: FloatArray, displaced: FloatArray) -> FloatArray:
+    """How far each spike moves under the whole band; NaN where it has no other."""
+    moved = np.full(spikes.size, np.nan)
+    if spikes.size and displaced.size:
+        there = _nearest(spikes, displaced)
+        mutual = _nearest(displaced, spikes)[there] == np.arange(spikes.size)
+        moved[mutual] = (displaced[there] - spikes)[mutual] / PART
+    return moved
+
+
+def _followed(ours: FloatArray, theirs: FloatArray) -> NDArray[np.intp]:
+    """For each of ours the index of its pair among theirs, or -1."""
+    found = np.full(ours.size, -1, dtype=np.intp)
+    near_ours, near_theirs = _interval(ours), _interval(theirs)
+    offset, free = 0.0, 0
+    for i, time in enumerate(ours):
+        if i and time - ours[i - 1] > SILENCE * near_ours[i - 1]:
+            offset = 0.0
+        after = free + int(np.searchsorted(theirs[free:], time - offset))
+        around = [j for j in (after - 1, after) if free <= j < theirs.size]
+        if not around:
+            continue
+        j = min(around, key=lambda k: abs(time - offset - theirs[k]))
+        room = WITHIN * min(near_ours[i], near_theirs[j])
+        if abs(time - offset - theirs[j]) <= room:
+            found[i], free = j, j + 1
+            offset = time - theirs[j]
+    return found
+
+
+def _nearest(of: FloatArray, among: FloatArray) -> NDArray[np.intp]:
+    after = np.clip(np.searchsorted(among, of), 0, among.size - 1)
+    before = np.maximum(after - 1, 0)
+    closer = np.abs(among[before] - of) <= np.abs(among[after] - of)
+    return np.where(closer, before, after)
+
+
+def _interval(times: FloatArray) -> FloatArray:
+    """The shorter interval beside each spike; endless for a lone one."""
+    gaps = np.diff(times)
+    before = np.append(np.inf, gaps)
+    after = np.append(gaps, np.inf)
+    shorter: FloatArray = np.minimum(before, after)
+    return shorter
