@@ -69,6 +69,7 @@ def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
         QTest.mouseClick(window.header.stop, Qt.MouseButton.LeftButton)
     else:
         window.activateWindow()
+        lab.until(window.isActiveWindow)
         key = {"Esc": Qt.Key.Key_Escape, "F12": Qt.Key.Key_F12}[how]
         QTest.keyClick(window, key)
     assert session.state is State.ABORTING
