@@ -73,7 +73,12 @@ class PresetButton(IconButton):
             self.failed.emit(str(error))
 
     def open_menu(self) -> None:
-        """Offer the presets, a name for a new one, and to delete."""
+        """Open the menu below the star."""
+        self.menu_of_presets().popup(self.mapToGlobal(QPoint(0, self.height())))
+        self.name.setFocus()
+
+    def menu_of_presets(self) -> QMenu:
+        """A menu with the presets, a name for a new one, and to delete."""
         menu, shown, found = QMenu(self), self.shown(), self._presets()
         for name, file in found.items():
             action = menu.addAction(name, partial(self.use, file))
@@ -95,8 +100,7 @@ class PresetButton(IconButton):
             out = menu.addMenu("Delete")
             for name, file in found.items():
                 out.addAction(name, partial(self._delete, file))
-        menu.popup(self.mapToGlobal(QPoint(0, self.height())))
-        self.name.setFocus()
+        return menu
 
     def _save_and_close(self, menu: QMenu) -> None:
         menu.close()

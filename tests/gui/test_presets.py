@@ -38,7 +38,8 @@ def test_star_keeps_marks_and_takes_up_parameters(lab) -> None:
     assert setup.form.field("hold").text == "700 ms"
     setup.form.undo.undo()
     assert setup.form.texts() == before, "taking up a preset can be undone"
-    setup.star.open_menu()
+    menu = setup.star.menu_of_presets()
+    assert "a bit longer" in [action.text() for action in menu.actions()]
     setup.star.name.setText("../nowhere")
     setup.star.name.returnPressed.emit()
     assert "cannot be called" in setup.problem.text()
