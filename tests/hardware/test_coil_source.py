@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import os
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -39,7 +42,9 @@ def fact(name: str, value: object) -> None:
 
 
 @pytest.fixture
-def coil() -> Iterator[CoilSource]:
+def coil(monkeypatch: pytest.MonkeyPatch) -> Iterator[CoilSource]:
+    # how busy this computer is, is not what is asked here
+    monkeypatch.setattr("drivers.guard.SILENCE", 5.0)
     source = CoilSource(coil_dialect(ROW), PORT, LIMITS, RealClock())
     source.open()
     yield source
@@ -88,6 +93,59 @@ def test_latency(link: SerialLink) -> None:
     fact("round trip, ms", f"{1e3 * statistics.median(times):.1f}")
     fact("of it latency, ms", f"{1e3 * (statistics.median(times) - wire):.1f}")
     fact("raw answer to the set-point query", repr(answer))
+
+
+def test_remote(link: SerialLink) -> None:
+    """What it says to the row's optional lines, and to a set-point before and after."""
+    row = coil_dialect(ROW)
+    for line in (row.set_line(0.0), *row.optional, row.set_line(0.0)):
+        *first, last = row.verified(line)
+        for part in first:
+            link.write(part)
+        fact(f"answer to {line}", link.query(last) if row.error else "not asked")
+
+
+OWNER = """
+import sys, time
+from drivers.coil_source import CoilSource
+from drivers.dialect import coil_dialect
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import RealClock
+limits = CoilLimits(current=0.3, slew=2.0, compliance=5.0)
+coil = CoilSource(coil_dialect(sys.argv[2]), sys.argv[1], limits, RealClock())
+coil.open()
+coil.energise()
+print("live", flush=True)
+while True:
+    coil.set_current(0.1)
+    time.sleep(coil.update_interval)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills a process the POSIX way")
+def test_guard(tmp_path: Path) -> None:
+    """Kill a program that has the output on, and see the guard switch it off."""
+    with subprocess.Popen(
+        [sys.executable, "-c", OWNER, PORT, ROW],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"XDG_STATE_HOME": str(tmp_path)},
+    ) as owner:
+        assert owner.stdout is not None
+        assert owner.stdout.readline() == b"live\n"
+        owner.kill()
+    log = tmp_path / "tactile-lab" / "guard.log"
+    until = time.monotonic() + 60
+    while not (log.exists() and " after " in log.read_text()):
+        assert time.monotonic() < until, "the guard did nothing"
+        time.sleep(0.05)
+    for line in log.read_text().splitlines():
+        fact("guard", line)
+    assert "NOT verified" not in log.read_text()
+    row = coil_dialect(ROW)
+    one = SerialLink(PORT, row.serial, RealClock(), what="coil source")
+    one.open()
+    fact("output after it", one.query(row.on_query))
+    one.close()
 
 
 def test_update_interval(coil: CoilSource) -> None:

@@ -72,6 +72,23 @@ def test_each_range_is_taken(scope: PicoScope, volts: float) -> None:
     scope.stop()
 
 
+def test_noise(scope: PicoScope) -> None:
+    """Mean and deviation of each input at 5 V, to be run with the inputs shorted."""
+    scope.open()
+    scope.start(FOUR, 1e-6)
+    block = None
+    for _ in range(1500):
+        time.sleep(scope.poll_interval)
+        block = scope.poll()
+        if block is not None and block.samples > 1000:
+            break
+    assert block is not None
+    steps = block.codes / 256
+    for channel, row in zip(FOUR, steps, strict=True):
+        fact(f"input {channel.input}, codes (mean, deviation)",
+             (round(float(row.mean()), 2), round(float(row.std()), 2)))  # fmt: skip
+
+
 @pytest.mark.parametrize("volts", [0.05, 0.5, 5.0])
 def test_offset_limits(scope: PicoScope, volts: float) -> None:
     scope.open()
