@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from drivers.coil_source import CoilSource
@@ -93,14 +93,39 @@ def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
     return Plant(
         scene.circuit,
         scene.bench.magnet,
-        world or options(scene.simulated),
+        world or options(scene.simulated, _inputs(scene)),
         scene.simulated.seed,
     )
 
 
-def options(simulated: Simulated) -> PlantOptions:
-    """Parts of the world as the scene's ``[simulated]`` table switches them."""
+def _inputs(scene: Scene) -> dict[str, str]:
+    """The scope's input of each wired signal."""
+    scope = scene.bench.scope
+    return {} if scope is None else {c.signal: c.input for c in scope.channels}
+
+
+def options(
+    simulated: Simulated, inputs: Mapping[str, str] | None = None
+) -> PlantOptions:
+    """Parts of the world as the scene's ``[simulated]`` table switches them.
+
+    Args:
+        simulated: the table.
+        inputs: scope input by signal, for mistakes in the wiring.
+    """
+    inputs = inputs or {}
+    here = [signal for signal in simulated.swapped if signal in inputs]
     return PlantOptions(
+        wired={
+            inputs[one]: other for one, other in zip(here, reversed(here), strict=True)
+        },
+        open_inputs=tuple(inputs[s] for s in simulated.open_probes if s in inputs),
+        attenuation={
+            inputs[s]: factor
+            for s, factor in simulated.attenuation.items()
+            if s in inputs
+        },
+        inverted_coil=simulated.inverted_coil,
         follower=simulated.follower,
         offset=simulated.follower_offset,
         bias=simulated.input_bias,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -173,6 +174,10 @@ class Simulated(Table):
         attraction: the magnet's pull on the core, N; the same at every current.
         clock_error: relative error of the scope's sample clock; 50e-6 is 50 ppm. More
             than the 100 ppm allowed a driver would take for lost samples.
+        swapped: mistake: two signals whose probes are exchanged.
+        open_probes: mistake: signals whose probe is connected to nothing.
+        attenuation: mistake: factor a probe divides by beyond the channel's scale.
+        inverted_coil: mistake: the coil's leads are exchanged.
     """
 
     seed: int = Field(default=1, ge=0, le=2**63 - 1)
@@ -186,6 +191,10 @@ class Simulated(Table):
     hysteresis: HalfWidth = 0.0
     attraction: Pull = 0.0
     clock_error: float = Field(default=0.0, ge=-1e-4, le=1e-4)
+    swapped: tuple[str, ...] = ()
+    open_probes: tuple[str, ...] = ()
+    attenuation: dict[str, float] = Field(default={})
+    inverted_coil: bool = False
 
     default_noise: ClassVar[dict[str, float]] = {
         "V_C1": 5e-3,
@@ -198,14 +207,28 @@ class Simulated(Table):
     @field_validator("noise")
     @classmethod
     def _channels(cls, noise: dict[str, float]) -> dict[str, float]:
-        for name in noise:
+        cls._known(noise)
+        return {**cls.default_noise, **noise}
+
+    @field_validator("swapped", "open_probes", "attenuation")
+    @classmethod
+    def _probes(cls, named: Any, info: ValidationInfo) -> Any:
+        cls._known(named)
+        if info.field_name == "swapped" and len(set(named)) not in (0, 2):
+            raise ValueError("name two different signals, or none")
+        if info.field_name == "attenuation" and 0 in named.values():
+            raise ValueError("a factor must not be 0")
+        return named
+
+    @classmethod
+    def _known(cls, names: Iterable[str]) -> None:
+        for name in names:
             if name not in cls.default_noise:
                 hint = nearest(name, cls.default_noise)
                 raise ValueError(
                     f'"{name}" is no scope signal; {hint + " " if hint else ""}'
                     f"Known: {', '.join(cls.default_noise)}."
                 )
-        return {**cls.default_noise, **noise}
 
 
 class CoilUse(Table):

@@ -87,6 +87,32 @@ def test_a_follower_s_offset_shows_in_v_gs_not_in_a_verdict(tmp_path):
     assert all(c["ok"] for c in values["channels"].values())
 
 
+def test_a_scene_can_make_the_mistakes_itself(tmp_path):
+    scene = load("wiring_check", (
+        *SHORT, 'simulated.swapped=["V_C1", "V_C2"]', 'simulated.open_probes=["V_K"]',
+        "simulated.attenuation.coil_current=10.0", "simulated.inverted_coil=true",
+    ))  # fmt: skip
+    assert load_again(scene, tmp_path).simulated == scene.simulated
+    done = Execution(scene, tmp_path).run()
+    channels = find(read(done.folder)).conclusion.values["channels"]
+    assert "swapped with V_C2" in channels["V_C1"]["text"]
+    assert "open probe" in channels["V_K"]["text"]
+    assert "10 times too little" in channels["coil_current"]["text"]
+    assert "reversed" in channels["field"]["text"]
+
+
+def load_again(scene, folder):
+    path = folder / "again.toml"
+    path.write_text(scene.to_toml())
+    return load(path)
+
+
+@pytest.mark.parametrize("mistake", ['swapped=["V_C1"]', 'open_probes=["V_C11"]'])
+def test_a_mistake_that_cannot_be_made_is_refused(mistake):
+    with pytest.raises(SceneError, match=mistake.partition("=")[0]):
+        load("wiring_check", [f"simulated.{mistake}"])
+
+
 def test_without_calibration_swapped_channels_are_still_named(tmp_path):
     values, _ = checked(
         tmp_path, "protocol.calibrate=false", wired={"A": "V_C2", "B": "V_C1"}
