@@ -14,16 +14,14 @@ import numpy as np
 
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.ellipse import E_11, E_22, transform, widen
 from tactile_lab.model.integrator import (
     MOST_TERMS,
     T_EPS,
     V_FIRE,
     V_RESET,
     V_S,
-    carried,
-    missing,
     series_at,
-    to_series,
 )
 from tactile_lab.model.kernel import (
     DONE,
@@ -63,7 +61,7 @@ from tactile_lab.model.pair import (
     collocate_pair,
     first_crossing,
     flow,
-    unseen,
+    series_of,
 )
 from tactile_lab.model.spiking import (
     COUNT,
@@ -88,43 +86,7 @@ from tactile_lab.model.transistor import (
     TO_C2,
     reach,
 )
-
-E_11, E_12, E_22 = range(3)
-"""The ellipse of possible errors of V_C1 (1) and V_C2 (2), V^2: e' E^-1 e <= 1. During
-a reset the second axis is the time at which it ends, s."""
-
-
-@inner
-def transform(E: FloatArray, a: float, b: float, c: float, d: float) -> None:
-    """The ellipse after e := [[a, b], [c, d]] e."""
-    p, q, r = E[E_11], E[E_12], E[E_22]
-    E[E_11] = a * a * p + 2.0 * a * b * q + b * b * r
-    E[E_12] = a * c * p + (a * d + b * c) * q + b * d * r
-    E[E_22] = c * c * p + 2.0 * c * d * q + d * d * r
-
-
-@inner
-def widen(E: FloatArray, one: float, two: float) -> None:
-    """An ellipse that holds the sum of any error in it and one of +-one, +-two."""
-    old, new = math.sqrt(E[E_11] + E[E_22]), math.sqrt(2.0 * (one * one + two * two))
-    if new == 0.0:
-        return
-    grow = 1.0 + new / old if old > 0.0 else 1.0
-    add = 2.0 * (1.0 + old / new)
-    E[E_11] = E[E_11] * grow + add * one * one
-    E[E_12] *= grow
-    E[E_22] = E[E_22] * grow + add * two * two
-
-
-@inner
-def series_of(start: float, W: FloatArray, first: int, a: FloatArray) -> None:
-    """Series of start + W[first:first + ORDER], its last digits kept."""
-    part = np.empty(ORDER + 1)
-    part[0] = 0.0
-    for i in range(ORDER):
-        part[i + 1] = W[first + i]
-    to_series(part, a)
-    a[0] += start
+from tactile_lab.model.truncation import carried, missing, unseen
 
 
 @inner

@@ -91,22 +91,6 @@ def series_at(series: FloatArray, degree: int, x: float) -> float:
 
 
 @inner
-def missing(a: FloatArray) -> float:
-    """What the series is wrong by: one coefficient may vanish by chance, not three."""
-    found: float = max(10.0 * abs(a[ORDER]), abs(a[ORDER - 1]), 0.1 * abs(a[ORDER - 2]))
-    return found
-
-
-@inner
-def carried(a: FloatArray, left: float) -> float:
-    """What of `left` is still wrong at the end of a collocated step.
-
-    That is its order's gain, unless the coefficients end before they fall.
-    """
-    return left if abs(a[ORDER]) > 0.2 * abs(a[ORDER - 1]) else 0.01 * left
-
-
-@inner
 def particular(q: FloatArray, r: float, P: FloatArray) -> int:
     """Series of a P with (1/r) dP/du + P = Q, r = piece / tau_L; returns its degree.
 

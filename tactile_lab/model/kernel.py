@@ -18,11 +18,8 @@ from tactile_lab.model.integrator import (
     TAU_L,
     V_FIRE,
     V_RESET,
-    Y_CRITICAL,
     Q_at,
     Q_gain,
-    carried,
-    missing,
     particular,
     series_at,
     to_series,
@@ -46,6 +43,8 @@ from tactile_lab.model.spiking import (
     run_piece,
 )
 from tactile_lab.model.tableau import NODES, ORDER
+from tactile_lab.model.threshold import above_threshold
+from tactile_lab.model.truncation import carried, missing, unseen
 
 SEGMENT_ROW, STEP_ROW, PIECE_ROW = 4, 3 + ORDER + 1, 6 + MOST_TERMS + 1
 """Columns of the dense stores: t T V0 p; t s h series; t s h degree V resume series."""
@@ -69,104 +68,6 @@ def more_rows(rows: FloatArray, count: int) -> FloatArray:
         for j in range(rows.shape[1]):
             larger[i, j] = rows[i, j]
     return larger
-
-
-@inner
-def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
-    """Where the series a, monotone on [low, high], passes `level`, by bisection."""
-    rising = series_at(a, a.size - 1, 2.0 * high - 1.0) > series_at(
-        a, ORDER, 2.0 * low - 1.0
-    )
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if (a[0] + series_at(a, a.size - 1, 2.0 * middle - 1.0) > level) == rising:
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
-
-
-@inner
-def unresolved(
-    s: float,
-    h: float,
-    y: float,
-    V0: float,
-    p: float,
-    left: float,
-    a: FloatArray,
-    par: FloatArray,
-) -> float:
-    """Error of a change that is over before the first node, which no node sees, V.
-
-    The residual at u = 0 sees it: what it exceeds a smooth series' own one by, times
-    the time to the first node or, if shorter, the time in which V_C1 forgets.
-    """
-    slope = 0.0
-    sign = 2.0
-    for n in range(1, ORDER + 1):
-        slope += sign * n * n * a[n]
-        sign = -sign
-    B = B_at(V_P_at(s, V0, p, par[TAU]), par)
-    residual = abs(h * slope_at(B, y, par) - slope)
-    rate = h * (par[LAMBDA] + B * math.exp(-y / par[V_T]) / par[V_T])
-    excess: float = max(residual - 100.0 * left, 0.0) * min(NODES[0], 1.0 / rate)
-    return excess
-
-
-@inner
-def above_threshold(
-    a: FloatArray,
-    s: float,
-    h: float,
-    V0: float,
-    p: float,
-    par: FloatArray,
-    fires: FloatArray,
-) -> None:
-    """Fill `fires` with the intervals of u where V_C1 < its critical value.
-
-    On one segment V_P is monotone, so V_C1'' at V_C1' = 0 has one sign: V_C1 has at
-    most one extremum per segment. Each monotone part has no or exactly one crossing.
-    """  # fmt: skip
-    level = par[Y_CRITICAL]
-    split = 1.0
-    y0 = a[0] + series_at(a, a.size - 1, -1.0)
-    y1 = a[0] + series_at(a, a.size - 1, 1.0)
-    f0 = slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y0, par)
-    f1 = slope_at(B_at(V_P_at(s + h, V0, p, par[TAU]), par), y1, par)
-    middle_y = y1
-    if f0 * f1 < 0.0 and (y0 < level) == (y1 < level):
-        low, high = 0.0, 1.0
-        for _ in range(50):
-            split = 0.5 * (low + high)
-            middle_y = a[0] + series_at(a, a.size - 1, 2.0 * split - 1.0)
-            B = B_at(V_P_at(s + h * split, V0, p, par[TAU]), par)
-            if (slope_at(B, middle_y, par) > 0.0) == (f0 > 0.0):
-                low = split
-            else:
-                high = split
-    fires[0] = fires[1] = 0.0
-    fires[2] = fires[3] = 1.0
-    if (y0 < level) == (middle_y < level):
-        if y0 < level:
-            fires[1] = split
-    else:
-        u = crossing(a, level, 0.0, split)
-        if y0 < level:
-            fires[1] = u
-        else:
-            fires[0], fires[1] = u, split
-    if split < 1.0:
-        if (y1 < level) == (middle_y < level):
-            if y1 < level:
-                fires[2] = split
-        else:
-            u = crossing(a, level, split, 1.0)
-            if y1 < level:
-                fires[2] = u
-            else:
-                fires[2], fires[3] = split, u
 
 
 def _build(stamp: int) -> Callable[..., Any]:
@@ -263,7 +164,9 @@ def _build(stamp: int) -> Callable[..., Any]:
                 to_series(part, a)
                 left = missing(a)
                 stays = carried(a, left)
-                layer = unresolved(s, h, y, V0, p, left, a, par)
+                B_s = B_at(V_P_at(s, V0, p, par[TAU]), par)
+                rate = par[LAMBDA] + B_s * math.exp(-y / par[V_T]) / par[V_T]
+                layer = unseen(slope_at(B_s, y, par), rate, h, left, a)
                 tail = max(abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]), layer)
                 biggest = max(abs(y), abs(values[ORDER]))
                 wanted = max(1e-3 * tolerance, 6e-16 * biggest)

@@ -142,16 +142,14 @@ def collocate_pair(
 
 
 @inner
-def unseen(slope: float, rate: float, h: float, left: float, a: FloatArray) -> float:
-    """Error of a change that is over before the first node; see `kernel.unresolved`."""
-    of_series = 0.0
-    sign = 2.0
-    for n in range(1, ORDER + 1):
-        of_series += sign * n * n * a[n]
-        sign = -sign
-    residual = max(abs(h * slope - of_series) - 100.0 * left, 0.0)
-    found: float = residual * min(NODES[0], 1.0 / (h * rate))
-    return found
+def series_of(start: float, W: FloatArray, first: int, a: FloatArray) -> None:
+    """Series of start + W[first:first + ORDER], its last digits kept."""
+    part = np.empty(ORDER + 1)
+    part[0] = 0.0
+    for i in range(ORDER):
+        part[i + 1] = W[first + i]
+    to_series(part, a)
+    a[0] += start
 
 
 @inner

@@ -56,7 +56,7 @@ def solve(
     counts = np.zeros(kernel.COUNTS, dtype=np.int64)
     keep_spikes = bool(need.signals & {"spikes"})
     if circuit.saturation and need.node_a:
-        from tactile_lab.model import coupled
+        from tactile_lab.model import coupled, ellipse
 
         most = MOST_COUPLED
         E = np.array([state.error_V_C1**2, state.errors_together, state.error_V_C2**2])
@@ -64,9 +64,9 @@ def solve(
             time, value, circuit.k_F, par, node, E, S, counts, tolerance,
             keep_spikes, need.dense, need.dense_V_C2, most,
         )  # fmt: skip
-        node[kernel.Y_ERROR] = math.sqrt(E[coupled.E_11])
-        S[spiking.ERROR] = math.sqrt(E[coupled.E_22])
-        together = float(E[coupled.E_12])
+        node[kernel.Y_ERROR] = math.sqrt(E[ellipse.E_11])
+        S[spiking.ERROR] = math.sqrt(E[ellipse.E_22])
+        together = float(E[ellipse.E_12])
     else:
         most, together = MOST_SPIKES, 0.0
         status, segments, steps, pieces, spikes = kernel.run(

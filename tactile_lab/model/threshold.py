@@ -1,0 +1,79 @@
+"""Where on a step of V_C1 the circuit may fire: V_C1 below its critical value."""
+
+from __future__ import annotations
+
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import inner
+from tactile_lab.model.integrator import Y_CRITICAL, series_at
+from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
+from tactile_lab.model.tableau import ORDER
+
+
+@inner
+def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
+    """Where the series a, monotone on [low, high], passes `level`, by bisection."""
+    rising = series_at(a, a.size - 1, 2.0 * high - 1.0) > series_at(
+        a, ORDER, 2.0 * low - 1.0
+    )
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if (a[0] + series_at(a, a.size - 1, 2.0 * middle - 1.0) > level) == rising:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)
+
+
+@inner
+def above_threshold(
+    a: FloatArray,
+    s: float,
+    h: float,
+    V0: float,
+    p: float,
+    par: FloatArray,
+    fires: FloatArray,
+) -> None:
+    """Fill `fires` with the intervals of u where V_C1 < its critical value.
+
+    On one segment V_P is monotone, so V_C1'' at V_C1' = 0 has one sign: V_C1 has at
+    most one extremum per segment. Each monotone part has no or exactly one crossing.
+    """  # fmt: skip
+    level = par[Y_CRITICAL]
+    split = 1.0
+    y0 = a[0] + series_at(a, a.size - 1, -1.0)
+    y1 = a[0] + series_at(a, a.size - 1, 1.0)
+    f0 = slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y0, par)
+    f1 = slope_at(B_at(V_P_at(s + h, V0, p, par[TAU]), par), y1, par)
+    middle_y = y1
+    if f0 * f1 < 0.0 and (y0 < level) == (y1 < level):
+        low, high = 0.0, 1.0
+        for _ in range(50):
+            split = 0.5 * (low + high)
+            middle_y = a[0] + series_at(a, a.size - 1, 2.0 * split - 1.0)
+            B = B_at(V_P_at(s + h * split, V0, p, par[TAU]), par)
+            if (slope_at(B, middle_y, par) > 0.0) == (f0 > 0.0):
+                low = split
+            else:
+                high = split
+    fires[0] = fires[1] = 0.0
+    fires[2] = fires[3] = 1.0
+    if (y0 < level) == (middle_y < level):
+        if y0 < level:
+            fires[1] = split
+    else:
+        u = crossing(a, level, 0.0, split)
+        if y0 < level:
+            fires[1] = u
+        else:
+            fires[0], fires[1] = u, split
+    if split < 1.0:
+        if (y1 < level) == (middle_y < level):
+            if y1 < level:
+                fires[2] = split
+        else:
+            u = crossing(a, level, split, 1.0)
+            if y1 < level:
+                fires[2] = u
+            else:
+                fires[2], fires[3] = split, u
