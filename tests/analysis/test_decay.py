@@ -31,12 +31,12 @@ def test_a_known_rest_current_makes_a_short_hold_enough():
 
 
 def test_its_intervals_cover_the_truth():
-    repeats = 200
+    repeats = 80
     hits = 0
     for seed in range(repeats):
         found = fit_decay(TIME, decaying(noise=0.02, seed=seed), (0.0, 30.0))
         hits += found.tau.low <= 8.69 <= found.tau.high
-    assert 0.90 < hits / repeats < 0.99
+    assert 0.88 < hits / repeats < 1.0
 
 
 def test_the_models_i_ds_decays_with_the_models_tau():

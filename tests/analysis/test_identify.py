@@ -44,7 +44,7 @@ def test_it_finds_what_the_run_was_made_with(names, truth):
 
 
 def test_its_intervals_cover_the_truth():
-    truth, hits, repeats = {"V_GS": 1.405, "tau": 8.3}, np.zeros(2), 60
+    truth, hits, repeats = {"V_GS": 1.405, "tau": 8.3}, np.zeros(2), 40
     for seed in range(repeats):
         trace, _ = run_of(replace(Circuit(), **truth), seed=seed, bins=200)
         found = identify(Circuit(), tuple(truth), FORCE, FORCE.end, V_C1=trace)
