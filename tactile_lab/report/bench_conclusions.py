@@ -39,7 +39,7 @@ def calibrate_field(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
         return Conclusion((f"No calibration: {reason}.",))
     sentences = (
         f"B2 rises by {show(found.slope.value, 'T')}/A "
-        f"({show(found.slope.low, 'T')} to {show(found.slope.high, 'T')}/A), from "
+        f"(±{show((found.slope.high - found.slope.low) / 2, 'T', 2)}/A, 95 %), from "
         f"{show(found.offset.value, 'T', 3)} at 0 A.",
         f"The loop is {show(found.half_width, 'T', 3)} or "
         f"{show(found.half_width_current, 'A', 3)} to either side; one field value is "

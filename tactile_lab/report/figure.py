@@ -6,6 +6,7 @@ instantaneous rate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -149,9 +150,10 @@ def _force(panel: Axes, run: RunData) -> None:
         if trial.pause or trial.level is None or trial.hold is None:
             continue
         middle = trial.start + sum(trial.hold) / 2
+        half = run.uncertain(trial.level) or 0.0
         panel.annotate(
             show(trial.level, "N", 3),
-            (middle, trial.level * 1e3),
+            (middle, (trial.level + math.copysign(half, trial.level)) * 1e3),
             (0, 3 if trial.level >= 0 else -3),
             textcoords="offset points",
             ha="center",

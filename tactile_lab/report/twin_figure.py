@@ -119,6 +119,14 @@ def _points(
     panel.plot(
         at, value * scale, "o", color=palette.RATE.light, ms=2.4, mew=0, zorder=3
     )
+    # tolerances grow beyond all bounds where a spike only just comes
+    known = tolerance[np.isfinite(tolerance)]
+    most = max(float(np.max(np.abs(value), initial=0.0)), _median(known)) * scale * 1.2
+    panel.set_ylim(-(most or 1.0), most or 1.0)
+
+
+def _median(values: np.ndarray) -> float:
+    return float(np.median(values)) if values.size else 0.0
 
 
 def _band(panel: Axes, time: np.ndarray, tolerance: np.ndarray) -> None:

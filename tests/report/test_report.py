@@ -2,6 +2,7 @@ import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,6 +101,14 @@ def test_results_json_holds_every_number_exactly(written, demo):
     silent = found["trials"][0]
     assert silent["latency_s"] is None
     assert silent["adaptation_why_not"] == "no spikes"
+
+
+def test_every_key_of_results_json_is_documented(written):
+    text = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+    page = text[text.index("results.json") :]
+    found = json.loads(written.results.read_text(encoding="utf-8"))
+    for key in (*found, *found["trials"][0]):
+        assert f"`{key}`" in page, key
 
 
 def test_text_of_others_cannot_break_the_page(demo, tmp_path):
