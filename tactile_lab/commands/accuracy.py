@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     help="Write accuracy.md, accuracy.csv and accuracy.svg there.",
 )
 @click.option("--scene", "names", multiple=True, metavar="NAME", help="Only this one.")
-@click.option("--cap", default=20.0, show_default=True, help="Most seconds per run.")
+@click.option(
+    "--cap", default=20.0, show_default=True, help="Most CPU time per run, s."
+)
 @click.option("--repeats", default=3, show_default=True, help="Timings; least counts.")
 @click.option(
     "--campaign",
@@ -93,7 +95,7 @@ def _report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
         "# Error against run time\n",
         f"{provenance()} Written by `tactile-lab accuracy --out docs`.\n",
         "Errors are the largest true error of any spike time and that of V_C1 at the "
-        "end, against a 40-digit reference. Times are the least of several, "
+        "end, against a 40-digit reference. Times are CPU time, the least of several, "
         f"interleaved in one process (ngspice in its own); the cap is {cap:g} s. The "
         "right-hand side is compiled for every solver. A wrong count, NaN, failure or "
         "time-out is shown as such.\n",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as wall
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compare import general, spice
 from tactile_lab.model.compare.problem import OutOfTimeError, Problem
+from tactile_lab.model.compare.stopwatch import spent
 from tactile_lab.model.reference import reference
 from tactile_lab.model.simulate import simulate
 
@@ -28,7 +28,7 @@ class Method:
     Attributes:
         name: of the solver.
         setting: tolerance or step, for tables.
-        solve: spike times and last V_C1 within a cap on wall time.
+        solve: spike times and last V_C1 within a cap on CPU time.
         repeats: how often it is timed; the least counts.
     """
 
@@ -50,7 +50,7 @@ class Row:
         spikes: count found, None without an answer.
         spike_error: largest true error of a spike time, s, where the count is right.
         V_C1_error: true error of V_C1 at the end, V.
-        run_time: least wall time, s.
+        run_time: least CPU time, s.
         note: why it failed.
     """
 
@@ -154,13 +154,13 @@ def truth(problem: Problem) -> Truth:
 
 def judge(problem: Problem, method: Method, exact: Truth, cap: float) -> Row:
     """Run once and compare; failures become verdicts."""
-    began = wall.perf_counter()
+    began = spent()
 
     def row(verdict: str, note: str = "") -> Row:
-        spent = wall.perf_counter() - began
+        took = spent() - began
         return Row(
             problem.name, method.name, method.setting, verdict, None, None, None,
-            spent, note,
+            took, note,
         )  # fmt: skip
 
     try:
@@ -170,13 +170,13 @@ def judge(problem: Problem, method: Method, exact: Truth, cap: float) -> Row:
     except (TactileLabError, ArithmeticError, ValueError, RuntimeError) as error:
         verdict = "NaN" if "NaN" in str(error) else "failed"
         return row(verdict, " ".join(str(error).split())[:120])
-    spent = wall.perf_counter() - began
+    took = spent() - began
     right = spikes.size == exact.spike_times.size
     gap = np.abs(spikes - exact.spike_times).max(initial=0.0) if right else None
     return Row(
         problem.name, method.name, method.setting,
         "right" if right else "wrong count", int(spikes.size),
-        None if gap is None else float(gap), abs(V_C1 - exact.V_C1), spent,
+        None if gap is None else float(gap), abs(V_C1 - exact.V_C1), took,
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as wall
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -13,6 +12,7 @@ from scipy.integrate import solve_ivp
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compare.problem import OutOfTimeError, Problem, march
+from tactile_lab.model.compare.stopwatch import Deadline
 from tactile_lab.model.compiled import entry
 from tactile_lab.model.integrator import TAU_L, V_FIRE, V_RESET, Q_at
 from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
@@ -56,14 +56,14 @@ def cvode(problem: Problem, method: str, tolerance: float, cap: float) -> Answer
     from sksundae.cvode import CVODE
 
     fire_voltage = problem.circuit.fire_voltage
-    deadline = wall.perf_counter() + cap
+    deadline = Deadline(cap)
 
     def piece(
         s: float, end: float, y: FloatArray, armed: bool, rhs: Any
     ) -> tuple[float, FloatArray, bool]:
         def f(t: float, state: FloatArray, out: FloatArray) -> None:
             # an exception would be lost in the C code: NaN makes it give up
-            if wall.perf_counter() > deadline:
+            if deadline.passed():
                 out[:] = np.nan
             else:
                 out[:] = rhs(t, state)
@@ -78,7 +78,7 @@ def cvode(problem: Problem, method: str, tolerance: float, cap: float) -> Answer
             max_num_steps=10_000_000, **options,
         )  # fmt: skip
         got = solver.solve(np.array([s, end]), y.copy())
-        if wall.perf_counter() > deadline:
+        if deadline.passed():
             raise OutOfTimeError(f"stopped after {cap:g} s")
         if not got.success:
             raise SolverError(str(got.message))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as wall
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +12,7 @@ import numpy as np
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.compare.stopwatch import Deadline
 from tactile_lab.model.compiled import entry
 from tactile_lab.model.equations import V_P as closed_V_P
 from tactile_lab.model.equations import rest_point
@@ -143,10 +143,10 @@ def march(
     """Spike times and the last V_C1 by a general solver, restarted at every event.
 
     Raises:
-        OutOfTimeError: more than `cap` s of wall time.
+        OutOfTimeError: more than `cap` s of CPU time.
     """
     c, par = problem.circuit, problem.par
-    deadline = wall.perf_counter() + cap
+    deadline = Deadline(cap)
     y = np.array(problem.first)
     spikes: list[float] = []
     resume = -1.0
@@ -160,7 +160,7 @@ def march(
                 at: float, state: FloatArray, V0: float = V0, p: float = p,
                 held: bool = held,
             ) -> FloatArray:  # fmt: skip
-                if wall.perf_counter() > deadline:
+                if deadline.passed():
                     raise OutOfTimeError(f"stopped after {cap:g} s")
                 out = np.empty(2)
                 right_hand_side(
