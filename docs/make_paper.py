@@ -20,7 +20,8 @@ import numpy as np
 from paper_page import page
 
 from tactile_lab.acquisition.execution import Execution
-from tactile_lab.analysis.transfer import Transfer, fit_transfer, read_transfer
+from tactile_lab.analysis.transfer import Transfer, fit_transfer
+from tactile_lab.analysis.transfer_file import read_transfer
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.report.canvas import save

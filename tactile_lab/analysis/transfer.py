@@ -4,27 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.errors import NotIdentifiableError, ParameterError
-from tactile_lab.scene.columns import read_columns
 
 FloatArray = NDArray[np.float64]
 
-HEADERS = (
-    ("V_GS_V", "I_DS_A"),
-    ("VG", "ID"),
-    ("Vg", "Id"),
-    ("VGS", "ID"),
-    ("VGS", "IDS"),
-)
-"""First lines a transfer curve may have: ours and a parameter analyser's."""
-NO_NUMBER = 9e37
-"""SCPI instruments send 9.9e37 for an overflow and 9.91e37 for no number."""
 FEWEST = 6
 SUBTHRESHOLD_END = 2.75
 ABOVE_FLOOR = 5.0
@@ -58,37 +46,6 @@ class Transfer:
         volts = np.asarray(V_GS, dtype=np.float64)
         values: FloatArray = self.I_S.value * np.exp(volts / (self.m.value * self.V_T))
         return values
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """A transfer curve as read.
-
-    Attributes:
-        V_GS: V.
-        I_DS: A.
-        left_out: lines of the file that held no number, or an instrument's sign for
-            none.
-    """
-
-    V_GS: FloatArray
-    I_DS: FloatArray
-    left_out: tuple[int, ...]
-
-
-def read_transfer(path: Path) -> Curve:
-    """The curve in a CSV with one of the headers in `HEADERS`.
-
-    Rows with NaN, an infinity, or what SCPI instruments send for them (9.9e37 and
-    9.91e37) are left out.
-
-    Raises:
-        SceneError: the file cannot be read as such.
-    """
-    _, rows, lines = read_columns(path, HEADERS, gaps=True)
-    good = np.all(np.abs(rows) < NO_NUMBER, axis=1)
-    left_out = tuple(lines[i] for i in np.flatnonzero(~good))
-    return Curve(rows[good, 0], rows[good, 1], left_out)
 
 
 def fit_transfer(

@@ -27,12 +27,15 @@ from tactile_lab.commands.terminal import print_json, refusing, warn
 def command(
     curve: Path, between: tuple[str, str] | None, figure: Path | None, as_json: bool
 ) -> None:
-    """Fit the subthreshold regime of CURVE, a CSV of V_GS and I_DS.
+    """Fit the subthreshold regime of CURVE, a CSV of V_GS and I_DS in SI units.
 
-    The first line is "V_GS_V,I_DS_A" or an analyser's "VG,ID"; SI units.
+    A line names the columns, such as "V_GS_V,I_DS_A", "VG,ID" or Keithley's
+    "GateV,DrainI"; others, and settings above as EasyEXPERT writes them, are passed
+    over.
     """
     with refusing():
-        from tactile_lab.analysis.transfer import fit_transfer, read_transfer
+        from tactile_lab.analysis.transfer import fit_transfer
+        from tactile_lab.analysis.transfer_file import read_transfer
         from tactile_lab.quantity import parse, show
 
         limits = None

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from tactile_lab.analysis.transfer import Curve, Transfer
+from tactile_lab.analysis.transfer import Transfer
+from tactile_lab.analysis.transfer_file import Curve
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import BOX, HEIGHT, WIDTH, axes, blank, heading
 

@@ -47,14 +47,13 @@ def read_text(path: Path, what: str = "File") -> str:
 
 
 def read_columns(
-    path: Path, headers: Sequence[tuple[str, ...]], *, gaps: bool = False
+    path: Path, headers: Sequence[tuple[str, ...]]
 ) -> tuple[tuple[str, ...], NDArray[np.float64], list[int]]:
     """Numeric columns of a CSV file.
 
     Args:
         path: the file; lines that are empty or start with # are passed over.
         headers: allowed headers; the first line must be one of them.
-        gaps: take values that are not finite as they are, for who can do without.
 
     Returns:
         The header found, an array of shape (rows, columns), and each row's line number.
@@ -82,7 +81,7 @@ def read_columns(
                         f"{wanted}."
                     )
                 continue
-            rows.append(_numbers(cells, header, at, gaps))
+            rows.append(_numbers(cells, header, at))
             lines.append(reader.line_num)
     except csv.Error as reason:
         raise SceneError(f"{path}, line {reader.line_num}: {reason}.") from reason
@@ -91,9 +90,7 @@ def read_columns(
     return header, np.array(rows, dtype=np.float64), lines
 
 
-def _numbers(
-    cells: list[str], header: tuple[str, ...], at: str, gaps: bool
-) -> list[float]:
+def _numbers(cells: list[str], header: tuple[str, ...], at: str) -> list[float]:
     if len(cells) != len(header):
         raise SceneError(
             f"{at}: {len(cells)} values where {len(header)} are needed "
@@ -107,7 +104,7 @@ def _numbers(
             raise SceneError(
                 f'{at}: {name} is "{cell[:40]}", not a number.'
             ) from reason
-        if not (gaps or math.isfinite(number)):
+        if not math.isfinite(number):
             raise SceneError(f"{at}: {name} is {cell}; give a finite number.")
         row.append(number)
     return row

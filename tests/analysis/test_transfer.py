@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.transfer import fit_transfer, read_transfer
+from tactile_lab.analysis.transfer import fit_transfer
+from tactile_lab.analysis.transfer_file import read_transfer
 from tactile_lab.errors import NotIdentifiableError, ParameterError, SceneError
 
 V = np.linspace(0, 3.5, 71)
@@ -75,3 +76,30 @@ def test_unusable_curves_are_refused():
         fit_transfer(V, curve()[::-1], between=(0, 2))
     with pytest.raises(ParameterError):
         fit_transfer(V, curve()[:-1])
+
+
+def test_it_reads_what_an_analyser_exports(tmp_path):
+    rows = list(zip(V, curve(), strict=True))
+    path = tmp_path / "easyexpert.csv"
+    path.write_text(
+        "SetupTitle, Id-Vg\nTestParameter, Channel.VName, Vd, Vg\n"
+        "Dimension1, 36\nDataName, Vg, Ig, Id\n"
+        + "".join(f"DataValue, {v:.6g}, 1E-13, {i:.9E}\n" for v, i in rows)
+    )
+    read = read_transfer(path)
+    assert read.V_GS.size == len(rows)
+    assert fit_transfer(read.V_GS, read.I_DS).m.value == pytest.approx(5.646)
+    path.write_text(
+        "DrainI,GateV,GateI\n" + "".join(f"{i:.9E},{v:.6g},0\n" for v, i in rows)
+    )
+    again = read_transfer(path)
+    assert again.I_DS == pytest.approx(read.I_DS)
+
+
+def test_a_file_without_such_columns_is_refused(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("time,force\n0,1\n")
+    with pytest.raises(SceneError, match="no line that names V_GS and I_DS"):
+        read_transfer(path)
+    path.write_text("VG,ID\n")
+    assert read_transfer(path).V_GS.size == 0
