@@ -24,6 +24,7 @@ from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
 from gui.record.log import LogView
 from gui.record.progress import Progress
+from gui.record.watching import WatchBar
 
 
 class EmptyCard(QFrame):
@@ -117,6 +118,8 @@ class Centre(QWidget):
         above.addWidget(self.notice)
         self.compare_bar = CompareBar(theme)
         above.addWidget(self.compare_bar)
+        self.watch_bar = WatchBar()
+        above.addWidget(self.watch_bar)
         above.addWidget(self.stack, 1)
         lower = panel()
         below = column(lower, margin=12, spacing=9)

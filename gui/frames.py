@@ -33,7 +33,6 @@ class Frames(QObject):
         self.costs: list[float] = []
         self.paints: list[float] = []
         self._numbers = 0.0
-        self._watched = False
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
@@ -81,7 +80,7 @@ class Frames(QObject):
             holds = planned if source.running and planned else source.holds
             panels.centre.progress.show_run(
                 snapshot, holds, source.length, source.reach, session.trial,
-                "Monitor: nothing is kept" if session.monitor.alive
+                "Monitor: only Record keeps what is seen" if session.monitor.alive
                 else self._opening.ending,
             )  # fmt: skip
             running = session.state in (State.RUNNING, State.ABORTING)
@@ -89,13 +88,11 @@ class Frames(QObject):
 
     def _show_monitor(self) -> None:
         panels, monitor = self._panels, self._panels.session.monitor
+        bar = panels.centre.watch_bar
         if monitor.alive:
-            panels.centre.notice.setText(monitor.words())
-            panels.centre.notice.show()
-            self._watched = True
-        elif self._watched:
-            panels.centre.notice.hide()
-            self._watched = False
+            bar.show_standing(monitor.standing, recording=monitor.recording)
+        elif bar.isVisible():
+            bar.hide()
         if panels.centre.tools.monitor.isChecked() is not monitor.alive:
             panels.centre.tools.monitor.setChecked(monitor.alive)
 

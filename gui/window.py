@@ -232,6 +232,9 @@ class Window(QMainWindow):
         self.closing.stopped.connect(self.leave)
         self.centre.tools.export_asked.connect(self.actions_.export_view)
         self.centre.tools.monitor.clicked.connect(session.watch)
+        self.centre.watch_bar.record_asked.connect(session.record)
+        self.centre.watch_bar.closed.connect(lambda: session.watch(False))
+        session.recorded.connect(lambda folder: self.opening.list_runs())
         self.setup.scene_wanted.connect(self.opening.ask_scene)
         manual = self.review.manual
         manual.begun.connect(session.begin_manual)

@@ -32,6 +32,28 @@ class StartRun:
 
 
 @dataclass(frozen=True)
+class StartWatch:
+    """Watch a request that asks for no force; nothing is kept.
+
+    Attributes:
+        run: number that tells its messages from others'.
+        request: what to watch.
+    """
+
+    run: int
+    request: Request
+
+
+@dataclass(frozen=True)
+class RecordWatch:
+    """Keep what a watch holds, the last minute, as a run in `out`."""
+
+    run: int
+    out: Path
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class StopRun:
     """Switch the coil off and end a run; why."""
 
@@ -92,6 +114,8 @@ class Leave:
 
 Command = (
     StartRun
+    | StartWatch
+    | RecordWatch
     | StopRun
     | TakeNote
     | ErrandDone

@@ -73,6 +73,7 @@ class Core(QObject):
     trial_ended = Signal(object)
     run_ended = Signal(object)
     reported = Signal(object)
+    recorded = Signal(object)
     twinned = Signal(object)
     queue_changed = Signal()
 

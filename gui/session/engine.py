@@ -23,10 +23,13 @@ from gui.session.commands import (
     Leave,
     MakePlan,
     MakeTwin,
+    RecordWatch,
     StartRun,
+    StartWatch,
     StopRun,
     TakeNote,
 )
+from gui.session.looking import Looking
 from gui.session.messages import Planned, Told, Twins
 from gui.session.request import Request
 from gui.session.running import Running
@@ -48,7 +51,7 @@ class Engine:
     def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
         self._pipe, self._realtime = pipe, realtime
         self._sending = threading.Lock()
-        self._runs: dict[int, Running] = {}
+        self._runs: dict[int, Running | Looking] = {}
 
     def serve(self) -> None:
         """Do what is asked until the window has gone; then leave every coil off."""
@@ -75,6 +78,13 @@ class Engine:
                     command, self._teller(number), realtime=self._realtime
                 )
                 self._runs[number].start()
+            case StartWatch(run=number):
+                self._runs[number] = Looking(command, self._teller(number))
+                self._runs[number].start()
+            case RecordWatch(run=number):
+                watch = self._runs.get(number)
+                if isinstance(watch, Looking):
+                    watch.record(command)
             case StopRun(run=number, reason=reason):
                 if number in self._runs:
                     self._runs[number].stop(reason)

@@ -258,6 +258,12 @@ class Incoming(Core):
         if self.monitor.problem:
             self.log(Level.ERROR, "monitor", self.monitor.problem)
             self.monitor.problem = ""
+        recorded, self.monitor.recorded = self.monitor.recorded, None
+        if recorded is not None and recorded.folder is not None:
+            self.log(Level.GOOD, "monitor", f"Recorded to {recorded.folder}")
+            self.recorded.emit(recorded.folder)
+        elif recorded is not None:
+            self.log(Level.ERROR, "monitor", f"Not recorded: {recorded.problem}")
         if self._after_monitor is not None and not self.monitor.alive:
             wanted, self._after_monitor = self._after_monitor, None
             self.start(*wanted)

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
-from gui.session.commands import Command, ErrandDone, Leave, StartRun, StopRun, TakeNote
+from gui.session.commands import (
+    Command,
+    ErrandDone,
+    Leave,
+    RecordWatch,
+    StartRun,
+    StartWatch,
+    StopRun,
+    TakeNote,
+)
 from gui.session.messages import Gone, Lost, Samples, Told
 from gui.session.request import Request
 from gui.session.threads import start
@@ -42,6 +51,10 @@ class RunAfar:
     def note(self, text: str, at: float) -> None:
         """Put a note into the run's log, stamped with its time, s."""
         self._link.ask(TakeNote(self._number, text, at))
+
+    def record(self, out: Path, notes: Mapping[str, str]) -> None:
+        """Keep the last minute of a watch as a run; `Recorded` tells the result."""
+        self._link.ask(RecordWatch(self._number, out, dict(notes)))
 
     def errand_done(self) -> None:
         """The person has done what the run waits for."""
@@ -102,12 +115,22 @@ class Link:
         report: bool = True,
     ) -> RunAfar:
         """Start a run; what it tells is put into `inbox`."""
+        kept = dict(notes or {})
+        return self._begin(
+            lambda number: StartRun(number, request, out, kept, report), inbox
+        )
+
+    def watch(self, request: Request, inbox: Inbox) -> RunAfar:
+        """Start to watch; what it tells is put into `inbox`."""
+        return self._begin(lambda number: StartWatch(number, request), inbox)
+
+    def _begin(self, command: Callable[[int], Command], inbox: Inbox) -> RunAfar:
         with self._lock:
             self._last += 1
             made = RunAfar(self, self._last, inbox)
             pipe = self._pipe or self._open()
             self._runs[self._last] = made
-            _send(pipe, StartRun(self._last, request, out, dict(notes or {}), report))
+            _send(pipe, command(self._last))
         return made
 
     def ask(self, command: Command) -> None:
@@ -115,7 +138,9 @@ class Link:
         with self._lock:
             if self._pipe is not None:
                 _send(self._pipe, command)
-            elif not isinstance(command, StopRun | TakeNote | ErrandDone | Leave):
+            elif not isinstance(
+                command, StopRun | TakeNote | ErrandDone | Leave | RecordWatch
+            ):
                 _send(self._open(), command)
 
     @property

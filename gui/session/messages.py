@@ -132,6 +132,14 @@ class Broken:
 
 
 @dataclass(frozen=True)
+class Recorded:
+    """The last minute of a watch is a run now, or why not."""
+
+    folder: Path | None
+    problem: str
+
+
+@dataclass(frozen=True)
 class Reported:
     """A run's report is written, or why not."""
 
@@ -191,6 +199,7 @@ Told = (
     | Refused
     | Ended
     | Broken
+    | Recorded
     | Reported
     | Errand
     | FieldByHand

@@ -1,23 +1,50 @@
-"""Watching the sensor between runs: coil off, nothing kept.
+"""Watching the sensor between runs: coil off, nothing kept but what Record asks for.
 
-The `monitor` protocol runs like any other, but into a temporary folder, so that V_GS
-can be trimmed by hand while V_C1, V_C2 and the rate are on screen.
+V_GS can be trimmed by hand while V_C1, V_C2 and the rate are on screen. The engine
+holds the last minute; Record makes it a run. `tactile-lab monitor` does the same.
 """
 
 from __future__ import annotations
 
-import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from gui.lanes.source import LiveSource
 from gui.session.link import Link, RunAfar
-from gui.session.messages import Begun, Broken, Refused, Samples, Told
+from gui.session.messages import Begun, Broken, Recorded, Refused, Samples, Told
 from gui.session.request import Request
 from tactile_lab.acquisition import events
-from tactile_lab.quantity import show
 
-LONGEST = "600 s"
+ENDLESS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')
+KEPT = 60.0
+"""Time that Record keeps at most, s; the engine holds no more."""
+SILENT = 2.0
+"""Seconds without a spike after which the rate counts as 0."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where the sensor stands now; None before the first sample.
+
+    Attributes:
+        V_C1, V_C2: V.
+        critical: V_C1 below which the sensor fires, V.
+        rate: Hz.
+        held: how much Record would keep, s.
+    """
+
+    V_C1: float | None
+    V_C2: float | None
+    critical: float
+    rate: float
+    held: float
+
+    @property
+    def distance(self) -> float | None:
+        """V_C1 less the critical one, V; above 0 the sensor is silent."""
+        return None if self.V_C1 is None else self.V_C1 - self.critical
 
 
 class Monitor:
@@ -26,15 +53,17 @@ class Monitor:
     Attributes:
         source: what is seen; None before the first sample.
         problem: why watching ended by itself, "" if it did not.
+        recorded: what became of the last Record; None before any.
     """
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self.source: LiveSource | None = None
         self.problem = ""
+        self.recorded: Recorded | None = None
+        self.recording = False
         self._run: RunAfar | None = None
         self._inbox: SimpleQueue[Told] = SimpleQueue()
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._critical = float("nan")
 
     @property
@@ -45,18 +74,21 @@ class Monitor:
     def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Watch the sensor on a bench ("sim" or a bench file)."""
         self.source, self.problem = None, ""
-        self._folder = tempfile.TemporaryDirectory(prefix="tactile-lab-monitor-")
-        request = Request(
-            "monitor", (f'protocol.duration="{LONGEST}"', *overrides), bench
-        )
+        self.recorded, self.recording = None, False
+        request = Request("monitor", (*ENDLESS, *overrides), bench)
         self._inbox = SimpleQueue()
-        out = Path(self._folder.name)
-        self._run = self._link.run(request, out, self._inbox, report=False)
+        self._run = self._link.watch(request, self._inbox)
 
     def stop(self) -> None:
         """Let go of the instruments; returns at once."""
         if self._run is not None:
             self._run.stop("monitor off")
+
+    def record(self, out: Path, notes: Mapping[str, str]) -> None:
+        """Keep the last minute as a run; `recorded` tells the result."""
+        if self._run is not None and not self.recording:
+            self.recording = True
+            self._run.record(out, notes)
 
     def poll(self) -> LiveSource | None:
         """Take what is new; the source if it has just begun."""
@@ -76,30 +108,29 @@ class Monitor:
                 case events.SpikesSeen(times=times):
                     if self.source is not None:
                         self.source.add_spikes(times)
+                case Recorded():
+                    self.recorded, self.recording = told, False
                 case Refused(fault=fault) | Broken(fault=fault):
                     self.problem = f"{fault.title} {fault.consequence}"
         if self._run is not None and not self._run.alive:
             if self.source is not None:
                 self.source.running = False
-            if self._folder is not None:
-                self._folder.cleanup()
-                self._folder = None
             self._run = None
         return begun
 
-    def words(self) -> str:
-        """V_C1, its distance to the threshold and the rate, for a person."""
-        V_C1 = None if self.source is None else self.source.mean("V_C1")
-        if V_C1 is None or self.source is None:
-            return "Monitor: opening the oscilloscope …"
-        distance = V_C1 - self._critical
-        side = "above the threshold: silent" if distance > 0 else "below it: fires"
-        spikes = self.source.spikes
-        rate = 0.0
-        if spikes.size > 1 and self.source.reach - spikes[-1] < 2.0:
+    @property
+    def standing(self) -> Standing:
+        """Where the sensor stands now."""
+        source = self.source
+        if source is None:
+            return Standing(None, None, self._critical, 0.0, 0.0)
+        spikes, rate = source.spikes, 0.0
+        if spikes.size > 1 and source.reach - spikes[-1] < SILENT:
             rate = 1 / max(float(spikes[-1] - spikes[-2]), 1e-9)
-        return (
-            f"<b>Monitor</b> · coil off, nothing kept · V_C1 {V_C1:.3f} V, "
-            f"<b>{show(abs(distance), 'V', 3)}</b> {side} "
-            f"(fires under {self._critical:.3f} V) · {rate:.2f} Hz"
+        return Standing(
+            source.mean("V_C1"),
+            source.mean("V_C2"),
+            self._critical,
+            rate,
+            min(source.reach, KEPT),
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +17,10 @@ from gui.session.messages import (
     Gone,
     Refused,
     Reported,
-    Samples,
     Told,
     Twinned,
 )
+from gui.session.sampling import tell_samples
 from gui.session.threads import start
 from gui.state import Fault
 from tactile_lab.acquisition import events
@@ -31,9 +30,6 @@ if TYPE_CHECKING:
     from gui.session.twin import LiveTwin
     from tactile_lab.acquisition.ending import Executed
     from tactile_lab.acquisition.execution import Execution
-
-EVERY = 0.02
-"""Seconds between two looks at the newest samples and at the coil."""
 
 TWINNED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
 """Signals beside which the twin runs."""
@@ -138,7 +134,14 @@ class Running:
             )
         )
         ended = threading.Event()
-        watching = [start(lambda: self._watch(execution, ended), "watch")]
+        watching = [
+            start(
+                lambda: tell_samples(
+                    execution.live, lambda: execution.coil_state, ended, self._tell
+                ),
+                "samples",
+            )
+        ]
         if self._twin is not None:
             twin = self._twin
             watching.append(start(lambda: self._follow(twin, execution, ended), "twin"))
@@ -171,23 +174,6 @@ class Running:
         self._tell(Errand(text))
         while self.alive and not self._errand_done.wait(0.2):
             pass
-
-    def _watch(self, execution: Execution, ended: threading.Event) -> None:
-        """Tell samples and the coil's state as they come, to the very last."""
-        live, seen, last, said = execution.live, 0, None, 0.0
-        while True:
-            over = ended.wait(EVERY)
-            written, coil = live.written, execution.coil_state
-            changed = coil != last or time.monotonic() - said > 0.2
-            if written != seen or changed:
-                first = seen if written >= seen else 0
-                bins = {}
-                if written != seen:
-                    bins = {s: live.since(first, s) for s in live.signals}
-                self._tell(Samples(bins, coil))
-                seen, last, said = written, coil, time.monotonic()
-            if over:
-                return
 
     def _follow(
         self, twin: LiveTwin, execution: Execution, ended: threading.Event

@@ -179,6 +179,10 @@ class Session(Incoming):
             if not self.monitor.alive:
                 self.monitor.start(self.bench_choice, self.bench_overrides)
 
+    def record(self) -> None:
+        """Keep the last minute of what is watched as a run."""
+        self.monitor.record(self.out, self.notes)
+
     def note(self, text: str) -> None:
         """A note of the user, stamped with wall-clock and run time."""
         at = f" (at {self.elapsed:.1f} s)" if self.state is State.RUNNING else ""

@@ -13,6 +13,7 @@ from gui.session.session import Queued
 from gui.state import State, Truth
 from sim_backend import serial_wires
 from sim_backend.faults import SerialFault
+from tactile_lab.store.run import Run
 
 
 def newest_coil() -> serial_wires.FarEnd:
@@ -338,15 +339,34 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
 def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     window, session = lab.window, lab.session
     window.centre.tools.monitor.click()
-    lab.until(lambda: "fires under" in window.centre.notice.text())
+    lab.until(lambda: "fires under" in window.centre.watch_bar.words)
+    assert "mV" in window.centre.watch_bar.words
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
     assert session.state is State.READY
     assert window.header.stop.truth is Truth.OFF
-    before = set((lab.folder / "runs").iterdir())
+    session.out.mkdir(exist_ok=True)
+    before = set(session.out.iterdir())
     window.setup.run.click()
     lab.until(lambda: session.state is State.RUNNING)
     assert not session.monitor.alive, "the scope is handed over before the run"
     lab.until(lambda: session.state in (State.READY, State.FAULT))
-    new = set((lab.folder / "runs").iterdir()) - before
+    new = set(session.out.iterdir()) - before
     assert len(new) == 1, "watching keeps nothing"
+
+
+def test_record_keeps_what_the_monitor_saw(lab) -> None:
+    window, session = lab.window, lab.session
+    session.watch(True)
+    lab.until(lambda: session.monitor.standing.held > 0.3)
+    window.centre.watch_bar.record.click()
+    kept = []
+    session.recorded.connect(kept.append)
+    lab.until(lambda: kept)
+    assert session.monitor.alive, "watching goes on"
+    run = Run.load(kept[0])
+    assert run.status == "complete" and "V_C1" in run.signals
+    run.close()
+    session.watch(False)
+    lab.until(lambda: not session.monitor.alive)
+    lab.until(lambda: not window.centre.watch_bar.isVisible())

@@ -1,0 +1,86 @@
+"""The bar above the lanes while the sensor is watched: where it stands, and Record."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel
+
+from gui.lanes.axis import number
+from gui.parts import column, label, push, set_role
+from gui.session.monitor import Standing
+
+
+class WatchBar(QFrame):
+    """V_C1, V_C2, rate and the distance to the threshold, for trimming V_GS by hand."""
+
+    record_asked = Signal()
+    closed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Monitor")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(14, 5, 10, 5)
+        row.setSpacing(20)
+        self._values: dict[str, QLabel] = {}
+        for name in ("V_C1", "V_C2", "Rate", "To the threshold"):
+            box = QFrame()
+            inside = column(box, spacing=0)
+            value = label("—", "value")
+            value.setAccessibleName(name)
+            inside.addWidget(label(name, "small"))
+            inside.addWidget(value)
+            self._values[name] = value
+            row.addWidget(box)
+        self.side = label("", "pill")
+        row.addWidget(self.side)
+        row.addStretch(1)
+        self._kept = label("", "muted")
+        row.addWidget(self._kept)
+        self.record = push("Record")
+        self.record.setToolTip("Keep what was seen, up to the last 60 s, as a run")
+        self.record.clicked.connect(self.record_asked)
+        row.addWidget(self.record)
+        off = push("Stop watching")
+        off.clicked.connect(self.closed)
+        row.addWidget(off)
+        self.hide()
+
+    @property
+    def words(self) -> str:
+        """What the bar says, in one line."""
+        values = ", ".join(f"{n} {v.text()}" for n, v in self._values.items())
+        return f"{values}, {self.side.text()}"
+
+    def show_standing(self, now: Standing, *, recording: bool) -> None:
+        """Show where the sensor stands; whether the last minute is being kept."""
+        distance = now.distance
+        for name, text in (
+            ("V_C1", _volts(now.V_C1)),
+            ("V_C2", _volts(now.V_C2)),
+            ("Rate", f"{number(now.rate, 2)} Hz"),
+            (
+                "To the threshold",
+                "—" if distance is None else f"{number(1e3 * distance, 0)} mV",
+            ),
+        ):
+            self._values[name].setText(text)
+        if distance is None:
+            self.side.setText("opening the oscilloscope …")
+            set_role(self.side, "pill")
+        elif distance > 0:
+            self.side.setText(f"silent · fires under {now.critical:.3f} V")
+            set_role(self.side, "pill-ok")
+        else:
+            self.side.setText(f"fires · silent above {now.critical:.3f} V")
+            set_role(self.side, "pill-warn")
+        self._kept.setText(
+            "coil off" if distance is None else f"coil off · {now.held:.0f} s held"
+        )
+        self.record.setText("Recording …" if recording else "Record")
+        self.record.setEnabled(distance is not None and not recording)
+        self.show()
+
+
+def _volts(value: float | None) -> str:
+    return "—" if value is None else f"{number(value, 3)} V"

@@ -1,0 +1,117 @@
+"""One watch in the engine: the sensor with the coil off, told to the window."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from gui.session.commands import RecordWatch, StartWatch
+from gui.session.messages import Begun, Broken, Gone, Recorded, Refused, Told
+from gui.session.sampling import tell_samples
+from gui.session.threads import start
+from gui.state import Fault
+from tactile_lab.acquisition.ending import CoilState
+from tactile_lab.errors import TactileLabError
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.watching import Watching
+
+NO_COIL = CoilState(live=False, setpoint=None, measured=None, off=None)
+
+
+class Looking:
+    """Watches until stopped; keeps the last minute when asked to.
+
+    Args:
+        asked: what to watch.
+        tell: tells the window, from any thread.
+    """
+
+    def __init__(self, asked: StartWatch, tell: Callable[[Told], None]) -> None:
+        self._asked, self._tell = asked, tell
+        self._watching: Watching | None = None
+        self._stop_asked: str | None = None
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Start to watch."""
+        self._thread = start(self._main, "watch")
+
+    def stop(self, reason: str) -> None:
+        """Let go of the instruments; returns at once."""
+        with self._lock:
+            self._stop_asked = reason
+            watching = self._watching
+        if watching is not None:
+            watching.stop(reason)
+
+    def note(self, text: str, at: float) -> None:
+        """Nothing is recorded that could hold a note."""
+
+    def errand_done(self) -> None:
+        """Nobody is asked for anything."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def join(self, timeout: float) -> None:
+        """Wait for the end, at most `timeout` s."""
+        if self._thread is not None:
+            self._thread.join(timeout)
+
+    def record(self, asked: RecordWatch) -> None:
+        """Keep the last minute as a run, in a thread of its own."""
+        watching = self._watching
+        if watching is None:
+            self._tell(Recorded(None, "Nothing has been seen yet."))
+            return
+
+        def work() -> None:
+            try:
+                folder = watching.record(asked.out, asked.notes)
+            except (TactileLabError, OSError) as error:
+                self._tell(Recorded(None, str(error)))
+            else:
+                self._tell(Recorded(folder, ""))
+
+        start(work, "record")
+
+    def _main(self) -> None:
+        try:
+            self._watch()
+        except (TactileLabError, OSError) as error:
+            self._tell(Refused(Fault("Watching was refused.", str(error))))
+        except Exception as error:  # whatever it is, the window must be told
+            title = f"Watching broke: {type(error).__name__}."
+            self._tell(Broken(Fault(title, str(error)), None))
+        finally:
+            self._tell(Gone())
+
+    def _watch(self) -> None:
+        from tactile_lab.acquisition.watching import Watching
+
+        scene = self._asked.request.load()
+        watching = Watching(scene, realtime=True, emit=self._tell)
+        with self._lock:
+            self._watching = watching
+            reason = self._stop_asked
+        if reason is not None:
+            watching.stop(reason)
+        gain = scene.bench.magnet.newtons_per_ampere
+        self._tell(Begun(None, gain, scene.circuit.critical_V_C1))
+        ended = threading.Event()
+        telling = start(
+            lambda: tell_samples(watching.live, lambda: NO_COIL, ended, self._tell),
+            "samples",
+        )
+        try:
+            ending = watching.run()
+        finally:
+            ended.set()
+            telling.join()
+        if ending.failure is not None:
+            raise ending.failure
