@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy
 
 from gui.lanes.axis import number
 from gui.parts import column, label, push, set_role
@@ -28,11 +28,15 @@ class WatchBar(QFrame):
             inside = column(box, spacing=0)
             value = label("—", "value")
             value.setAccessibleName(name)
-            inside.addWidget(label(name, "small"))
+            title = label(name, "small")
+            inside.addWidget(title)
             inside.addWidget(value)
             self._values[name] = value
             row.addWidget(box)
+        self._threshold = title
+        self._threshold.setMinimumWidth(132)
         self.side = label("", "pill")
+        self.side.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         row.addWidget(self.side)
         row.addStretch(1)
         self._kept = label("", "muted")
@@ -61,18 +65,21 @@ class WatchBar(QFrame):
             ("Rate", f"{number(now.rate, 2)} Hz"),
             (
                 "To the threshold",
-                "—" if distance is None else f"{number(1e3 * distance, 0)} mV",
+                "—" if distance is None else f"{number(1e3 * abs(distance), 0)} mV",
             ),
         ):
             self._values[name].setText(text)
+        critical = f" {now.critical:.3f} V"
         if distance is None:
             self.side.setText("opening the oscilloscope …")
             set_role(self.side, "pill")
         elif distance > 0:
-            self.side.setText(f"silent · fires under {now.critical:.3f} V")
+            self._threshold.setText(f"Above threshold{critical}")
+            self.side.setText("silent")
             set_role(self.side, "pill-ok")
         else:
-            self.side.setText(f"fires · silent above {now.critical:.3f} V")
+            self._threshold.setText(f"Below threshold{critical}")
+            self.side.setText("fires")
             set_role(self.side, "pill-warn")
         self._kept.setText(
             "coil off" if distance is None else f"coil off · {now.held:.0f} s held"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
 
 from gui.look.theme import Theme
 from gui.parts import IconButton, column, empty, label, panel, push, scrolling
@@ -12,8 +12,8 @@ from gui.setup.estimate import words_of
 from gui.state import minutes
 
 ROW = 50
-MOST = 3
-"""Rows shown without scrolling."""
+MOST, LOW = 3, 800
+"""Rows shown without scrolling; one less in windows lower than `LOW` px."""
 
 
 class QueueView(QWidget):
@@ -48,7 +48,8 @@ class QueueView(QWidget):
         empty(self._rows)
         for number, item in enumerate(queue):
             self._rows.addWidget(self._row(number, len(queue), item))
-        self._area.setFixedHeight(ROW * min(len(queue), MOST))
+        room = MOST if self.window().height() > LOW else MOST - 1
+        self._area.setFixedHeight(ROW * min(len(queue), room))
         total = sum(
             item.expectation.estimate.duration for item in queue if item.expectation
         )
@@ -66,6 +67,9 @@ class QueueView(QWidget):
         if item.expectation is not None:
             time, samples, disk, heat = words_of(item.expectation.estimate)
             cost.setText(f"{time} · {samples} samples · {disk} · heat {heat}")
+        for words_ in (name, cost):
+            words_.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        made.setToolTip(f"{item.title}: {cost.text()}")
         made.setAccessibleName(f"{number + 1}: {item.title}, {cost.text()}")
         both = QWidget()
         words = column(both, spacing=0)

@@ -339,7 +339,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
 def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     window, session = lab.window, lab.session
     window.centre.tools.monitor.click()
-    lab.until(lambda: "fires under" in window.centre.watch_bar.words)
+    lab.until(lambda: "silent" in window.centre.watch_bar.words)
     assert "mV" in window.centre.watch_bar.words
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
