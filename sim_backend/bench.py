@@ -9,8 +9,8 @@ from drivers.coil_source import CoilSource
 from drivers.dialect import coil_dialect, meter_dialect
 from drivers.picoscope import PicoScope
 from drivers.teslameter import Teslameter
-from sim_backend.coil_source import SimCoilSource
 from sim_backend.faults import SerialFault
+from sim_backend.from_row import coil_far_end, meter_far_end
 from sim_backend.options import PlantOptions
 from sim_backend.picoscope import Make
 from sim_backend.picoscope_faults import Fault
@@ -19,7 +19,6 @@ from sim_backend.plant import Plant
 from sim_backend.scope_input import BUFFERED
 from sim_backend.scope_source import Acquisition, Codes
 from sim_backend.serial_wires import plug_in
-from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import Bench, Channel
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.errors import SceneError
@@ -171,7 +170,7 @@ def open_bench(
             raise SceneError("The scene drives the coil, but the bench has no [coil].")
         row = coil_dialect(spec.coil.dialect)
         wire = row.serial.model_copy(update={"baud": spec.coil.baud or row.serial.baud})
-        source = SimCoilSource(plant, row.id, clock)
+        source = coil_far_end(plant, row, clock)
         far_end = plug_in(source, wire, clock, "coil", coil_faults)
         coil = CoilSource(
             row, far_end.url, spec.coil.limits, clock, baud=spec.coil.baud
@@ -204,7 +203,7 @@ def open_bench(
                 "The scene reads the field; the bench has no [field_meter]."
             )
         meter_row = meter_dialect(spec.field_meter.dialect)
-        probe = SimTeslameter(plant, meter_row.id, clock)
+        probe = meter_far_end(plant, meter_row, clock)
         far_end = plug_in(probe, meter_row.serial, clock, "field-meter", meter_faults)
         meter = Teslameter(meter_row, far_end.url, clock)
     return Bench(

@@ -11,12 +11,11 @@ from typing import TextIO
 from drivers.dialect import coil_dialect, meter_dialect
 from drivers.dialect_row import Wire
 from sim_backend.coil_panel import Deed
-from sim_backend.coil_source import SimCoilSource
 from sim_backend.driven_coil import DrivenCoil
+from sim_backend.from_row import coil_far_end, meter_far_end
 from sim_backend.options import PlantOptions
 from sim_backend.serial_servers import PtyServer, SerialServer, TcpServer
 from sim_backend.serial_wires import FarEnd, LineInstrument
-from sim_backend.teslameter import SimTeslameter
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
 from tactile_lab.magnetics import Magnet
@@ -54,7 +53,7 @@ class ServedBench:
     Args:
         coil: `pty`, `tcp:PORT` (0 for any free port) or None for no source.
         teslameter: the same for the teslameter.
-        coil_row, meter_row: ids of the dialect rows they speak.
+        coil_row, meter_row: ids of the dialect rows they speak, or files with one.
         baud: of the source instead of its row's.
         paced: let bytes take the time the baud rate gives them, and the instruments
             the time they take to act.
@@ -86,17 +85,17 @@ class ServedBench:
         plant = CoilOnly(magnet or Magnet(r=6e-3))
         try:
             if coil is not None:
-                wire = coil_dialect(coil_row).serial
-                source = SimCoilSource(plant, coil_row, clock)
+                row = coil_dialect(coil_row)
+                source, wire = coil_far_end(plant, row, clock), row.serial
                 if log is not None:
                     self._log = log.open("a", encoding="utf-8")
                     source.on_deed = _writer(self._log)
                 wire = wire.model_copy(update={"baud": baud or wire.baud})
                 self._add("coil", coil, source, wire, clock, paced)
             if teslameter is not None:
-                wire = meter_dialect(meter_row).serial
-                meter = SimTeslameter(plant, meter_row, clock, noise=2e-6, seed=seed)
-                self._add("teslameter", teslameter, meter, wire, clock, paced)
+                known = meter_dialect(meter_row)
+                meter = meter_far_end(plant, known, clock, noise=2e-6, seed=seed)
+                self._add("teslameter", teslameter, meter, known.serial, clock, paced)
         except BaseException:
             self.close()
             raise

@@ -12,9 +12,19 @@ from tactile_lab.commands.terminal import print_json, refusing
 @click.command()
 @click.option("--coil", metavar="pty|tcp:PORT", help="Serve a current source there.")
 @click.option("--teslameter", metavar="pty|tcp:PORT", help="Serve a teslameter there.")
-@click.option("--coil-dialect", default="kepco-bop", show_default=True, metavar="ROW")
 @click.option(
-    "--teslameter-dialect", default="lakeshore-425", show_default=True, metavar="ROW"
+    "--coil-dialect",
+    default="kepco-bop",
+    show_default=True,
+    metavar="ROW|FILE",
+    help="What the source speaks; a row of your own is served as it says.",
+)
+@click.option(
+    "--teslameter-dialect",
+    default="lakeshore-425",
+    show_default=True,
+    metavar="ROW|FILE",
+    help="What the teslameter speaks.",
 )
 @click.option("--baud", type=click.IntRange(50, 4_000_000), help="Of the source.")
 @click.option(

@@ -10,7 +10,8 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 def test_the_page_works(tmp_path, monkeypatch):
     blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
-    assert [kind for kind, _ in blocks] == ["toml", "text", "python", "toml", "python"]
+    kinds = [kind for kind, _ in blocks]
+    assert kinds == ["toml", "text", "python", "toml", "python", "python"]
     monkeypatch.chdir(tmp_path)
     name = ""
     for kind, text in blocks:
