@@ -2,11 +2,16 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from click.testing import CliRunner
+
+from tactile_lab.cli import cli
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -80,3 +85,28 @@ def test_the_python_of_the_scripting_how_to_runs(tmp_path):
     assert re.search(r"120 mN \d+ spikes", said)
     tau = float(re.search(r"^tau ([\d.]+)", said, flags=re.M)[1])
     assert tau == pytest.approx(8.69, rel=0.1)
+
+
+def test_the_how_to_analyse_a_run_is_true(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    volts = np.linspace(0, 2.75, 56)
+    amperes = 1.216e-12 * np.exp(volts / (5.646 * 0.025))
+    rows = "\n".join(f"{v},{i}" for v, i in zip(volts, amperes, strict=True))
+    (tmp_path / "curve.csv").write_text(f"VG,ID\n{rows}\n", encoding="utf-8")
+    page = "how-to/analyse-a-run.md"
+    said = ""
+    for command in "".join(blocks(page, "sh")).splitlines():
+        verb, *rest = shlex.split(command)[1:]
+        found = [
+            str(path) for part in rest
+            for path in (sorted(tmp_path.glob(part)) if "*" in part else [part])
+        ]  # fmt: skip
+        done = CliRunner().invoke(cli, [verb, *found])
+        assert done.exit_code == 0, done.output
+        said += done.stdout
+    assert (tmp_path / "report" / "twin.pdf").exists()
+    assert (tmp_path / "transfer.png").exists()
+    assert re.search(r"V_GS +1\.\d+ ", said)
+    assert "time constant of" in said
+    exec("\n".join(blocks(page, "python")), {})
+    assert re.search(r"V_C1: [\d.]+ mV rms, \d+%", capsys.readouterr().out)
