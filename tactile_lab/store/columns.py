@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from typing import Any
 
 import h5py
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError
 from tactile_lab.store.layout import BIN, CHECK, pyramid_record
+
+Wrote = Callable[[h5py.Dataset, int, int, int], None]
 
 BINS_HELD = 2048
 """Entries of the pyramid that are written at once."""
@@ -81,10 +84,19 @@ class Records:
 
 
 class SampleColumn:
-    """One channel's codes with their checksums and pyramid, a chunk at a time."""
+    """One channel's codes with their checksums and pyramid, a chunk at a time.
 
-    def __init__(self, file: h5py.File, signal: str) -> None:
+    Args:
+        file: with the channel declared.
+        signal: its name.
+        wrote: told each chunk's dataset, number, samples and CRC-32 once it is written.
+    """
+
+    def __init__(
+        self, file: h5py.File, signal: str, wrote: Wrote | None = None
+    ) -> None:
         samples = file[f"samples/{signal}"]
+        self._dataset, self._wrote = samples, wrote
         self._samples = Column(samples)
         self._pyramid = Column(file[f"pyramid/{signal}"])
         self._checks = Column(file[f"checks/{signal}"])
@@ -135,8 +147,10 @@ class SampleColumn:
             return
         held, end = self._chunk[: self._held], self._first + self._held
         self._samples.put(self._first, held)
-        check = np.array([(held.size, zlib.crc32(held.data))], CHECK)
-        self._checks.put(self._first // self._chunk.size, check)
+        number, crc = self._first // self._chunk.size, zlib.crc32(held.data)
+        self._checks.put(number, np.array([(held.size, crc)], CHECK))
+        if self._wrote is not None:
+            self._wrote(self._dataset, number, held.size, crc)
         self._bins = self._bins[: self._first // BIN - self._pyramid.length]
         self._bins = np.concatenate([self._bins, pyramid_of(held)])
         self.written = end

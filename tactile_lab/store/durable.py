@@ -1,4 +1,4 @@
-"""Pushes a growing file to the disk, so that a power cut costs seconds, not a run."""
+"""Pushes growing files to the disk, so that a power cut costs seconds, not a run."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ EVERY = 1.0
 
 
 class Durable:
-    """Syncs a file in a thread of its own, because a disk may take its time for it.
+    """Syncs files in a thread of its own, because a disk may take its time for it.
 
     What a program has written survives its own death, but lies in the computer's
     memory until the system writes it out, which may be half a minute later.
 
     Args:
-        path: of the file, which exists.
+        paths: of the files, in one folder, which exist.
         every: s from the end of one sync to the next.
     """
 
-    def __init__(self, path: Path, *, every: float = EVERY) -> None:
+    def __init__(self, *paths: Path, every: float = EVERY) -> None:
         self.failure: OSError | None = None
         self.count = 0
         self._every = every
-        self._file = os.open(path, os.O_RDWR)
+        self._files = [os.open(path, os.O_RDWR) for path in paths]
         self._ended = threading.Event()
-        _sync_folder(path.parent)
-        _sync_folder(path.parent.parent)
+        _sync_folder(paths[0].parent)
+        _sync_folder(paths[0].parent.parent)
         self._thread = threading.Thread(target=self._work, name="sync", daemon=True)
         self._thread.start()
 
@@ -38,7 +38,7 @@ class Durable:
             raise self.failure
 
     def close(self) -> None:
-        """Sync once more and let go of the file; idempotent.
+        """Sync once more and let go of the files; idempotent.
 
         Raises:
             OSError: the disk did not take it.
@@ -48,18 +48,23 @@ class Durable:
         self._ended.set()
         self._thread.join()
         try:
-            os.fsync(self._file)
+            self._sync()
         finally:
-            os.close(self._file)
+            for file in self._files:
+                os.close(file)
 
     def _work(self) -> None:
         while not self._ended.wait(self._every):
             try:
-                os.fsync(self._file)
+                self._sync()
             except OSError as failure:
                 self.failure = failure
                 return
             self.count += 1
+
+    def _sync(self) -> None:
+        for file in self._files:
+            os.fsync(file)
 
 
 def _sync_folder(path: Path) -> None:

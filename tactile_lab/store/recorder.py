@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import h5py
@@ -19,6 +20,7 @@ from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
 from tactile_lab.store.layout import RECORDS, Layout, declare
 from tactile_lab.store.pieces import Pieces
+from tactile_lab.store.places import PLACES, Places
 from tactile_lab.trial import Outcome
 
 CADENCE = 0.5
@@ -55,6 +57,7 @@ class Recorder:
         self._reserve = reserve
         self._sync = not layout.simulated if sync is None else sync
         self._durable: Durable | None = None
+        self._places: Places | None = None
         self._records = {name: Records(kind) for name, kind in RECORDS.items()}
         self._file: h5py.File | None = None
         self._columns: tuple[SampleColumn, ...] = ()
@@ -231,14 +234,21 @@ class Recorder:
         file = h5py.File(path, "x", libver="latest", rdcc_nbytes=0)
         declare(file, self.layout, stream)
         self._file = file
+        if self._sync:
+            places = self.folder.path / PLACES
+            self._places = Places(places)
+            self._durable = Durable(path, places)
         if stream is not None:
-            self._columns = tuple(SampleColumn(file, n) for n in self.layout.signals)
+            self._columns = tuple(self._column(file, n) for n in self.layout.signals)
         for name, records in self._records.items():
             records.attach(file[name])
         file.swmr_mode = True
-        if self._sync:
-            self._durable = Durable(path)
         self._flush()
+
+    def _column(self, file: h5py.File, signal: str) -> SampleColumn:
+        if self._places is None:
+            return SampleColumn(file, signal)
+        return SampleColumn(file, signal, partial(self._places.note, signal))
 
     def _append(self, block: Block) -> None:
         over = sum(
@@ -287,9 +297,12 @@ class Recorder:
                     records.flush()
         finally:
             file.close()
-            if self._durable is not None:
+            if self._places is not None and self._durable is not None:
+                self._places.close()
                 with suppress(*failed):
                     self._durable.close()
+                if not self._failed:
+                    (self.folder.path / PLACES).unlink()
 
     def _guard(self, write: Callable[[], None]) -> None:
         """Turn what a disk can do to us into a message that says what is kept."""

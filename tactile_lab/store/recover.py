@@ -25,7 +25,9 @@ from tactile_lab.store.folder import (
 )
 from tactile_lab.store.layout import CHECK, RECORDS, create_channel
 from tactile_lab.store.opening import missing_bytes
+from tactile_lab.store.places import PLACES
 from tactile_lab.store.run import Run
+from tactile_lab.store.salvage import Salvage
 from tactile_lab.store.torn import rows_of
 
 KEPT = "data.killed.h5"
@@ -86,6 +88,7 @@ def recover(path: Path) -> Recovery:
             raise RecordingError(f"{new} cannot be written: {error}.") from error
     (path / DATA).rename(path / KEPT)
     new.rename(path / DATA)
+    (path / PLACES).unlink(missing_ok=True)
     return _derive(path, samples, dropped)
 
 
@@ -108,15 +111,15 @@ def _copy(run: Run, file: h5py.File) -> tuple[int, int]:
             name, data=rows, maxshape=(None,), chunks=True, fletcher32=True
         )
         dataset.attrs.update(run.table_attributes(name))
-    sound = [_sound(run, name) for name in run.signals]
+    salvages = {name: Salvage(run, name) for name in run.signals}
     longest = max(
         (int(run.column(name)[0].shape[0]) for name in run.signals), default=0
     )
-    samples = min(sound, default=0)
-    for name in run.signals:
-        _copy_channel(run, name, samples, file)
+    samples = min((one.samples for one in salvages.values()), default=0)
+    for name, salvage in salvages.items():
+        _copy_channel(run, name, salvage, samples, file)
     _cut(file, samples)
-    return samples, longest - samples
+    return samples, max(0, longest - samples)
 
 
 def _readable_rows(run: Run, name: str, record: np.dtype[Any]) -> NDArray[Any]:
@@ -127,47 +130,25 @@ def _readable_rows(run: Run, name: str, record: np.dtype[Any]) -> NDArray[Any]:
         return np.empty(0, record)
 
 
-def _sound(run: Run, name: str) -> int:
-    """Samples of a channel up to the first chunk that is not as written."""
-    samples, checks, _ = run.column(name)
-    size = samples.chunks[0]
-    end = 0
-    for number, (count, crc) in enumerate(rows_of(checks).tolist()):
-        first = number * size
-        if count == 0 or first + count > samples.shape[0]:
-            break
-        try:
-            codes = samples[first : first + count]
-        except (OSError, RuntimeError):
-            break
-        if zlib.crc32(codes.data) != crc:
-            break
-        end = first + count
-        if count < size:
-            break  # written when it was the last; what follows has no such place
-    return end
-
-
-def _copy_channel(run: Run, name: str, length: int, file: h5py.File) -> None:
-    """Copy whole chunks as they are and rewrite the last; rebuild what is derived."""
+def _copy_channel(
+    run: Run, name: str, salvage: Salvage, length: int, file: h5py.File
+) -> None:
+    """Copy the first `length` samples; rebuild what is derived from them."""
     samples, _, _ = run.column(name)
-    size = samples.chunks[0]
-    new = create_channel(file, name, samples.dtype, size)
+    new = create_channel(file, name, samples.dtype, salvage.size)
     new.attrs.update(samples.attrs)
     new.resize(length, axis=0)
-    checks, bins = [], []
-    for first in range(0, length, size):
-        codes = samples[first : min(first + size, length)]
-        if codes.size == size:
-            mask, raw = samples.id.read_direct_chunk((first,))
-            new.id.write_direct_chunk((first,), raw, mask)
-        else:
-            new[first:] = codes
+    checks, bins = [], [pyramid_of(np.empty(0, samples.dtype))]
+    for first in range(0, length, salvage.size):
+        codes = salvage.chunk(first // salvage.size)
+        assert codes is not None, "it was there when samples were counted"
+        codes = codes[: length - first]
+        new[first : first + codes.size] = codes
         checks.append((codes.size, zlib.crc32(codes.data)))
         bins.append(pyramid_of(codes))
     for kind, rows in (
         ("checks", np.array(checks, CHECK)),
-        ("pyramid", np.concatenate([pyramid_of(samples[:0]), *bins])),
+        ("pyramid", np.concatenate(bins)),
     ):
         file[f"{kind}/{name}"].resize(rows.size, axis=0)
         file[f"{kind}/{name}"][:] = rows

@@ -11,21 +11,23 @@ from tactile_lab.errors import RecordingError
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
+from tactile_lab.store.places import PLACES, read_places
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
 PAGE, CHUNK = 4096, 1024
-SAMPLES, BLOCK, SYNC = 60_000, 500, 10_000
+SAMPLES, BLOCK, SYNC = 150_000, 500, 2000
+FILES = (DATA, PLACES)
 
 
 @pytest.fixture(scope="module")
 def cut_runs(bench, tmp_path_factory):
-    """A running run: its folder, its codes, and (samples written, file) per sync."""
+    """A running run: its folder, its codes, and (samples written, files) per sync."""
     layout = Layout(signals=bench.SIGNALS, detection=bench.DETECTION, simulated=True)
     folder = RunFolder.create(tmp_path_factory.mktemp("cut"), "pulses", {})
-    recorder = Recorder(folder, layout, reserve=0)
+    recorder = Recorder(folder, layout, reserve=0, sync=True)
     made = bench.codes(SAMPLES)
     recorder.segment(bench.stream(), 0.0)
     synced = []
@@ -34,8 +36,8 @@ def cut_runs(bench, tmp_path_factory):
         recorder.current(first * 1e-3, 0.1, 0.1)
         if (first + BLOCK) % SYNC == 0:
             recorder._guard(recorder._flush)
-            data = (folder.path / DATA).read_bytes()
-            synced.append((recorder._columns[0].written, data))
+            files = [(folder.path / name).read_bytes() for name in FILES]
+            synced.append((recorder._columns[0].written, files))
     left = tmp_path_factory.mktemp("left") / "run"
     shutil.copytree(folder.path, left)
     recorder.close("complete", SAMPLES)
@@ -55,11 +57,14 @@ def after_the_cut(old, new, chance, rng):
 def test_what_was_synced_survives_whatever_else_arrived(cut_runs, tmp_path, seed):
     left, made, synced = cut_runs
     rng = random.Random(seed)
-    number = rng.randrange(len(synced) - 1)
-    (written, old), (_, new) = synced[number], synced[number + 1]
+    # most chunks share a block of places when there are many
+    number = rng.randrange(len(synced) // 2, len(synced) - 1)
+    (written, before), (_, after) = synced[number], synced[number + 1]
     path = tmp_path / "run"
     shutil.copytree(left, path)
-    (path / DATA).write_bytes(after_the_cut(old, new, rng.random(), rng))
+    chance = rng.random()
+    for name, old, new in zip(FILES, before, after, strict=True):
+        (path / name).write_bytes(after_the_cut(old, new, chance, rng))
     recovery = recover(path)
     assert recovery.samples >= written // CHUNK * CHUNK  # the last was being filled
     assert verify(path).sound
@@ -67,6 +72,37 @@ def test_what_was_synced_survives_whatever_else_arrived(cut_runs, tmp_path, seed
         kept = run.signal("V_K").scope_codes(0, recovery.samples)
         np.testing.assert_array_equal(kept, made[1, : recovery.samples])
         assert run.current["time"].size * BLOCK >= written
+
+
+def test_a_run_that_ended_well_needs_no_noted_places(cut_runs, bench, folder):
+    layout = Layout(signals=bench.SIGNALS, detection=bench.DETECTION, simulated=False)
+    recorder = Recorder(folder, layout, reserve=0)
+    bench.play(recorder, bench.codes(4000), 500)
+    noted = read_places(folder.path / PLACES)
+    assert set(noted["signal"]) == {b"V_C1", b"V_K"}
+    assert noted["chunk"].max() == 2
+    recorder.close("complete", 4000)
+    assert not (folder.path / PLACES).exists()
+
+
+def test_samples_are_found_by_their_noted_places_alone(cut_runs, tmp_path):
+    """HDF5's index of one channel is gone; its chunks are not."""
+    left, made, synced = cut_runs
+    path = tmp_path / "run"
+    shutil.copytree(left, path)
+    written, files = synced[-1]
+    data = bytearray(files[0])
+    at, blocks = data.find(b"EADB"), 0  # an extensible array's data blocks
+    while at >= 0:
+        data[at + 20] ^= 0xFF
+        at, blocks = data.find(b"EADB", at + 1), blocks + 1
+    assert blocks > 2
+    (path / DATA).write_bytes(data)
+    (path / PLACES).write_bytes(files[1])
+    assert recover(path).samples >= written // CHUNK * CHUNK
+    with Run.load(path) as run:
+        found = run.signal("V_C1").scope_codes(0, run.samples)
+        np.testing.assert_array_equal(found, made[0, : run.samples])
 
 
 def test_a_measured_run_is_synced_again_and_again(bench, folder, monkeypatch):
