@@ -22,6 +22,7 @@ class ForceCheck(ForceProtocol):
     name: ClassVar[str] = "force_check"
     title: ClassVar[str] = "Force check"
     signals: ClassVar[tuple[str, ...]] = ("force", "coil_current", "field")
+    as_wired: ClassVar[bool] = True
 
     levels: tuple[Force, ...] = Field(
         default=(0.05, 0.1, 0.0, -0.05), min_length=1, description="Force by Eq. (2)"

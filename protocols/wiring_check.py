@@ -28,6 +28,7 @@ class WiringCheck(Protocol):
     signals: ClassVar[tuple[str, ...]] = (
         "force", "coil_current", "field", "V_C1", "V_C2", "V_K",
     )  # fmt: skip
+    as_wired: ClassVar[bool] = True
     sees_supply: ClassVar[bool] = True
 
     calibrate: bool = Field(

@@ -104,6 +104,8 @@ class Protocol(BaseModel):
         "force", "coil_current", "V_C1", "V_C2", "V_K", "spikes",
     )  # fmt: skip
     """Signals recorded unless the scene says otherwise."""
+    as_wired: ClassVar[bool] = False
+    """Of those, what the bench does not measure is left out without complaint."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Signals the generator looks at in outcomes: acquired even when not recorded."""
 

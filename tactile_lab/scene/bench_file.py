@@ -309,6 +309,15 @@ class BenchSpec:
     notes: str
     table: BenchTable
 
+    def measures(self, signal: str) -> bool:
+        """Whether an instrument of this bench measures that signal by itself."""
+        wired = () if self.scope is None else self.scope.channels
+        meter = self.field_meter
+        by_itself = meter is not None and meter.driver != "manual"
+        return any(channel.signal == signal for channel in wired) or (
+            signal == "field" and by_itself
+        )
+
     @classmethod
     def of(cls, table: BenchTable, path: Path | None, folder: Path) -> BenchSpec:
         """The bench described by `table`; its files are found relative to `folder`.

@@ -24,6 +24,7 @@ from tactile_lab.scene.complaint import Blame, complaint, validated, written
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.sensor import SensorTable
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
+from tactile_lab.signals import SIGNALS
 from tactile_lab.trial import Protocol
 
 TABLES = (
@@ -99,7 +100,14 @@ def resolve(
     if not record.signals:
         if "signals" in frozen.get("record", {}):
             raise complaint(("record", "signals"), "name at least one signal.", blame)
-        record = record.model_copy(update={"signals": tuple(protocol.signals)})
+        signals = [
+            name
+            for name in protocol.signals
+            if not protocol.as_wired
+            or SIGNALS[name].source != "measured"
+            or spec.measures(name)
+        ]
+        record = record.model_copy(update={"signals": tuple(signals)})
     return Scene(
         name=path.stem,
         path=path,

@@ -113,6 +113,40 @@ def test_a_mistake_that_cannot_be_made_is_refused(mistake):
         load("wiring_check", [f"simulated.{mistake}"])
 
 
+BARE = """
+name = "no meter, no shunt"
+simulated = true
+[coil]
+[magnet]
+r = "6 mm"
+[scope]
+[[scope.channels]]
+signal = "V_C1"
+input = "A"
+[[scope.channels]]
+signal = "V_K"
+input = "B"
+"""
+
+
+def test_what_the_bench_does_not_measure_is_not_checked(tmp_path):
+    (tmp_path / "bare.toml").write_text(BARE)
+    scene = load("wiring_check", SHORT, bench=str(tmp_path / "bare.toml"))
+    done = Execution(scene, tmp_path / "runs").run()
+    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    channels = find(read(done.folder)).conclusion.values["channels"]
+    assert {name: c["ok"] for name, c in channels.items()} == {
+        "V_C1": True,
+        "V_K": True,
+    }
+
+
+def test_a_force_check_needs_neither_teslameter_nor_shunt(tmp_path):
+    (tmp_path / "bare.toml").write_text(BARE)
+    scene = load("force_check", bench=str(tmp_path / "bare.toml"))
+    assert scene.record.signals == ("force",)
+
+
 def test_without_calibration_swapped_channels_are_still_named(tmp_path):
     values, _ = checked(
         tmp_path, "protocol.calibrate=false", wired={"A": "V_C2", "B": "V_C1"}
