@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.analysis.identify import Identified, identify
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.twinned import displaced
+from tactile_lab.waveform import Waveform
+
+LAG = 0.03
+"""Time after a step of the current until the field has followed, s: the coil's L/R and
+the core's eddy currents, which the model does not know, last some milliseconds."""
 
 
 def identify_run(run: RunData, names: Sequence[str]) -> Identified:
@@ -31,6 +37,7 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
     seen = None
     if trace is not None:
         inside = (trace.time >= 0) & (trace.time <= run.duration)
+        inside &= settled(run.force, trace.time)
         code = trace.code or 0.0
         seen = Measured("V_C1", trace.time[inside], trace.mean[inside], code)
     return identify(
@@ -42,3 +49,12 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
         spike_times=spikes[spikes <= run.duration] if run.searched else None,
         displaced=displaced(run),
     )
+
+
+def settled(force: Waveform, time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which bins (middles, s) lie wholly beyond `LAG` of the step before."""
+    steps = np.append(-np.inf, force.time[1:][np.diff(force.value) != 0])
+    half = float(np.median(np.diff(time))) / 2 if time.size > 1 else 0.0
+    last = steps[np.searchsorted(steps, time + half, side="right") - 1]
+    beyond: NDArray[np.bool_] = time - half - last > LAG
+    return beyond

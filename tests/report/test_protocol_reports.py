@@ -13,6 +13,7 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.report.figure import figure
 from tactile_lab.report.findings import find
+from tactile_lab.report.identified import identify_run, settled
 from tactile_lab.report.run_data import RunData, Trace, TrialData
 from tactile_lab.report.splice import spliced
 from tactile_lab.report.summary import summary
@@ -331,3 +332,19 @@ def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_pa
     assert "Not determined" in report.html.read_text(encoding="utf-8")
     assert sum(t.response.spikes for t in report.findings.trials) > 30
     assert report.html.exists()
+
+
+def test_identification_leaves_out_the_field_s_lag(rate_force):
+    steps = np.array([1.0, 1.0, 2.0, 2.0])
+    force = Waveform(np.r_[0.0, steps, 3.0], np.array([0, 0, 0.1, 0.1, 0, 0]))
+    time = np.arange(0.005, 3, 0.01)
+    late = ~settled(force, time)
+    assert late.sum() == 8
+    assert np.all((time[late] - np.floor(time[late])) < 0.04)
+    # V_C1 that comes some milliseconds late, as behind a real core
+    trace = rate_force.trace("V_C1")
+    lagging = replace(trace, mean=np.interp(trace.time - 4e-3, trace.time, trace.mean))
+    run = replace(rate_force, traces=(lagging,), searched=False)
+    found = identify_run(run, ("V_GS", "tau")).estimates
+    assert found["tau"].value == pytest.approx(8.69, rel=0.05)
+    assert found["V_GS"].value == pytest.approx(1.4, abs=2e-3)
