@@ -96,7 +96,7 @@ def one(rate: float, seconds: float, root: Path) -> str:
     assert stream is not None
     folder = RunFolder.create(root, "sustained", {})
     layout = Layout(signals=SIGNALS, detection=DETECTION, simulated=True)
-    recorder = RecorderThread(Recorder(folder, layout), when_full="error")
+    recorder = RecorderThread(Recorder(folder, layout, sync=True), when_full="error")
     intake.begin(stream, 0.0, recorder, detector, ROW)
     worked, began, ended, fullest = time.process_time(), time.monotonic(), "", 0.0
     try:
