@@ -194,6 +194,7 @@ def write_calibration(
     *,
     coil: str,
     date: datetime.date,
+    temperature: str = "not known",
     valid_days: int = 180,
 ) -> Path:
     """Write the file a bench's ``[magnet] calibration`` names; never over another.
@@ -203,6 +204,7 @@ def write_calibration(
         calibration: what to write.
         coil: the coil or source it belongs to, as the bench names it.
         date: day of the measurement.
+        temperature: of the room meanwhile, and who says so.
         valid_days: after so many days it has expired.
 
     Raises:
@@ -221,6 +223,7 @@ def write_calibration(
         f"{calibration.slope.high:.6g})",
         "loop half-width T": f"{calibration.half_width:.3g}",
         "drift T": _known(calibration.drift),
+        "temperature": temperature,
         "winding warmed by K": _known(calibration.warming),
         UNCERTAINTY["T"]: f"{calibration.uncertainty:.3g}",
     }

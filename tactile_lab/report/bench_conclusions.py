@@ -88,7 +88,8 @@ def write_calibration_file(folder: Path, run: RunData) -> Path | None:
     except (NotIdentifiableError, ValueError):
         return None  # the report's own sentence says why
     coil = run.settings.get("coil", {}).get("identity", run.bench)
-    return write_calibration(path, found, coil=coil, date=date)
+    temperature = run.conditions.get("temperature", "not known")
+    return write_calibration(path, found, coil=coil, date=date, temperature=temperature)
 
 
 def field_steps(run: RunData, trials: Sequence[TrialData]) -> list[FieldStep]:

@@ -18,6 +18,7 @@ SHORT = (
     "protocol.loops=0",
     "protocol.dwell=0.5 s",
     "record.sample_rate=2 kS/s",
+    "conditions.temperature=22.5 °C",
 )
 
 
@@ -47,6 +48,7 @@ def test_the_file_tells_its_origin_and_covers_what_was_measured(calibrated):
     assert {"coil", "date", "valid until", "drift T", "winding warmed by K"} <= set(
         used.head
     )
+    assert used.head["temperature"] == "22.5 °C (entered)"
     assert used.at(0.3) == pytest.approx(0.3 * 0.011, abs=1e-5)
     with pytest.raises(LimitError, match="outside the calibration"):
         used.at(0.6)
