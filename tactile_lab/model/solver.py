@@ -230,7 +230,8 @@ def _warnings(
     if S[spiking.SATURATED]:
         found.append(
             "Spikes occur with V_C1 below V_fire - 0.5 V, where a real T1 saturates "
-            "and the circuit stops firing; Eqs. (16)-(18) cannot show it."
+            "and the circuit stops firing; Eq. (17) cannot show it, saturation = true "
+            "does."
         )
     if S[spiking.DOUBT]:
         found.append(
