@@ -61,7 +61,16 @@ class Actions(QObject):
             for keys in () if key.single else key.keys:
                 self._bind(keys, key)
         self._bind_stop()
-        panels.header.help_asked.connect(self.show_help)
+        panels.header.help_asked.connect(lambda: self.show_help())
+        for button, topic in (
+            (panels.setup.help, "Protocol"),
+            (panels.centre.tools.help, "Lanes"),
+            (panels.centre.log.help, "Steps and log"),
+        ):
+            button.clicked.connect(lambda _=False, topic=topic: self.show_help(topic))
+        panels.review.help.clicked.connect(
+            lambda: self.show_help(("Results", "Runs", "Manual")[panels.review.tab])
+        )
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
 
@@ -131,7 +140,12 @@ class Actions(QObject):
             Key(("F8",), "Fold the right panel", lambda: self._fold(panels.review)),
             Key(("F11",), "Lanes only", self._focus),
             Key(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
-            Key(("?", "F1"), "Help and shortcuts", self.show_help, single=True),
+            Key(
+                ("?", "F1"),
+                "Help and shortcuts",
+                lambda: self.show_help(),
+                single=True,
+            ),
         ]
 
     def _nudge(self, way: int) -> None:
@@ -182,11 +196,12 @@ class Actions(QObject):
 
         export_view(self._panels, self._opening.run)
 
-    def show_help(self) -> None:
-        """Show the shortcut list and the help of the panels."""
+    def show_help(self, topic: str = "") -> None:
+        """Show the shortcut list and the help of the panels, at a topic."""
         from gui.dialogs.help import show_help
 
-        show_help(self._window, [(", ".join(key.keys), key.words) for key in self.keys])
+        keys = [(", ".join(key.keys), key.words) for key in self.keys]
+        show_help(self._window, keys, topic)
 
     def connect_dialog(self) -> None:
         """Show the connect dialog."""
@@ -213,7 +228,7 @@ class Actions(QObject):
             one.setChecked(theme.choice == word)
         menu.addSeparator()
         menu.addAction("Copy command line", self._copy_command)
-        menu.addAction("Help and shortcuts", self.show_help)
+        menu.addAction("Help and shortcuts", lambda: self.show_help())
         menu.addAction("Quit", self._window.close)
         button = panels.header.menu_button
         menu.popup(button.mapToGlobal(QPoint(0, button.height())))

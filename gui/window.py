@@ -114,6 +114,9 @@ class Window(QMainWindow):
         """Fold a side panel by hand; the window's width no longer decides."""
         self._folds[side] = folded
         side.setVisible(not folded)
+        if not folded and self.width() < NARROW:  # there is room for one of them
+            other = self.setup if side is self.review else self.review
+            other.setVisible(False)
 
     # --- closing
 
@@ -183,6 +186,8 @@ class Window(QMainWindow):
         for side, limit in ((self.review, NARROW + 40), (self.setup, 0)):
             if self._folds[side] is None:
                 side.setVisible(width >= limit)
+        if width < NARROW and self.setup.isVisible():  # whatever was unfolded by hand
+            self.review.setVisible(False)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take the single-key shortcuts."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.parts import Segments, column, label, push, scrolling
@@ -19,34 +19,69 @@ PANELS = (
         "source off at its front panel. Only hardware is a real interlock.",
     ),
     (
-        "Protocol (left)",
+        "Protocol",
         "Choose a protocol; its form is made from its typed parameters. A blue mark "
         "is a value changed from its default, red says why a value cannot be used. The "
-        "form is locked while running; Queue has a run follow. The preview is the "
-        "force as the coil will really play it.",
+        "star keeps the parameters under a name, as a scene in the folder presets. The "
+        "form is locked while running. The preview is the force as the coil will "
+        "really play it; below it stands what the run costs.",
     ),
     (
-        "Lanes (centre)",
+        "Queue",
+        "Queue has a run follow; so does a scene or a run dropped while one is in "
+        "progress. Waiting runs show their cost and can be moved and taken out. After "
+        "a STOP or a fault the queue is held until you resume it.",
+    ),
+    (
+        "Lanes",
         "Colour: measured, thin grey: what the model expects, also ahead of now. V_C1, "
         "V_C2 and V_K show the mean of each pixel column over a tint of its extremes, "
         "so that nothing is hidden. Wheel zooms, Shift+wheel or dragging pans, double "
-        "click shows all. What the scene does not record has no lane.",
+        "click shows all. What the scene does not record has no lane. The residual is "
+        "measured V_C1 less the model's; the green band is ±50 mV.",
     ),
     (
-        "Residual",
-        "Measured V_C1 less the model's, averaged; the green band is ±50 mV.",
+        "Monitor",
+        "Between runs: V_C1, V_C2, the rate and the distance to the threshold with the "
+        "coil off, for trimming V_GS by hand. Record keeps what was seen, up to the "
+        "last 60 s, as a run.",
     ),
     (
-        "Results, Runs, Manual (right)",
-        "Results are preliminary while the run lasts. Runs opens old runs in the same "
-        "lanes, runs them again or compares two or three. Manual drives the coil by "
-        "hand within its limits; if this window hangs, the coil is switched off.",
+        "Steps and log",
+        "One block per step, with the time left. The log tells what happened; filter "
+        "it, or add a note: it is stamped with the run's time and kept with the run.",
+    ),
+    (
+        "Results",
+        "Fits are preliminary while the run lasts: the force of onset, the slope of "
+        "the peak rate, the adaptation's time constant and the fall in the hold, each "
+        "beside the model's. Bars tell how far the run is from the model: the root "
+        "mean square over the range of each voltage, and the median offset of spikes.",
+    ),
+    (
+        "Runs",
+        "Enter or double click opens a run in the same lanes. Re-run puts its settings "
+        "into the form, or into the queue while a run is in progress. Tick two or "
+        "three to compare them, stacked or laid over each other.",
+    ),
+    (
+        "Manual",
+        "Drives the coil within its limits, reads the field, and sets range, offset "
+        "and coupling of the scope's inputs for all runs that follow. If this window "
+        "hangs for 2 s, the coil is switched off.",
+    ),
+    (
+        "Connect instruments",
+        "Asks ports and devices for their names, suggests driver and row, tests, and "
+        "saves a bench file. Its other pages run the wiring check and the field "
+        "calibration, show verdicts and loop, and put the calibration into the bench.",
     ),
     (
         "Command line",
         "Everything the window does has a command: menu, Copy command line.",
     ),
 )
+"""Title and text of each topic; panels open the help at theirs."""
 
 
 class Help(Overlay):
@@ -54,6 +89,8 @@ class Help(Overlay):
 
     def __init__(self, window: QWidget, keys: Sequence[tuple[str, str]]) -> None:
         super().__init__(window, 640)
+        self.topic = ""
+        self._titles: dict[str, QLabel] = {}
         self._pages = (self._panels(), self._shortcuts(keys))
         choice = Segments(["Panels", "Shortcuts"], "Help page")
         choice.group.idClicked.connect(self._show)
@@ -76,6 +113,14 @@ class Help(Overlay):
         whole.addLayout(foot)
         self._show(0)
 
+    def show_topic(self, topic: str) -> None:
+        """Open the first page at a topic; "" is its start."""
+        self.topic = topic
+        self._show(0)
+        title = self._titles.get(topic)
+        top = 0 if title is None else title.y()
+        self._areas[0].verticalScrollBar().setValue(top)
+
     def _show(self, number: int) -> None:
         self._choice.choose(number)
         for at, area in enumerate(self._areas):
@@ -85,7 +130,8 @@ class Help(Overlay):
         page = QWidget()
         rows = column(page, spacing=4)
         for title, text in PANELS:
-            rows.addWidget(label(title, "title"))
+            self._titles[title] = label(title, "title")
+            rows.addWidget(self._titles[title])
             words = label(text, "", wrap=True)
             words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             rows.addWidget(words)
@@ -109,9 +155,12 @@ class Help(Overlay):
         return page
 
 
-def show_help(window: QWidget, keys: Sequence[tuple[str, str]]) -> None:
-    """Open the help."""
+def show_help(
+    window: QWidget, keys: Sequence[tuple[str, str]], topic: str = ""
+) -> None:
+    """Open the help, at a topic."""
     found = window.findChild(Help)
     shown = found if isinstance(found, Help) else Help(window, keys)
     shown.open()
+    shown.show_topic(topic)
     shown.close_button.setFocus()

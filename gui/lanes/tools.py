@@ -73,6 +73,7 @@ class Tools(QWidget):
         )
         self.lanes = IconButton(theme, "layers", "Choose lanes")
         self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
+        self.help = IconButton(theme, "help", "Help on the lanes")
         self._readout = QLabel()
         self._texts = [
             self.follow,
@@ -203,6 +204,7 @@ class Tools(QWidget):
         row.addWidget(self.monitor)
         row.addWidget(self.lanes)
         row.addWidget(self.export)
+        row.addWidget(self.help)
         self._readout.setSizePolicy(
             QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed
         )

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import Segments, column, label
+from gui.parts import IconButton, Segments, column, label
 from gui.session.messages import Level, Line
 
 Index = QModelIndex | QPersistentModelIndex
@@ -123,6 +123,7 @@ class LogView(QWidget):
         self.filter.setSourceModel(self.model)
         self.choices = Segments(["All", "Warnings", "Safety", "Notes"], "Log filter")
         self.choices.choose(0)
+        self.help = IconButton(theme, "help", "Help on steps and log")
         self.note = QLineEdit()
         self.note.setPlaceholderText("Add a time-stamped note …  (N)")
         self.note.setAccessibleName("Note")
@@ -180,6 +181,7 @@ class LogView(QWidget):
         top.addWidget(self.choices)
         top.addStretch(1)
         top.addWidget(self.note, 1)
+        top.addWidget(self.help)
         whole = column(self, spacing=6)
         whole.addLayout(top)
         whole.addWidget(table, 1)

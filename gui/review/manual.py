@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSlider, QWidget
 from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
 from gui.review.scope_inputs import ScopeInputs
-from gui.state import CoilView, Snapshot, State, milliamperes
+from gui.state import CoilView, Snapshot, State, Truth, milliamperes, truth
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse, show
 from tactile_lab.scene.bench_file import BenchSpec
@@ -98,7 +98,10 @@ class ManualView(QWidget):
 
     def _show_coil(self, coil: CoilView | None) -> None:
         self._now.setText("—" if coil is None else milliamperes(coil.current))
-        if coil is None or coil.current is None or coil.output is not True:
+        what = truth(State.READY, coil)
+        if what is Truth.UNKNOWN:
+            self._force.setText("state unknown: look at the source")
+        elif coil is None or coil.current is None or coil.output is not True:
             self._force.setText("output off" if coil is not None else "")
         else:
             force = show(round(coil.current * self._gain, 6), "N", 3)

@@ -245,6 +245,7 @@ class SetupPanel(QFrame):
         elided(self.source, f"scene: {name}")
 
     def _lay_out(self) -> None:
+        self.help = IconButton(self._theme, "help", "Help on this panel")
         self._open = IconButton(self._theme, "folder", "Open a scene (Ctrl+O)")
         self._open.clicked.connect(self.scene_wanted)
         self._reset = IconButton(self._theme, "undo", "Reset to defaults")
@@ -255,6 +256,7 @@ class SetupPanel(QFrame):
         head.addWidget(self.star)
         head.addWidget(self._open)
         head.addWidget(self._reset)
+        head.addWidget(self.help)
         buttons = QHBoxLayout()
         buttons.setSpacing(8)
         buttons.addWidget(self.run, 3)

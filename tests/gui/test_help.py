@@ -1,0 +1,39 @@
+"""Help opens at the panel that asked for it."""
+
+from gui.dialogs.help import PANELS, Help
+
+
+def test_each_panel_opens_the_help_at_its_own_topic(lab) -> None:
+    window = lab.window
+    for button, topic in (
+        (window.setup.help, "Protocol"),
+        (window.centre.tools.help, "Lanes"),
+        (window.centre.log.help, "Steps and log"),
+    ):
+        button.click()
+        shown = window.findChild(Help)
+        assert shown.isVisible() and shown.topic == topic
+        shown.hide()
+    for tab, topic in enumerate(("Results", "Runs", "Manual")):
+        window.review.show_tab(tab)
+        window.review.help.click()
+        assert window.findChild(Help).topic == topic
+        window.findChild(Help).hide()
+    window.review.show_tab(0)
+
+
+def test_every_topic_says_something() -> None:
+    assert len({title for title, _ in PANELS}) == len(PANELS)
+    assert all(len(text) > 40 for _, text in PANELS)
+
+
+def test_narrow_window_has_room_for_one_side_only(lab) -> None:
+    window = lab.window
+    window.resize(1180, 720)
+    window.fold(window.review, False)
+    assert window.review.isVisible() and not window.setup.isVisible()
+    window.fold(window.setup, False)
+    assert window.setup.isVisible() and not window.review.isVisible()
+    window.resize(1720, 1080)
+    window.fold(window.review, False)
+    assert window.setup.isVisible() and window.review.isVisible()
