@@ -62,9 +62,11 @@ def link() -> Iterator[SerialLink]:
 
 
 def drive(coil: CoilSource, current: float, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        coil.set_current(current)
+    """For `seconds`, and until the slew limit has let the set-point arrive."""
+    begun, reached = time.monotonic(), False
+    while (spent := time.monotonic() - begun) < seconds or not reached:
+        assert spent < seconds + 60, "the set-point does not arrive"
+        reached = coil.set_current(current) == current
         time.sleep(coil.update_interval)
 
 
