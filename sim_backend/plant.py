@@ -120,10 +120,16 @@ class Plant(DrivenCoil):
         """How far the computed circuit is from its equations' exact solution."""
         with self._lock:
             time, volts = self._sensor.error_spike_time, self._sensor.error_V_C1
+        told = []
+        if time > 0:
+            told.append(f"spike times within {time:.1e} s")
+        if volts > 0:
+            told.append(f"V_C1 within {volts:.1e} V")
+        if not told:  # nothing of the circuit was computed
+            return ""
         return (
-            f"Simulated circuit, by its own estimate: spike times within {time:.1e} s "
-            f"and V_C1 within {volts:.1e} V of the exact solution; force between "
-            "set-points within 1e-4 of a step."
+            f"Simulated circuit, by its own estimate: {' and '.join(told)} of the "
+            "exact solution; force between set-points within 1e-4 of a step."
         )
 
     def render(

@@ -19,6 +19,9 @@ from tactile_lab.report.table import NONE, table
 from tactile_lab.report.trial_finding import TrialFinding
 from tactile_lab.report.twinned import sentences
 
+LONG = 12
+"""Rows of a table one reads before anything else."""
+
 
 def page(findings: Findings, pictures: Mapping[str, tuple[str, str]]) -> str:
     """The report as one HTML page.
@@ -47,9 +50,7 @@ def page(findings: Findings, pictures: Mapping[str, tuple[str, str]]) -> str:
         _list("warning", "Warnings", run.warnings),
         _list("warning", "Not determined", findings.missing),
         _list("conclusion", "Result", findings.conclusion.sentences),
-        _results(findings),
-        _figure(findings, pictures.get("summary")),
-        _figure(findings, pictures.get("figure")),
+        *_trials_and_figures(findings, pictures),
         _beside(findings),
         _figure(findings, pictures.get("twin")),
         _drift(findings, pictures.get("drift")),
@@ -120,6 +121,16 @@ def _legend(findings: Findings) -> str:
             else ""
         )
     )
+
+
+def _trials_and_figures(
+    findings: Findings, pictures: Mapping[str, tuple[str, str]]
+) -> tuple[str, ...]:
+    """A short table stands before the figures, a long one after them."""
+    drawn = tuple(_figure(findings, pictures.get(n)) for n in ("summary", "figure"))
+    if len(findings.trials) > LONG:
+        return *drawn, _results(findings)
+    return _results(findings), *drawn
 
 
 def _figure(findings: Findings, picture: tuple[str, str] | None) -> str:

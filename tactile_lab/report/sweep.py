@@ -36,6 +36,11 @@ def responses(run: RunData, trials: Sequence[TrialFinding], trace: Trace) -> lis
     return found
 
 
+def degrees(phase: float) -> float:
+    """Between -360 and 0: V_C1 falls when the force rises, and lags."""
+    return float(np.degrees(phase)) - (360.0 if phase > 0 else 0.0)
+
+
 def known_gain(run: RunData, found: Gain) -> Estimate:
     """The gain with its noise and the force's uncertainty."""
     gain = Estimate.of(found.gain, found.error, LARGE)
@@ -58,7 +63,7 @@ def sine_sweep(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     known = [(g, known_gain(run, g)) for g in found]
     said = "; ".join(
         f"{g.frequency:.3g} Hz {u.value:.3g} ± {(u.high - u.low) / 2:.2g} V/N at "
-        f"{np.degrees(g.phase):.0f}°"
+        f"{degrees(g.phase):.0f}°"
         for g, u in known
     )
     sentences = [f"V_C1 answers force with {said} (95 %).".replace("-", "−")]

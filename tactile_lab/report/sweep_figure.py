@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import BOX, HEIGHT, WIDTH, axes, blank
 from tactile_lab.report.findings import Findings
-from tactile_lab.report.sweep import known_gain, responses
+from tactile_lab.report.sweep import degrees, known_gain, responses
 
 
 def sweep_figure(findings: Findings) -> Figure | None:
@@ -41,12 +41,12 @@ def sweep_figure(findings: Findings) -> Figure | None:
         label="simulated bench" if run.simulated else "measured",
         **look,
     )
-    lower.plot(at, [_degrees(g.phase) for g in found], "o", **look)
+    lower.plot(at, [degrees(g.phase) for g in found], "o", **look)
     if expected:
         there = [g.frequency for g in expected]
         look = {"color": palette.TWIN.light, "lw": 1.0, "ls": (0, (4, 2))}
         upper.plot(there, [g.gain for g in expected], label="model", **look)
-        lower.plot(there, [_degrees(g.phase) for g in expected], **look)
+        lower.plot(there, [degrees(g.phase) for g in expected], **look)
     upper.set_ylim(bottom=0)
     upper.set_ylabel("Gain (V/N)")
     lower.set_ylabel("Phase (°)")
@@ -63,8 +63,3 @@ def sweep_figure(findings: Findings) -> Figure | None:
         loc="lower right", frameon=False, fontsize=7.5, labelcolor=palette.INK.light
     )
     return drawn
-
-
-def _degrees(phase: float) -> float:
-    """Between -360 and 0: V_C1 falls when the force rises, and lags."""
-    return float(np.degrees(phase)) - (360.0 if phase > 0 else 0.0)

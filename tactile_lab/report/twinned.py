@@ -87,7 +87,8 @@ def sentences(run: RunData, found: Twin) -> tuple[str, ...]:
             if residual.signal == "V_C2" and found.spikes is not None
             else ""
         )
-        offset = f"{residual.offset * 1e3:+.1f}".replace("-", "−")
+        # adding 0 makes a rounded -0 plain
+        offset = f"{round(residual.offset * 1e3, 1) + 0.0:+.1f}".replace("-", "−")
         said.append(
             f"{residual.signal}: measured less model is {offset} mV on average, "
             f"{residual.rms * 1e3:.1f} mV rms, within {residual.band * 1e3:.1f} mV for "
