@@ -60,8 +60,8 @@ def wiring_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
             f"{verdict.text}{said}."
         )
     sentences += [
-        f"{name}: offset {show(c.offset, 'V', 2)}, gain {c.gain:.3f} by 0 V and V_S; "
-        f"it is known to ±{show(2 * c.error, 'V', 2)} (95 %)."
+        f"{name}: offset {show(c.offset, 'V', 2)}, gain {c.gain:.3f} by 0 V and V_S, "
+        f"then known to ±{show(2 * c.error, 'V', 2)} (95 %)."
         for name, c in calibrations.items()
     ]
     values: dict[str, Any] = {"channels": channels}
@@ -145,8 +145,11 @@ def _hum(run: RunData, trace: Trace | None, window: Window) -> tuple[float | Non
     except NotIdentifiableError:
         return None, ""
     half = (trace.code or CODE) / abs(trace.scale) / 2
-    said = f"{1e3 * size:.2g} mV" if size > half else f"below {1e3 * half:.2g} mV"
-    return size, f"; {mains:g} Hz hum {said} (half a code is {1e3 * half:.2g} mV)"
+    # half a code of the converter is as fine as it can be told
+    said = f"{1e3 * size:.2g} ± {1e3 * half:.2g} mV"
+    if size <= half:
+        said = f"below {1e3 * half:.2g} mV"
+    return size, f"; {mains:g} Hz hum {said}"
 
 
 def _gate(
