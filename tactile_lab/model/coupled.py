@@ -296,7 +296,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
                     flow(B, y, v, False, par, f)
                     flow(B, y, v, True, par, g)
-                    slope = max(f[TO_C2], 1e-300)
+                    # where it only grazes V_fire, the step is all that is known
+                    slope = max(f[TO_C2], (error_2 + math.sqrt(E[E_22])) / h)
                     late = (par[V_FIRE] - v) / slope
                     error = math.sqrt(E[E_22]) / slope + EPS * (t + s)
                     # does the series stay above V_fire by more than its error?

@@ -80,6 +80,40 @@ def test_rates_agree_with_transistors_in_ngspice(netlist):
     assert silenced >= 4
 
 
+PUSH = Waveform.through([(0, 0), (0.02, 0), (0.02, 0.205), (0.15, 0.205), (0.25, 0)])
+
+
+@pytest.fixture(scope="module")
+def highest():
+    """The highest V_C2 under PUSH without a spike, V; T1 saturates on the way."""
+    found = simulate(
+        Circuit(saturation=True, V_th=10.0), PUSH, until=0.4, keep=("V_C2",)
+    )
+    low, high = 0.02, 0.4
+    for _ in range(40):
+        times = np.linspace(low, high, 201)
+        V = found.sample("V_C2", times)
+        k = int(np.argmax(V))
+        low, high = times[max(k - 1, 0)], times[min(k + 1, 200)]
+    assert 2.0 < V[k] < 4.5 and 0.1 < times[k] < 0.39
+    return float(V[k])
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-10, -1e-10, -1e-6])
+def test_a_spike_that_only_just_happens_or_not_is_decided(highest, gap):
+    circuit = Circuit(saturation=True, V_th=highest * (1 - gap))
+    found = simulate(circuit, PUSH, until=0.4)
+    assert (found.spike_times.size > 0) == (gap > 0)
+    assert np.isfinite(found.end.error_V_C2)
+
+
+def test_what_cannot_be_decided_is_said(highest):
+    found = simulate(Circuit(saturation=True, V_th=highest), PUSH, until=0.4)
+    assert any("cannot be decided" in text for text in found.warnings)
+    assert np.isfinite(found.error.spike_time)
+    assert np.isfinite([found.end.V_C1, found.end.V_C2, found.end.error_V_C2]).all()
+
+
 def test_rest_is_an_equilibrium_of_both_voltages():
     V_C1, V_C2 = rest_point(SENSOR)
     I_C, I_B = T1_currents(SENSOR, V_C1, V_C2)
