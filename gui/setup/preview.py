@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
 from gui.lanes.axis import decimals, number, step_of, ticks
-from gui.lanes.decimate import Drawn
+from gui.lanes.decimate import line_between
 from gui.lanes.expected import Preview
 from gui.lanes.paint import Frame
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 
 HEIGHT = 118
+LEFT, RIGHT = 38, 8
+"""Margins of the plot, px."""
 
 
 class WaveformPreview(QWidget):
@@ -27,6 +29,8 @@ class WaveformPreview(QWidget):
         self._preview: Preview | None = None
         self._problem = ""
         self._head: float | None = None
+        self._drawn = QPixmap()
+        self._drawn_of: tuple[object, ...] = ()
         self.setFixedHeight(HEIGHT)
         self.setAccessibleName("Force of the next run against time")
         theme.changed.connect(self.update)
@@ -44,8 +48,29 @@ class WaveformPreview(QWidget):
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the plan."""
+        """Draw the plan, and the play-head on it."""
+        of = (self._preview, self._problem, self.size(), self._theme.tokens)
+        if of != self._drawn_of:
+            self._drawn_of = of
+            ratio = self.devicePixelRatio()
+            self._drawn = QPixmap(self.size() * ratio)
+            self._drawn.setDevicePixelRatio(ratio)
+            self._drawn.fill(Qt.GlobalColor.transparent)
+            drawing = QPainter(self._drawn)
+            self._draw_plan(drawing)
+            drawing.end()
         painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._drawn)
+        preview = self._preview
+        if preview and self._head is not None and 0 <= self._head <= preview.length:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            left, right = LEFT, self.width() - RIGHT
+            at = left + (right - left) * self._head / max(preview.length, 1e-9)
+            x = round(at) + 0.5
+            painter.setPen(QPen(QColor(self._theme.tokens.text), 1.5))
+            painter.drawLine(QPointF(x, 6), QPointF(x, HEIGHT - 20))
+
+    def _draw_plan(self, painter: QPainter) -> None:
         tokens = self._theme.tokens
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
@@ -71,7 +96,7 @@ class WaveformPreview(QWidget):
         span = high - low
         low -= 0.12 * span if low < 0 else 0.0
         frame = Frame(
-            38, self.width() - 8, 18, HEIGHT - 20, 0.0, preview.length, low, high
+            LEFT, self.width() - RIGHT, 18, HEIGHT - 20, 0.0, preview.length, low, high
         )
         step = step_of(high - low, 3)
         for value in ticks(low, high, 3):
@@ -90,16 +115,13 @@ class WaveformPreview(QWidget):
                 Qt.AlignmentFlag.AlignHCenter,
                 number(value, decimals(step_of(preview.length, 6))),
             )
-        drawn = Drawn.line(preview.force.time, force)
+        count = max(50, self.width())
+        drawn = line_between(preview.force.time, force, 0.0, preview.length, count)
         soft = QColor(tokens.force)
         soft.setAlpha(50)
         paint.fill(painter, frame, drawn, soft)
         paint.trace(painter, frame, drawn, paint.pen(tokens.force))
         self._names(painter, frame, preview, force)
-        if self._head is not None and 0 <= self._head <= preview.length:
-            x = round(frame.x1(self._head)) + 0.5
-            painter.setPen(QPen(QColor(tokens.text), 1.5))
-            painter.drawLine(QPointF(x, 6), QPointF(x, frame.bottom))
 
     def _names(
         self, painter: QPainter, frame: Frame, preview: Preview, force: np.ndarray
