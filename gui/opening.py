@@ -172,7 +172,6 @@ class Opening(QObject):
         view.set_width(5.0)
         view.set_follow(True)
         panels.centre.tools.follow.setChecked(True)
-        panels.centre.tools.widths.choose(1)
         if not panels.session.monitor.alive:
             self.ending = ""
             expectation = panels.session.running
@@ -256,7 +255,6 @@ class Opening(QObject):
         self.show_lanes()
         panels.centre.stack.show_source(source)
         view.show_all()
-        panels.centre.tools.widths.choose(3)
         panels.centre.stack.show_values()
         panels.session.make_twin(source.path, source.current, source.length)
         status = str(source.info.get("status"))
@@ -283,7 +281,6 @@ class Opening(QObject):
         self.show_lanes()
         centre.stack.show_source(comparison)
         centre.view.show_all()
-        centre.tools.widths.choose(3)
         self.changed.emit()
 
     def _queue(self, scene: str, title: str) -> None:

@@ -6,6 +6,12 @@ import numpy as np
 
 from gui.lanes.decimate import Drawn, FloatArray, line_between
 
+SILENCE = 3.0
+"""Times the interval before from which on a pause between spikes is a silence."""
+
+LEAST_SILENCE = 0.5
+"""Shortest silence, s."""
+
 
 def scaled(drawn: Drawn, by: float) -> Drawn:
     """The trace in shown units."""
@@ -24,7 +30,8 @@ def averaged(drawn: Drawn) -> Drawn:
 def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
     """Instantaneous rate at each spike around [start, end] s; 0 at the first, Hz.
 
-    More than 4 `count` spikes become about `count` columns.
+    After a silence a new line begins. More than 4 `count` spikes become about `count`
+    columns.
     """
     first, last = np.searchsorted(spikes, [start, end])
     first, last = max(0, first - 2), min(spikes.size, last + 1)
@@ -35,7 +42,13 @@ def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
     rate[1:] = 1 / np.maximum(np.diff(times), 1e-9)
     if first > 0:
         times, rate = times[1:], rate[1:]
-    return line_between(times, rate, start, end, count)
+    if times.size > 4 * count:
+        return line_between(times, rate, start, end, count)
+    gap = np.zeros(times.size, np.bool_)
+    gap[0] = True
+    between = np.diff(times)
+    gap[2:] = between[1:] > np.maximum(SILENCE * between[:-1], LEAST_SILENCE)
+    return Drawn(times, rate, rate, rate, gap)
 
 
 def difference(measured: Drawn, model: Drawn) -> Drawn:

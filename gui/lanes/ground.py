@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QPainter
 
 from gui.lanes import paint
 from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.expected import Hold
 from gui.lanes.paint import Frame
 from gui.lanes.source import Source
 from gui.look.tokens import Tokens
@@ -40,27 +41,46 @@ def ground(
     painter: QPainter, frame: Frame, source: Source, tokens: Tokens, place: Place
 ) -> None:
     """Bands of holds, grid, axis numbers, hold names, the future."""
-    for hold in source.holds:
-        if hold.end <= frame.start or hold.start >= frame.end:
-            continue
-        left = max(frame.x1(hold.start), frame.left)
-        right = min(frame.x1(hold.end), frame.right)
+    for hold, left, right in _visible(source, frame):
         band = QRectF(left, 0, right - left, frame.bottom + 3)
         painter.fillRect(band, QColor(tokens.sunken if hold.pause else tokens.band))
-        if place.top and right - left > 34:
-            text = "recovery" if hold.pause else hold.label
-            painter.save()
-            painter.setClipRect(QRectF(left, 0, right - left - 3, 20))
-            paint.write(painter, QPointF(left + 5, 10), text, tokens.muted)
-            painter.restore()
     if source.running and source.reach < frame.end:
         x = max(frame.x1(source.reach), frame.left)
         painter.fillRect(
             QRectF(x, 0, frame.right - x, frame.bottom + 3), QColor(tokens.ahead)
         )
     _time_grid(painter, frame, tokens, place)
-    if not place.values:
-        return
+    if place.values:
+        _value_grid(painter, frame, tokens)
+    if place.top:
+        _names(painter, frame, source, tokens)
+
+
+def _visible(source: Source, frame: Frame) -> list[tuple[Hold, float, float]]:
+    """Holds in view with their left and right ends, px."""
+    return [
+        (
+            hold,
+            max(frame.x1(hold.start), frame.left),
+            min(frame.x1(hold.end), frame.right),
+        )
+        for hold in source.holds
+        if hold.end > frame.start and hold.start < frame.end
+    ]
+
+
+def _names(painter: QPainter, frame: Frame, source: Source, tokens: Tokens) -> None:
+    """Names of the holds, over the grid."""
+    for hold, left, right in _visible(source, frame):
+        if right - left > 34:
+            text = "recovery" if hold.pause else hold.label
+            painter.save()
+            painter.setClipRect(QRectF(left, 0, right - left - 3, 20))
+            paint.write(painter, QPointF(left + 5, 10), text, tokens.muted)
+            painter.restore()
+
+
+def _value_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
     rows = max(2, int((frame.bottom - frame.top) / 21))
     step = step_of(frame.high - frame.low, rows)
     places = decimals(step)

@@ -6,6 +6,7 @@ import numpy as np
 from PySide6.QtCore import QPoint, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QWidget
 
+from gui.lanes.axis import decimals
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
@@ -114,6 +115,7 @@ class Tools(QWidget):
     def _connect(self) -> None:
         self.follow.clicked.connect(self._view.set_follow)
         self._view.follow_changed.connect(self._follow_changed)
+        self._view.changed.connect(self._mark_width)
         self.widths.group.idClicked.connect(self._width_chosen)
         self.fit.clicked.connect(self._view.show_all)
         self.zoom.toggled.connect(self._box)
@@ -135,6 +137,18 @@ class Tools(QWidget):
         else:
             self._view.set_width(WIDTHS[number])
 
+    def _mark_width(self) -> None:
+        """Mark the button of the visible time, if it is one of theirs."""
+        view, marked = self._view, -1
+        for number_, width in enumerate(WIDTHS):
+            if abs(view.width - width) < 1e-6 * width:
+                marked = number_
+        whole = max(view.length, view.now)
+        if marked < 0 and view.start == 0.0 and abs(view.width - whole) < 0.05 * whole:
+            marked = len(WIDTHS)
+        if marked != self.widths.chosen:
+            self.widths.choose(marked)
+
     def _follow_changed(self, follow: bool) -> None:
         self.follow.setChecked(follow)
 
@@ -144,7 +158,6 @@ class Tools(QWidget):
 
     def _boxed(self, start: float, end: float) -> None:
         self.zoom.setChecked(False)
-        self.widths.choose(-1)
         self._view.show_span(start, end - start)
 
     def _twin(self, on: bool) -> None:
@@ -174,13 +187,14 @@ class Tools(QWidget):
             return
         tokens = self._theme.tokens
         low, high = sorted(cursors)
+        places = min(6, max(2, decimals(self._view.width / 2000)))
         spikes = self._stack.source.spikes
         count = int(np.diff(np.searchsorted(spikes, [low, high]))[0])
         span = high - low
         rate = f" · <b>{count / span:.3g} Hz</b>" if span > 0 else ""
         boxes = [
             f'<span style="background:{colour};color:{tokens.on_accent};'
-            f'font-weight:700">&nbsp;{name}&nbsp;</span> <b>{time:.4f} s</b>'
+            f'font-weight:700">&nbsp;{name}&nbsp;</span> <b>{time:.{places}f} s</b>'
             for name, time, colour in zip(
                 "AB", cursors, (tokens.accent, tokens.V_C1), strict=True
             )

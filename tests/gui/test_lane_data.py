@@ -87,6 +87,11 @@ def test_rate_is_one_over_the_last_interval() -> None:
     assert drawn.mean.tolist() == [0.0, 2.0, 4.0]
 
 
+def test_rate_is_not_joined_across_a_silence() -> None:
+    drawn = rate_of(np.array([1.0, 1.5, 2.0, 9.0, 9.5]), 0.0, 10.0, 100)
+    assert np.flatnonzero(drawn.gap).tolist() == [0, 3]
+
+
 def test_model_moves_to_where_each_trial_really_started() -> None:
     holds = [Hold(0.1, 1.0, "a"), Hold(1.0, 2.0, "b")]
     force = Waveform.through([(0.1, 0.0), (0.5, 1.0), (1.5, 1.0)])

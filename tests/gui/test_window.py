@@ -248,6 +248,16 @@ def test_cursors_are_readable_as_text(lab) -> None:
     assert window.centre.tools.readout == ""
 
 
+def test_width_buttons_mark_what_is_seen(lab) -> None:
+    view, tools = lab.window.centre.view, lab.window.centre.tools
+    tools.widths.group.button(0).click()
+    assert view.width == 1.0 and tools.widths.chosen == 0
+    view.zoom(1.5)
+    assert tools.widths.chosen == -1
+    tools.fit.click()
+    assert tools.widths.chosen == 3
+
+
 def test_view_is_exported(lab) -> None:
     from gui.dialogs.saving import write_scene, write_view
 
