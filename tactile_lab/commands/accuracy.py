@@ -124,14 +124,12 @@ def _report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
 
 def _honesty(count: int) -> str:
     from tactile_lab.model.campaign import random_case, saturated_case
-    from tactile_lab.model.compare.tables import provenance
 
     fewer = -(-count // 5)
     return "\n".join(
         [
             "# Is the error estimate honest?\n",
-            f"{provenance()} Written by `tactile-lab accuracy --campaign {count} --out "
-            "docs`.\n",
+            f"Written by `tactile-lab accuracy --campaign {count} --out docs`. "
             "Random scenes and parameters (`tactile_lab/model/campaign.py`), half at "
             "random tolerances, against the 40-digit reference.\n",
             "## The cascade, Eqs. (16) to (18)\n",
@@ -147,6 +145,7 @@ def _section(draw: Callable[[int], Case], count: int) -> list[str]:
     import numpy as np
 
     from tactile_lab.model.campaign import compare
+    from tactile_lab.model.compare.tables import provenance
 
     found = []
     for seed in range(count):
@@ -162,6 +161,7 @@ def _section(draw: Callable[[int], Case], count: int) -> list[str]:
     time_ratio, V_ratio = (f"{np.median(r):.0f}" if r else "unknown" for r in ratios)
     default = [c for c in found if c.case.tolerance == 1e-9]
     lines = [
+        f"{provenance()}\n",
         f"- {count} scenes, {len(spiking)} of them with spikes",
         f"- count right and true errors below the estimates: {honest} of {count} "
         f"({honest / count:.1%})",
