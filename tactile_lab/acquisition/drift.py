@@ -40,7 +40,7 @@ class Drift:
         self._limit = limit
         self._V_P, self._at, self._force = 0.0, 0.0, 0.0
         self._still = -STILL
-        self._first: float | None = None
+        self._first: tuple[float, float] | None = None
 
     def before(self, V_C1: float, time: float) -> float | None:
         """The drift, V, of a rest value measured just before run time `time` s.
@@ -48,16 +48,17 @@ class Drift:
         None where the sensor was not at rest: under force, or until a moment ago.
 
         Raises:
-            LimitError: it is beyond the limit.
+            LimitError: it is beyond the limit, and so is the change of V_C1 itself: a
+                film that remembers less than believed is no drift.
         """
         if abs(self._force) > NOTHING or time < self._still + STILL:
             return None
         remembered = V_P(self._circuit, self._V_P, 0.0, max(time - self._at, 0.0))
         alone = V_C1 - rest_V_C1(self._circuit, remembered)
         if self._first is None:
-            self._first = alone
-        drift = alone - self._first
-        if abs(drift) > self._limit:
+            self._first = alone, V_C1
+        drift, plain = alone - self._first[0], V_C1 - self._first[1]
+        if min(abs(drift), abs(plain)) > self._limit:
             raise LimitError(
                 f"V_C1 at rest has drifted by {show(drift, 'V')} since the first "
                 f"trial; {show(self._limit, 'V')} is the limit. Check V_GS, the supply "

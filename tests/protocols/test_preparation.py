@@ -126,6 +126,16 @@ def test_only_a_sensor_at_rest_is_judged():
     assert watch.before(4.4, 6.0) is not None
 
 
+def test_a_film_that_remembers_less_than_believed_is_no_drift():
+    """A core with a tenth of Table 1's A2 moves the sensor by a tenth."""
+    watch = Drift(Circuit(), lambda current: current, limit=0.1)
+    rest = rest_V_C1(Circuit())
+    watch.before(rest, 0.0)
+    watch.plays(Waveform.pulse(0.3, ramp=0.25, hold=10.0, rest=1.0), 0.0)
+    believed = watch.before(rest + 0.02, 12.0)
+    assert believed < -0.1
+
+
 @pytest.mark.parametrize("change", [0.11, -0.11])
 def test_a_drift_beyond_the_limit_is_refused_with_what_to_do(change):
     watch = Drift(Circuit(), lambda current: current, limit=0.1)
