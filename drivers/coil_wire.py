@@ -105,6 +105,10 @@ class CoilWire:
         """
         return self.current() if self.row.measures_when_off else self.setpoint()
 
+    def known_setpoint(self, read: float) -> float:
+        """Set-point, A, given what `current_when_off` just read."""
+        return self.setpoint() if self.row.measures_when_off else read
+
     def measured_interval(self) -> float:
         """Time of a verified set-point with margin, s, from queries as long as one."""
         row, wire = self.row, self.talk.link.wire
