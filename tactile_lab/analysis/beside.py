@@ -44,7 +44,8 @@ class Beside:
         try:
             begin = self._follower.reached
             out = self._follower.until(end)
-            if trial.pause or (trial.level is None and trial.hold is None):
+            # a look at the rest between trials is no result either
+            if trial.pause or (trial.level is None and trial.force.peak == 0):
                 return ""
             trace = outcome.traces.get("V_C1", np.empty((0, 2)))
             time = trace[:, 0] + start

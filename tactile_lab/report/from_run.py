@@ -21,6 +21,7 @@ from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
+from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Records, Run
 from tactile_lab.waveform import Waveform
@@ -46,7 +47,7 @@ def read(folder: Path) -> RunData:
         applied = _applied(run)
         current = applied.steps
         spikes = run.spikes["time"]
-        before = float(getattr(scene.protocol, "before", 0.0))
+        onset = stimulus_onset(scene)
         started = _for_people(str(info.get("started", "")))
         settings: Mapping[str, Mapping[str, str]] = info.get("instruments") or {}
         changed = tuple(info.get("instruments_changed") or ())
@@ -63,7 +64,7 @@ def read(folder: Path) -> RunData:
             bench=scene.bench.name,
             duration=run.duration,
             took=info.get("took_s"),
-            trials=tuple(_trial(row, spikes, before, segments) for row in run.trials),
+            trials=tuple(_trial(row, spikes, onset, segments) for row in run.trials),
             force=_force(scene, current, run.duration),
             current=current,
             warming=_warming(run),
@@ -104,6 +105,15 @@ def _conditions(info: Mapping[str, Any]) -> dict[str, str]:
     for name, digest in (info.get("files") or {}).items():
         found[name] = f"SHA-256 {digest[:16]}…"
     return found
+
+
+def stimulus_onset(scene: Scene) -> float:
+    """When a presentation of the scene's protocol begins to change the force, s."""
+    if not isinstance(scene.protocol, ForceProtocol):
+        return 0.0
+    force = next(scene.protocol.presentations()).force
+    changed = np.flatnonzero(force.value != force.value[0])
+    return float(force.time[changed[0] - 1]) if changed.size else 0.0
 
 
 def _trial(

@@ -9,9 +9,11 @@ import pytest
 
 from tactile_lab.report.figure import figure
 from tactile_lab.report.findings import find, stretches
+from tactile_lab.report.from_run import stimulus_onset
 from tactile_lab.report.run_data import TrialData
 from tactile_lab.report.table import table
 from tactile_lab.report.write import write
+from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
 
 
@@ -180,3 +182,16 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
     report = write(tmp_path, empty)
     assert "No trial was completed" in report.html.read_text(encoding="utf-8")
     assert len(figure(report.findings).axes) == 2
+
+
+@pytest.mark.parametrize(
+    ("scene", "overrides", "onset"),
+    [
+        ("demo", [], 0.0),
+        ("hold_10s", ['protocol.before="0.3 s"'], 0.3),
+        ("waveform", [], 0.5),
+        ("monitor", [], 0.0),
+    ],
+)
+def test_latency_counts_from_where_the_force_begins(scene, overrides, onset):
+    assert stimulus_onset(load(scene, overrides)) == pytest.approx(onset)
