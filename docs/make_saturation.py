@@ -111,11 +111,11 @@ def ngspice(point: Point) -> Found:
     return _found(np.array(times))
 
 
-def model(point: Point) -> Found:
-    """What `saturation = true` gives, junctions added to C2."""
+def model(point: Point, saturation: bool = True) -> Found:
+    """What the model gives, junctions added to C2."""
     circuit = Circuit(
-        saturation=True, firing=FIRING[point.netlist], V_GS=point.V_GS, tau=point.tau,
-        C2=_capacitance(point),
+        saturation=saturation, firing=FIRING[point.netlist], V_GS=point.V_GS,
+        tau=point.tau, C2=_capacitance(point),
     )  # fmt: skip
     force = Waveform.through([(0, 0), (0.1, 0), (0.11, point.force)])
     spikes = simulate(circuit, force, until=point.until).spike_times
@@ -142,6 +142,42 @@ def _line(point: Point, spice: Found, ours: Found) -> str:
     )
 
 
+def _draw(results: list[tuple[Point, Found]]) -> None:
+    """Rate against held force: ngspice's points on the model's curves."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    plot, axes = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
+    titles = {
+        "t1": "T1 a transistor, ideal firing stage",
+        "complete": "complete circuit",
+    }
+    for axis, (netlist, title) in zip(axes, titles.items(), strict=True):
+        forces = np.linspace(0.085, 0.26, 71)
+        curves: dict[bool, list[float]] = {True: [], False: []}
+        for saturation, rates in curves.items():
+            for F in forces:
+                point = Point(netlist, 1.4, float(F), STEADY, 2.1)
+                rates.append(model(point, saturation).highest)
+        axis.plot(forces * 1e3, curves[False], "--", color="0.6", label="Eq. (17)")
+        axis.plot(forces * 1e3, curves[True], color="black", label="saturation = true")
+        known = [
+            (p.force * 1e3, found.highest)
+            for p, found in results
+            if p.netlist == netlist and p.V_GS == 1.4 and p.tau == STEADY
+            and p.force < 0.26
+        ]  # fmt: skip
+        axis.plot(*zip(*known, strict=True), "o", color="tab:red", label="ngspice")
+        axis.set(title=title, xlabel="force (mN)")
+        axis.grid(visible=True, color="0.92")
+    axes[0].set_ylabel("rate (Hz)")
+    axes[0].legend(frameon=False)
+    plot.savefig(DOCS / "saturation.svg", metadata={"Date": None})
+    plt.close(plot)
+
+
 HEAD = (
     "| V_GS | force | spikes, ngspice | ours | highest rate (Hz), ngspice | ours | "
     "difference |\n|---|---|---|---|---|---|---|"
@@ -152,6 +188,7 @@ def main() -> None:
     """Run every point both ways and write the page and the tests' table."""
     lines: dict[str, list[str]] = {"t1": [], "complete": []}
     worst = dict.fromkeys(lines, 0.0)
+    results = []
     with TABLE.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(
@@ -161,6 +198,7 @@ def main() -> None:
         )
         for point in points():
             spice, ours = ngspice(point), model(point)
+            results.append((point, spice))
             print(_line(point, spice, ours), flush=True)
             lines[point.netlist].append(_line(point, spice, ours))
             if spice.highest:
@@ -183,6 +221,8 @@ capacitance over the swing is given to it as part of C2 (5 pF of T1, 6 pF of T2:
 them its rates are 3 % and 7 % higher). "Held": V_P does not decay (tau = 1e9 s), 2 s;
 "adapts": tau = 8.69 s, 10 s.
 
+![Rate against force](saturation.svg)
+
 ## T1 a transistor, the firing stage ideal (`firing = "lif"`)
 
 Largest difference {worst["t1"]:.1%}.
@@ -200,6 +240,7 @@ moves by 30 mV with the current. Equations (10) and (11) have neither.
 {HEAD}
 {chr(10).join(lines["complete"])}
 """
+    _draw(results)
     (DOCS / "saturation.md").write_text(text, encoding="utf-8")
 
 
