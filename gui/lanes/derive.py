@@ -34,7 +34,7 @@ def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
     columns.
     """
     first, last = np.searchsorted(spikes, [start, end])
-    first, last = max(0, first - 2), min(spikes.size, last + 1)
+    first, last = max(0, first - 3), min(spikes.size, last + 1)
     times = spikes[first:last]
     if times.size < 2:
         return Drawn.nothing()
@@ -49,6 +49,14 @@ def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
     between = np.diff(times)
     gap[2:] = between[1:] > np.maximum(SILENCE * between[:-1], LEAST_SILENCE)
     return Drawn(times, rate, rate, rate, gap)
+
+
+def rate_at(spikes: FloatArray, time: float) -> float:
+    """1/ISI of the last two spikes at or before `time` s; 0 before the second, Hz."""
+    last = int(np.searchsorted(spikes, time, side="right"))
+    return (
+        1 / max(float(spikes[last - 1] - spikes[last - 2]), 1e-9) if last > 1 else 0.0
+    )
 
 
 def difference(measured: Drawn, model: Drawn) -> Drawn:

@@ -24,6 +24,9 @@ from gui.look.tokens import Tokens
 DOTS = 160
 """Most rate markers drawn; more would be a smear and slow."""
 
+NAMES = 0.15
+"""Share of the top lane's range that is left free for the names of holds."""
+
 
 @dataclass
 class Options:
@@ -130,6 +133,8 @@ class LanePainter:
         if not extents:
             return
         low, high = min(e[0] for e in extents), max(e[1] for e in extents)
+        if self.top:
+            high += NAMES * (high - low)
         if low == high == 0.0:
             self.range = (0.0, self.lane.least)
             return

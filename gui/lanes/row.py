@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 from gui.lanes.axis import number
 from gui.lanes.compare import Comparison
 from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.derive import rate_of
+from gui.lanes.derive import rate_at
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.plot import LanePainter, Options
@@ -234,7 +234,7 @@ class LaneRow(QFrame):
         """Value at a time in shown units; None outside the data."""
         lane = self.lane
         if lane.kind is Kind.RATE:
-            drawn = rate_of(source.spikes, time - 1e3, time + 1e3, 1 << 20)
+            return rate_at(source.spikes, time) if time <= source.reach else None
         elif lane.kind is Kind.RESIDUAL:
             one = _at(source.trace(lane.signal, time - 0.02, time + 0.02, 100), time)
             two = _at(source.twin(lane.signal, time - 0.02, time + 0.02, 100), time)

@@ -179,7 +179,7 @@ class Tools(QWidget):
         menu.popup(self.lanes.mapToGlobal(QPoint(0, self.lanes.height())))
 
     def show_cursors(self) -> None:
-        """Times of A and B, their difference, and the spikes between, as text."""
+        """Times of A and B, their difference, and the mean rate between, as text."""
         cursors = self._view.cursors
         self.set_width(self.width())
         if cursors is None:
@@ -200,8 +200,7 @@ class Tools(QWidget):
             )
         ]
         self._readout.setText(
-            f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; Δt <b>{show(span, 's')}</b>"
-            f" &nbsp; {count} spikes{rate}"
+            f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; Δt <b>{show(span, 's')}</b>{rate}"
         )
 
     def _lay_out(self) -> None:

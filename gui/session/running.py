@@ -178,10 +178,12 @@ class Running:
     def _follow(
         self, twin: LiveTwin, execution: Execution, ended: threading.Event
     ) -> None:
-        """Advance the twin to where the samples are, slice by slice."""
+        """Advance the twin to where the samples are, slice by slice, to the end."""
         from gui.session.twin import EVERY as SLICE
 
-        while not ended.wait(SLICE):
+        over = False
+        while not over:
+            over = ended.wait(SLICE)
             part = twin.until(execution.live.reach)
             if part is not None:
                 self._tell(Twinned(part))

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from gui.lanes.axis import decimals, nice_range, number, ticks
 from gui.lanes.decimate import columns, zigzag
-from gui.lanes.derive import rate_of
+from gui.lanes.derive import rate_at, rate_of
 from gui.lanes.expected import Aligned, Hold, Preview
 from gui.lanes.history import COARSE, FINE, SlowTrack, Track
 from tactile_lab.acquisition.live import Bins
@@ -85,6 +85,12 @@ def test_history_is_bounded_and_keeps_a_single_spike() -> None:
 def test_rate_is_one_over_the_last_interval() -> None:
     drawn = rate_of(np.array([1.0, 1.5, 1.75]), 0.0, 3.0, 100)
     assert drawn.mean.tolist() == [0.0, 2.0, 4.0]
+
+
+def test_rate_at_a_time_is_that_of_the_last_two_spikes() -> None:
+    spikes = np.array([1.0, 1.5, 1.75])
+    rates = [rate_at(spikes, time) for time in (0.5, 1.2, 1.5, 1.7, 1.75, 99.0)]
+    assert rates == [0.0, 0.0, 2.0, 2.0, 4.0, 4.0]
 
 
 def test_rate_is_not_joined_across_a_silence() -> None:
