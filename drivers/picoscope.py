@@ -201,7 +201,7 @@ class PicoScope(Opened):
         block = Block(self._count.received, codes, overrange, received)
         self._data_at = received
         try:
-            self._count.poll(self._asked, block.samples, self._drained)
+            self._count.poll(self._asked, block.samples, self._drained, received)
         except SamplesLostError as error:
             self._failure = error
         return block

@@ -19,6 +19,10 @@ class SampleCount:
     minimum since the start (many small gaps). A poll that came later than the ring
     holds samples is taken as a loss even if the count looks right.
 
+    A busy computer may halt between asking and being served, and samples of that time
+    come along. So a lag lies between that at asking and that at having; a loss must
+    raise it beyond both.
+
     Args:
         started: clock time of the stream's start, s.
         interval: between samples, s.
@@ -47,7 +51,7 @@ class SampleCount:
         self._drift = drift
         self._window = window
         self._least: float | None = None
-        self._lags: deque[tuple[float, float]] = deque(maxlen=2 * window)
+        self._lags: deque[tuple[float, float, float]] = deque(maxlen=2 * window)
 
     @classmethod
     def of(
@@ -72,13 +76,16 @@ class SampleCount:
             tolerance=tolerance, drift=_DRIFT, window=window,
         )  # fmt: skip
 
-    def poll(self, now: float, samples: int, drained: bool = True) -> None:
+    def poll(
+        self, now: float, samples: int, drained: bool = True, had: float | None = None
+    ) -> None:
         """Take note of a poll.
 
         Args:
-            now: clock time, s.
+            now: clock time at which samples were asked for, s.
             samples: a channel, that it brought.
             drained: nothing more waited to be read.
+            had: clock time at which they were there, s; `now` unless given.
 
         Raises:
             SamplesLostError: samples are missing or cannot be vouched for.
@@ -87,9 +94,10 @@ class SampleCount:
         self.received += samples
         if samples and drained:
             elapsed = now - self._started
-            lag = elapsed - self.received * self._interval
-            self._least = lag if self._least is None else min(self._least, lag)
-            self._lags.append((elapsed, lag))
+            least = elapsed - self.received * self._interval
+            most = least + (0.0 if had is None else had - now)
+            self._least = most if self._least is None else min(self._least, most)
+            self._lags.append((elapsed, least, most))
         holds = self._depth * self._interval
         if waited > holds * (1 + 1e-9):
             raise SamplesLostError(
@@ -113,8 +121,8 @@ class SampleCount:
             return
         lags = list(self._lags)
         before, after = lags[:-recent], lags[-recent:]
-        elapsed, now_least = after[-1][0], min(lag for _, lag in after)
-        gap = now_least - min(lag for _, lag in before)
+        elapsed, now_least = after[-1][0], min(least for _, least, _ in after)
+        gap = now_least - min(most for _, _, most in before)
         if gap > self._tolerance + self._drift * (elapsed - before[0][0]):
             self._refuse(elapsed, gap)
         total = now_least - self._least

@@ -26,7 +26,9 @@ def test_enter_and_a_signal_record_and_ctrl_c_ends(tmp_path):
         watching.stdin.flush()
         first = watching.stdout.readline().split()[-1]
         watching.send_signal(signal.SIGUSR1)
-        second = watching.stdout.readline().split()[-1]
+        line = watching.stdout.readline()
+        assert line, watching.stderr.read()
+        second = line.split()[-1]
         watching.send_signal(signal.SIGINT)
         _, said = watching.communicate(timeout=120)
     finally:

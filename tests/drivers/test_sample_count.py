@@ -94,3 +94,17 @@ def test_the_end_is_looked_at_more_sharply() -> None:
     count.poll(2.02, 20_000)
     with pytest.raises(SamplesLostError, match="about 15000 too few"):
         count.finish()
+
+
+def test_a_computer_that_halts_while_it_asks_has_lost_nothing() -> None:
+    """Samples that came while a poll was held up are more, and none is missing."""
+    count = counter()
+    total = 0
+    for k in range(1, 60):
+        halted = 0.3 if k == 10 else 0.0
+        produced = int((0.02 * k + halted) * RATE)
+        if produced > total:
+            had = 1.0 + 0.02 * k + halted
+            count.poll(1.0 + 0.02 * k, produced - total, had=had)
+            total = produced
+    assert count.received == int(0.02 * 59 * RATE)
