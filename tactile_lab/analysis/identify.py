@@ -1,36 +1,27 @@
 """Identification: fit chosen sensor parameters to a run, and say what it cannot tell.
 
-Two kinds of evidence are used. V_C1, bin by bin. And each pair of neighbouring spikes:
-with V_C2 set to V_reset at the earlier one, the model must reach V_fire at the later
-one. The second is smooth in the parameters, unlike a comparison of spike trains, whose
-number of spikes jumps.
+What it is fitted to: `tactile_lab.analysis.evidence`.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Problem, scatter
 from tactile_lab.analysis.spike_pairs import PART
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import PARAMETERS, Circuit
-from tactile_lab.model.equations import I_C
-from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
-VOLTAGES = frozenset({"V_GS", "V_S", "V_th", "V_fire", "V_reset"})
-SCALES = {**dict.fromkeys(VOLTAGES, 0.01), "I_bias": 1e-10, "g31": 0.004}
-"""Steps of parameters fitted as they are; all others are fitted by their logarithm."""
 ALIKE = 0.98
 """Two parameters whose estimates correlate more than this are hardly told apart."""
 DEGENERATE = 1e-7
@@ -40,10 +31,6 @@ LOOSE = 0.5
 LOOSE_VOLTAGE = 0.1
 """The same for voltages, V."""
 DIFFERENCE = np.array(1e-4)
-STEP = 2e-3
-"""Grid on which I_C is integrated between spikes, s."""
-LONGEST = 1.0
-"""Intervals longer than this tell little about rate and much about drift, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +86,11 @@ def identify(
             that does not act on the data at all.
     """
     _check(circuit, names)
-    problem = _Problem(circuit, tuple(names), force, duration, V_C1, spike_times)
+    unused: tuple[str, ...] = ()
+    if circuit.saturation and spike_times is not None:
+        # between spikes I_C is then no function of V_C1 alone
+        spike_times, unused = None, ("spikes are not used: T1 saturates",)
+    problem = Problem(circuit, tuple(names), force, duration, V_C1, spike_times)
     if problem.size <= len(names):
         raise NotIdentifiableError(
             f"{problem.size} data points cannot determine {len(names)} parameters"
@@ -112,7 +103,8 @@ def identify(
         )  # fmt: skip
         x = np.asarray(solved.x, dtype=np.float64)
         weights = problem.weights(problem.residual(x))
-    return _identified(problem, x, weights, _systematic(problem, x, displaced))
+    found = _identified(problem, x, weights, _systematic(problem, x, displaced))
+    return replace(found, warnings=(*unused, *found.warnings))
 
 
 def _check(circuit: Circuit, names: Sequence[str]) -> None:
@@ -131,107 +123,8 @@ def _check(circuit: Circuit, names: Sequence[str]) -> None:
 _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
-class _Problem:
-    """Residuals of one identification as a function of scaled parameters."""
-
-    def __init__(
-        self,
-        circuit: Circuit,
-        names: tuple[str, ...],
-        force: Waveform,
-        duration: float,
-        V_C1: Measured | None,
-        spike_times: FloatArray | None,
-    ) -> None:
-        self.names = names
-        self._circuit, self._force, self._duration = circuit, force, duration
-        self._trace = V_C1
-        times = np.empty(0) if spike_times is None else np.asarray(spike_times)
-        short = np.diff(times) <= LONGEST
-        self._earlier, self._later = times[:-1][short], times[1:][short]
-        self.bins = 0 if V_C1 is None else int(V_C1.time.size)
-        self.offset = 0.0 if V_C1 is None else V_C1.resolution
-        self.size = self.bins + self._earlier.size
-        self._grids = [
-            np.linspace(a, b, max(8, int((b - a) / STEP)) | 1)
-            for a, b in zip(self._earlier, self._later, strict=True)
-        ]
-
-    def circuit(self, x: FloatArray) -> Circuit:
-        """The circuit at scaled parameters `x`, 0 where the start lies."""
-        changed: dict[str, Any] = {}
-        for name, step in zip(self.names, x, strict=True):
-            start = self._start(name)
-            if name in SCALES:
-                changed[name] = start + SCALES[name] * float(step)
-            else:
-                changed[name] = start * float(np.exp(np.clip(step, -20, 20)))
-        return dataclasses.replace(self._circuit, **changed)
-
-    def _start(self, name: str) -> float:
-        if name == "V_fire":
-            return self._circuit.fire_voltage
-        if name == "V_reset":
-            return self._circuit.reset_voltage
-        return float(getattr(self._circuit, name))
-
-    def residual(self, x: FloatArray, force: Waveform | None = None) -> FloatArray:
-        """All residuals, V, under `force`: those of V_C1, then those at firing."""
-        circuit, force = self.circuit(x), force or self._force
-        found = simulate(
-            circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
-        )
-        parts = []
-        if self._trace is not None:
-            parts.append(self._trace.value - found.sample("V_C1", self._trace.time))
-        if self._grids:
-            everywhere = np.concatenate(self._grids)
-            current = I_C(circuit, found.sample("V_C1", everywhere)) + circuit.I_bias
-            parts.append(self._at_firing(circuit, current))
-        return np.concatenate(parts) if parts else np.empty(0)
-
-    def _at_firing(self, circuit: Circuit, current: FloatArray) -> FloatArray:
-        """V_C2 at each later spike, from V_reset at the earlier one, less V_fire."""
-        misses, at = np.empty(len(self._grids)), 0
-        for i, grid in enumerate(self._grids):
-            flowing = current[at : at + grid.size]
-            at += grid.size
-            left = np.exp((grid - grid[-1]) / circuit.tau_L)
-            charge = _simpson(flowing * left, grid) / circuit.C2
-            kept = circuit.reset_voltage * left[0]
-            misses[i] = charge + kept - circuit.fire_voltage
-        return misses
-
-    def weighted(self, x: FloatArray, weights: FloatArray) -> FloatArray:
-        """All residuals over their scatter."""
-        return self.residual(x) * weights
-
-    def first_weights(self) -> FloatArray:
-        """A few millivolts for either kind of evidence, before anything is known."""
-        return np.full(self.size, 1 / 5e-3)
-
-    def weights(self, residual: FloatArray) -> FloatArray:
-        """One over the scatter of each kind of evidence."""
-        weights = np.empty(self.size)
-        for part in (slice(0, self.bins), slice(self.bins, self.size)):
-            if residual[part].size:
-                weights[part] = 1 / max(_scatter(residual[part]), 1e-9)
-        return weights
-
-
-def _scatter(residual: FloatArray) -> float:
-    return float(np.sqrt(np.mean(residual**2)))
-
-
-def _simpson(values: FloatArray, grid: FloatArray) -> float:
-    """Integral over an even number of equal steps."""
-    step = (grid[-1] - grid[0]) / (grid.size - 1)
-    total = values[0] + values[-1] + 4 * values[1:-1:2].sum() + 2 * values[2:-1:2].sum()
-    return float(total * step / 3)
-
-
 def _systematic(
-    problem: _Problem, x: FloatArray, displaced: Sequence[Waveform]
+    problem: Problem, x: FloatArray, displaced: Sequence[Waveform]
 ) -> list[FloatArray]:
     """Half of the 95 % band each systematic cause gives all residuals, V."""
     here = problem.residual(x)
@@ -244,7 +137,7 @@ def _systematic(
 
 
 def _identified(
-    problem: _Problem, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
+    problem: Problem, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
 ) -> Identified:
     jacobian = _jacobian(problem, x) * weights[:, None]
     lengths = np.linalg.norm(jacobian, axis=0)
@@ -274,13 +167,13 @@ def _identified(
         circuit=circuit,
         estimates=estimates,
         correlation=correlation,
-        scatter_V_C1=_scatter(residual[:bins]) if bins else None,
-        scatter_V_fire=_scatter(residual[bins:]) if problem.size > bins else None,
+        scatter_V_C1=scatter(residual[:bins]) if bins else None,
+        scatter_V_fire=scatter(residual[bins:]) if problem.size > bins else None,
         warnings=_warnings(estimates, correlation, float(strength[0])),
     )
 
 
-def _jacobian(problem: _Problem, x: FloatArray) -> FloatArray:
+def _jacobian(problem: Problem, x: FloatArray) -> FloatArray:
     """Central differences in the scaled parameters, shape (points, parameters)."""
     columns = []
     for i in range(x.size):
@@ -292,7 +185,7 @@ def _jacobian(problem: _Problem, x: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    problem: _Problem,
+    problem: Problem,
     circuit: Circuit,
     name: str,
     error: float,

@@ -10,28 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.analysis.applied import AppliedCurrent, applied_current
 from tactile_lab.analysis.drain_current import Divider
 from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.model.simulate import Start
 from tactile_lab.quantity import show
+from tactile_lab.report.driven import applied_in, force_of, told
 from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Records, Run
-from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
 CELLS = 4000
 """Cells of a trace over the whole run."""
-EDGE = 5e-4
-"""Bins of the shunt to find edges in, s."""
 
 
 def read(folder: Path) -> RunData:
@@ -44,7 +40,7 @@ def read(folder: Path) -> RunData:
     scene = load(folder / "scene.toml")
     with Run.load(folder) as run:
         info = run.info
-        applied = _applied(run)
+        applied = applied_in(run)
         current = applied.steps
         spikes = run.spikes["time"]
         onset = stimulus_onset(scene)
@@ -65,7 +61,7 @@ def read(folder: Path) -> RunData:
             duration=run.duration,
             took=info.get("took_s"),
             trials=tuple(_trial(row, spikes, onset, segments) for row in run.trials),
-            force=_force(scene, current, run.duration),
+            force=force_of(scene, current, run.duration),
             current=current,
             warming=_warming(run),
             field=_field(run),
@@ -80,7 +76,7 @@ def read(folder: Path) -> RunData:
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
             warnings=(*warnings, *_doubts(scene, started, settings, warnings)),
-            assumptions=(*(info.get("assumptions") or ()), *_told(applied)),
+            assumptions=(*(info.get("assumptions") or ()), *told(applied)),
             parameters=_texts(scene, "protocol"),
             sensor=_texts(scene, "sensor"),
             settings=settings,
@@ -167,44 +163,6 @@ def _trace(run: Run, name: str) -> Trace:
     )
 
 
-def _applied(run: Run) -> AppliedCurrent:
-    """The coil current: levels as read back, edges where the shunt saw them."""
-    rows, shunt = run.current, None
-    if "coil_current" in run.signals:
-        signal = run.signal("coil_current")
-        # whole bins of the run's pyramid where they are fine enough
-        together = min(BIN, max(1, round(EDGE / signal.interval)))
-
-        def shunt(start: float, end: float) -> tuple[FloatArray, FloatArray]:
-            part = signal.between(start, end)
-            cells = max(1, (part.stop - part.start) // together)
-            seen = signal.envelope(part.start, part.stop, cells=cells)
-            step = np.diff(seen.time[-2:]) if seen.time.size > 1 else 0.0
-            return seen.time[:-1] + step / 2, seen.mean[:-1]  # the last may be short
-
-    return applied_current(rows["time"], rows["setpoint"], rows["measured"], shunt)
-
-
-def _told(applied: AppliedCurrent) -> tuple[str, ...]:
-    """Where the coil current came from, and whether shunt and source agree."""
-    steps = len(applied.steps)
-    if steps < 2:
-        return ()
-    said = (
-        f"coil current: levels as the source read them back, {applied.edges} of "
-        f"{steps - 1} steps timed by the shunt"
-    )
-    if applied.lead and applied.edges < steps - 1:
-        said += f", the others moved alike ({show(applied.lead, 's', 2)} earlier)"
-    ratio = applied.shunt_over_source
-    if ratio is not None:
-        said += (
-            f"; averaged over each level the shunt reads {ratio.value:.4g} "
-            f"({ratio.low:.4g} to {ratio.high:.4g}) of the source"
-        )
-    return (said,)
-
-
 def _start(scene: Scene) -> Start | None:
     given = scene.start
     if given is None:
@@ -234,20 +192,6 @@ def _field(run: Run) -> NDArray[np.float64]:
     names = rows.dtype.names or ()
     value = "field" if "field" in names else "value"
     return np.column_stack([rows["time"], rows[value]])
-
-
-def _force(scene: Scene, current: NDArray[np.float64], end: float) -> Waveform:
-    """Force the applied current gives: each set-point holds until the next."""
-    if len(current) == 0:
-        return Waveform.constant(0.0)
-    time, amperes = current[:, 0], current[:, 1]
-    steps = np.repeat(time, 2)[1:]
-    held = np.repeat(amperes, 2)[:-1]
-    steps, held = np.append(steps, max(end, steps[-1])), np.append(held, held[-1])
-    distinct = np.ones(steps.size, dtype=bool)
-    distinct[1:-1] = (steps[2:] != steps[1:-1]) | (steps[1:-1] != steps[:-2])
-    wave = Waveform(steps[distinct], held[distinct])
-    return scene.bench.magnet.force_for(wave, beyond="hold")
 
 
 def _divider(scene: Scene) -> Divider:
