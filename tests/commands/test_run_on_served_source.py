@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ BENCH = """
 name = "served"
 simulated = false
 [coil]
-dialect = "kepco-bop"
+dialect = "patient.toml"
 port = "{port}"
 [magnet]
 r = "6 mm"
@@ -50,6 +51,10 @@ class Served:
         )
         port = json.loads(self.process.stdout.readline())["coil"]
         (folder / "scene.toml").write_text(SCENE)
+        row = resources.files("drivers").joinpath("dialects", "kepco-bop.toml")
+        (folder / "patient.toml").write_text(
+            row.read_text().replace("[serial]", '[serial]\ntimeout = "400 ms"')
+        )
         (folder / "bench.toml").write_text(BENCH.format(port=port))
 
     def run(self) -> subprocess.Popen:

@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from patient import patient
 
 from drivers.coil_source import CoilSource
 from drivers.dialect import coil_dialect
@@ -25,12 +26,12 @@ OWNER = """
 import sys, time
 from drivers import guard
 from drivers.coil_source import CoilSource
-from drivers.dialect import coil_dialect
+from patient import patient
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 guard.SILENCE = float(sys.argv[4])
 clock = RealClock()
-coil = CoilSource(coil_dialect("kepco-bop"), sys.argv[1], CoilLimits(), clock)
+coil = CoilSource(patient("kepco-bop"), sys.argv[1], CoilLimits(), clock)
 coil.open()
 coil.energise()
 print("live", flush=True)
@@ -85,7 +86,11 @@ def owner(served, tmp_path):
             ],
             stdout=subprocess.PIPE,
             text=True,
-            env=os.environ | {"XDG_STATE_HOME": str(tmp_path)},
+            env=os.environ
+            | {
+                "XDG_STATE_HOME": str(tmp_path),
+                "PYTHONPATH": os.pathsep.join(sys.path),
+            },
         )
         started.append(process)
         assert process.stdout.readline() == "live\n"
@@ -169,8 +174,9 @@ def test_ctrl_c_at_the_terminal_does_not_reach_the_guard(served, owner):
 def guarded(served, tmp_path, monkeypatch):
     """A source guarded in this very process, its output on."""
     monkeypatch.setattr("drivers.guard.SILENCE", LONG_SILENCE)
+    monkeypatch.setattr("drivers.coil_off.VERIFICATIONS", 1)
     _, server = served
-    row = coil_dialect("kepco-bop")
+    row = patient("kepco-bop", timeout=0.6)
     log = tmp_path / "tactile-lab" / "guard.log"
     guard = Guard(server.url, row, row.serial, log)
     coil = CoilSource(row, server.url, CoilLimits(), RealClock(), guard=guard)

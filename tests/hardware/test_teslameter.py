@@ -35,6 +35,9 @@ def fact(name: str, value: object) -> None:
 @pytest.fixture
 def meter() -> Iterator[Teslameter]:
     row = meter_dialect(os.environ.get("TACTILE_LAB_DIALECT", "lakeshore-425"))
+    # how busy this computer is, is not asked here
+    wire = row.serial.model_copy(update={"timeout": 2.0})
+    row = row.model_copy(update={"serial": wire})
     port = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
     one = Teslameter(row, port, RealClock())
     one.open()

@@ -5,9 +5,9 @@ import sys
 import time
 
 import pytest
+from patient import patient
 
 from drivers.coil_source import CoilSource
-from drivers.dialect import coil_dialect, meter_dialect
 from drivers.teslameter import Teslameter
 from sim_backend.serve import ServedBench
 from tactile_lab.bench import CoilLimits
@@ -22,15 +22,13 @@ def test_both_instruments_look_at_one_coil(where, tmp_path):
     bench.start()
     clock = RealClock()
     coil = CoilSource(
-        coil_dialect("kepco-bop"),
+        patient("kepco-bop"),
         bench.addresses["coil"],
         CoilLimits(),
         clock,
         guarded=False,
     )
-    meter = Teslameter(
-        meter_dialect("lakeshore-425"), bench.addresses["teslameter"], clock
-    )
+    meter = Teslameter(patient("lakeshore-425"), bench.addresses["teslameter"], clock)
     coil.open()
     meter.open()
     coil.energise()
@@ -83,7 +81,7 @@ def test_the_command_serves_until_told_to_end(ending):
     )
     address = json.loads(served.stdout.readline())["coil"]
     coil = CoilSource(
-        coil_dialect("kepco-bop"), address, CoilLimits(), RealClock(), guarded=False
+        patient("kepco-bop"), address, CoilLimits(), RealClock(), guarded=False
     )
     coil.open()
     assert coil.identity.startswith("KEPCO")
