@@ -24,8 +24,8 @@ from gui.look.tokens import Tokens
 DOTS = 160
 """Most rate markers drawn; more would be a smear and slow."""
 
-NAMES = 0.15
-"""Share of the top lane's range that is left free for the names of holds."""
+NAMES = 14
+"""Height at the top lane's top that is left free for the names of holds, px."""
 
 
 @dataclass
@@ -62,7 +62,8 @@ class LanePainter:
             return
         count = max(50, int(right - AXIS))
         measured, twin = self._data(source, view.start, view.end, count)
-        self._fit(measured, twin, source)
+        room = min(NAMES / max(bottom - 5 - NAMES, NAMES), 1.0) if self.top else 0.0
+        self._fit(measured, twin, source, room)
         low, high = self.range
         frame = Frame(AXIS, right, 5, bottom, view.start, view.end, low, high)
         painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
@@ -115,8 +116,11 @@ class LanePainter:
             twin = scaled(source.twin(lane.signal, start, end, count), lane.scale)
         return scaled(measured, lane.scale), twin
 
-    def _fit(self, measured: Drawn, twin: Drawn, source: Source) -> None:
-        """Choose the value range: round, and steady while the data allows it."""
+    def _fit(self, measured: Drawn, twin: Drawn, source: Source, room: float) -> None:
+        """Choose the value range: round, and steady while the data allows it.
+
+        `room` is left free above the data, as a share of its range.
+        """
         if self.manual is not None:
             self.range = self.manual
             return
@@ -133,8 +137,7 @@ class LanePainter:
         if not extents:
             return
         low, high = min(e[0] for e in extents), max(e[1] for e in extents)
-        if self.top:
-            high += NAMES * (high - low)
+        high += room * (high - low)
         if low == high == 0.0:
             self.range = (0.0, self.lane.least)
             return

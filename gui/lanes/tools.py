@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QPoint, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QWidget
 
 from gui.lanes.axis import decimals
@@ -91,6 +92,11 @@ class Tools(QWidget):
         wide = width > (1330 if self._view.cursors is not None else 960)
         for button in self._texts:
             button.set_wide(wide)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Say as much of the cursors as there is room for."""
+        super().resizeEvent(event)
+        self.show_cursors()
 
     def toggle_cursors(self, on: bool) -> None:
         """Put the cursors into view, or take them away."""
@@ -199,9 +205,12 @@ class Tools(QWidget):
                 "AB", cursors, (tokens.accent, tokens.V_C1), strict=True
             )
         ]
-        self._readout.setText(
-            f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; Δt <b>{show(span, 's')}</b>{rate}"
-        )
+        between = f"Δt <b>{show(span, 's')}</b>{rate}"
+        whole = f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; {between}"
+        self._readout.setToolTip(whole)
+        self._readout.setText(whole)
+        if self._readout.sizeHint().width() > self._readout.width():
+            self._readout.setText(between)
 
     def _lay_out(self) -> None:
         row = QHBoxLayout(self)
