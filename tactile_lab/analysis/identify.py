@@ -94,6 +94,7 @@ def identify(
     if problem.size <= len(names):
         raise NotIdentifiableError(
             f"{problem.size} data points cannot determine {len(names)} parameters"
+            + "".join(f" ({why})" for why in unused)
         )
     x, weights = np.zeros(len(names)), problem.first_weights()
     for _ in range(3):  # the scatter of the two kinds of evidence is itself estimated

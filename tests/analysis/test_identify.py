@@ -103,12 +103,9 @@ def test_an_uncertain_force_and_offset_widen_the_intervals():
         assert 0.5 * half < 2 * moved < 2 * half
 
 
-def test_spikes_of_a_saturating_t1_are_left_out_and_that_is_said():
-    trace, spikes = run_of(Circuit())
-    found = identify(
-        Circuit(saturation=True), ("V_GS",), FORCE, FORCE.end, V_C1=trace,
-        spike_times=spikes,
-    )  # fmt: skip
-    assert found.warnings[0] == "spikes are not used: T1 saturates"
-    assert found.scatter_V_fire is None
-    assert found.estimates["V_GS"].value == pytest.approx(1.4, abs=2e-3)
+def test_spikes_of_a_saturating_t1_are_no_evidence():
+    _, spikes = run_of(Circuit())
+    with pytest.raises(NotIdentifiableError, match="T1 saturates"):
+        identify(
+            Circuit(saturation=True), ("V_GS",), FORCE, FORCE.end, spike_times=spikes
+        )
