@@ -94,7 +94,9 @@ def _line(case: Extreme, cap: float, alone: bool) -> tuple[str, str]:
             method: Method | None = able.get((name, settings.get(name, "tol 1e-09")))
             if method is None or case.truth == "refuse":
                 cells.append("")
-            elif problem.force.time.size > MOST_SEGMENTS:
+            elif problem.force.time.size > MOST_SEGMENTS or (
+                name == "Euler" and problem.circuit.saturation
+            ):
                 cells.append("not run")
             elif exact is None:
                 cells.append(_unjudged(case, method, cap))
