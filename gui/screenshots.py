@@ -19,6 +19,7 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gui.app import application, begin
+from gui.dialogs.connect import Connect
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
 from gui.session.session import Session
@@ -171,6 +172,7 @@ def _after(stage: Stage) -> None:
     window.actions_.connect_dialog()
     stage.shoot("window_connect")
     _close_overlays(window)
+    _wiring(stage)
     _compare(stage)
     _monitor(stage)
     _unplugged(stage)
@@ -179,6 +181,26 @@ def _after(stage: Stage) -> None:
 def _close_overlays(window: Window) -> None:
     for overlay in window.findChildren(Overlay):
         overlay.hide()
+
+
+def _wiring(stage: Stage) -> None:
+    """The wiring check from its page, with its verdicts."""
+    window, session = stage.window, stage.session
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    assert isinstance(dialog, Connect)
+    dialog.show_page(1)
+    dialog.wiring.check.click()
+    stage.until(lambda: session.state is State.RUNNING, 10)
+    stage.until(lambda: not session.busy, 40)
+    stage.until(lambda: bool(dialog.wiring.verdicts), 30)
+    stage.shoot("window_wiring")
+    _close_overlays(window)
+    session.acknowledge()
+    window.opening.open_scene(None)
+    session.expectation = None
+    window.setup.plan_now()
+    stage.until(lambda: session.expectation is not None)
 
 
 def _compare(stage: Stage) -> None:
