@@ -64,15 +64,17 @@ class Stage:
         if self.theme.choice != theme:
             self.theme.choose(theme)
         self.live(0.15)
-        # compressing a picture now would starve a run in progress
         self.taken[name] = (widget or self.window).grab()
+        if not self.session.busy:  # compressing would starve a run in progress
+            self.save()
 
     def save(self) -> None:
-        """Write all pictures taken."""
+        """Write the pictures taken since the last time."""
         for name, picture in self.taken.items():
             file = self.folder / f"{name}.png"
             picture.save(str(file))
-            print(file)
+            print(file, flush=True)
+        self.taken.clear()
 
     def ready(self) -> None:
         """Wait for bench and plan."""
