@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QRect, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QFrame, QGraphicsDropShadowEffect, QLabel, QWidget
+from PySide6.QtWidgets import (
+    QFrame,
+    QGraphicsDropShadowEffect,
+    QLabel,
+    QScrollArea,
+    QWidget,
+)
 
 HEADER = 68
 
@@ -68,7 +74,7 @@ class Overlay(QWidget):
     def _unwrap(self, width: int) -> None:
         """Give wrapped labels the height they need at this width."""
         layout = self.card.layout()
-        wrapped = [x for x in self.card.findChildren(QLabel) if x.wordWrap()]
+        wrapped = [x for x in self.card.findChildren(QLabel) if _wraps_alone(x)]
         for one in wrapped:
             one.setMinimumHeight(0)
         self.card.resize(width, max(self.card.height(), 400))
@@ -79,3 +85,13 @@ class Overlay(QWidget):
             for one in wrapped:
                 if one.isVisibleTo(self.card):
                     one.setMinimumHeight(max(one.heightForWidth(one.width()), 0))
+
+
+def _wraps_alone(one: QLabel) -> bool:
+    """Whether nobody else gives the label its height: scroll areas do for theirs."""
+    parent: QWidget | None = one
+    while one.wordWrap() and parent is not None:
+        if isinstance(parent, QScrollArea):
+            return False
+        parent = parent.parentWidget()
+    return one.wordWrap()

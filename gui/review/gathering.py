@@ -36,6 +36,7 @@ class Gathering(QObject):
         self.folder: Path | None = None
         self._view = view
         self._whole = False
+        self._elsewhere = False
         self._total = 0
         self._fitting = Fitting(self)
         self._fitting.fitted.connect(view.show_fit)
@@ -43,6 +44,7 @@ class Gathering(QObject):
     def begin(self, steps: int, *, fires: bool) -> None:
         """A run of so many steps begins; `fires`: its spikes are looked for."""
         self.findings, self.folder, self._whole = [], None, False
+        self._elsewhere = False
         self._total = steps
         self._view.show_kind(fires=fires)
         self._view.show_facts("", report=False)
@@ -52,11 +54,12 @@ class Gathering(QObject):
 
     def step(self, outcome: Outcome, source: LiveSource | None) -> None:
         """A step has ended."""
+        self._elsewhere |= outcome.trial.probes != "circuit"
         found = of_outcome(outcome)
         if found is not None:
             self.findings.append(found)
         self._show(running=True)
-        self._fitting.ask(self.findings, source)
+        self._fit(source)
         if source is not None:
             self._view.show_loop(source.loop)
 
@@ -65,7 +68,7 @@ class Gathering(QObject):
         self.folder = done.folder
         self._whole = done.ending.state is RunState.COMPLETE
         self._show(running=False)
-        self._fitting.ask(self.findings, source)
+        self._fit(source)
         facts = [
             f"<b>{done.folder.name}</b>",
             done.ending.off.text.partition(" | ")[0],
@@ -76,7 +79,7 @@ class Gathering(QObject):
     def reported(self, folder: Path, source: Source | None) -> None:
         """The run's report is written, and the model has come to the end."""
         if folder == self.folder:
-            self._fitting.ask(self.findings, source)
+            self._fit(source)
             self._view.report.setVisible((folder / "report.html").exists())
             self._conclude(folder)
 
@@ -84,9 +87,10 @@ class Gathering(QObject):
         """A run from disk is on screen."""
         self.findings, self.folder = of_run(source), source.path
         self._whole = source.info.get("status") == "complete"
+        self._elsewhere = source.info.get("protocol") == "wiring_check"
         self._view.show_kind(fires="spikes" in source.signals)
         self._show(running=False)
-        self._fitting.ask(self.findings, source)
+        self._fit(source)
         self._view.show_loop(source.loop)
         report = (source.path / "report.html").exists()
         self._view.show_facts(facts_of(source), report=report)
@@ -96,7 +100,11 @@ class Gathering(QObject):
 
     def compare_with_model(self, source: Source) -> None:
         """The model beside a run from disk has been computed."""
-        self._fitting.ask(self.findings, source)
+        self._fit(source)
+
+    def _fit(self, source: Source | None) -> None:
+        """Fit; with the probes elsewhere for a while there is nothing to compare."""
+        self._fitting.ask(self.findings, None if self._elsewhere else source)
 
     def open_report(self) -> None:
         """Open the report of the run on screen in the browser."""
