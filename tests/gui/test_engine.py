@@ -24,7 +24,7 @@ SCENE = """
 [protocol]
 name = "pulses"
 levels = ["80 mN"]
-hold = "1000 s"
+hold = "10000 s"
 
 [record]
 signals = ["V_C1"]
@@ -48,7 +48,7 @@ def test_window_that_has_gone_leaves_coil_off_and_record_complete(
     tmp_path: Path, request_: Request
 ) -> None:
     ours, theirs = Pipe()
-    serving = start(Engine(theirs).serve, "engine")
+    serving = start(Engine(theirs, realtime=False).serve, "engine")
     ours.send(StartRun(1, request_, tmp_path / "runs", report=False))
     live = False
     while not live:
@@ -65,10 +65,11 @@ def test_window_that_has_gone_leaves_coil_off_and_record_complete(
     assert "window has gone" in str(info["reason"])
 
 
+@pytest.mark.timeout(400)
 def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
     app: QApplication, tmp_path: Path, request_: Request
 ) -> None:
-    session = Session(tmp_path / "runs")
+    session = Session(tmp_path / "runs", realtime=False)
 
     def until(done: Callable[[], object]) -> None:
         end = time.monotonic() + LONGEST

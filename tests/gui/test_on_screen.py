@@ -16,6 +16,20 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+SCENE = """
+[protocol]
+name = "pulses"
+levels = ["120 mN"]
+hold = "600 s"
+
+[record]
+sample_rate = "20 kS/s"
+"""
+"""A run that lasts until it is stopped, and so slow that a busy computer keeps pace."""
+
+LONGEST = 90.0
+
+
 def wait(ask: list[str], environment: dict[str, str], longest: float) -> str:
     end = time.monotonic() + longest
     while True:
@@ -34,6 +48,7 @@ def logged(runs: Path, text: str, longest: float) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.timeout(400)
 def test_run_stop_and_close_by_keys(tmp_path: Path) -> None:
     read, write = os.pipe()
     screen = subprocess.Popen(
@@ -52,14 +67,23 @@ def test_run_stop_and_close_by_keys(tmp_path: Path) -> None:
         started.append(
             subprocess.Popen(["openbox"], env=environment, stderr=subprocess.DEVNULL)
         )
-        runs = tmp_path / "runs"
+        runs, scene = tmp_path / "runs", tmp_path / "slow.toml"
+        scene.write_text(SCENE)
         program = subprocess.Popen(
-            [sys.executable, "-m", "tactile_lab", "gui", "--out", str(runs)],
+            [
+                sys.executable,
+                "-m",
+                "tactile_lab",
+                "gui",
+                str(scene),
+                "--out",
+                str(runs),
+            ],
             env=environment,
         )
         started.append(program)
         ask = ["xdotool", "search", "--onlyvisible", "--name", "^Tactile Lab$"]
-        window = wait(ask, environment, 40)
+        window = wait(ask, environment, LONGEST)
 
         def keys(*pressed: str) -> None:
             subprocess.run(
@@ -67,15 +91,15 @@ def test_run_stop_and_close_by_keys(tmp_path: Path) -> None:
                 env=environment, check=True, timeout=20, stderr=subprocess.DEVNULL,
             )  # fmt: skip
 
-        end = time.monotonic() + 60
+        end = time.monotonic() + LONGEST
         while not list(runs.glob("*/run.json")):
             keys("ctrl+r")  # does nothing until bench and plan are there
             assert time.monotonic() < end, "Run never started"
             time.sleep(0.5)
         keys("Escape")
-        logged(runs, '"aborted"', 30)
+        logged(runs, '"aborted"', LONGEST)
         keys("alt+F4")
-        assert program.wait(30) == 0
+        assert program.wait(LONGEST) == 0
     finally:
         for process in reversed(started):
             if process.poll() is None:
