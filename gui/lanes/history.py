@@ -14,13 +14,15 @@ from tactile_lab.acquisition.live import Bins
 
 FINE = 1 << 17
 COARSE = 1 << 15
+FIRST = 1 << 12
+"""Bins there is room for at first: zeroing memory for all at once takes a frame."""
 
 
 class Track:
     """One signal's least, largest and mean value against time."""
 
     def __init__(self) -> None:
-        self._fine = np.empty((4, 2 * FINE))
+        self._fine = np.empty((4, FIRST))
         self._fine_from = 0
         self._fine_to = 0
         self._width = 0.0
@@ -48,6 +50,7 @@ class Track:
         rows = np.array([bins.time, bins.low, bins.high, bins.mean], dtype=np.float64)
         rows = rows[:, -FINE:]
         count = rows.shape[1]
+        self._make_room(self._fine_to + count)
         if self._fine_to + count > self._fine.shape[1]:
             oldest = max(self._fine_from, self._fine_to + count - FINE)
             kept = self._fine[:, oldest : self._fine_to].copy()
@@ -57,6 +60,14 @@ class Track:
         self._fine_to += count
         self._fine_from = max(self._fine_from, self._fine_to - FINE)
         self._coarsen(rows)
+
+    def _make_room(self, wanted: int) -> None:
+        """Have room for `wanted` bins, at most for twice `FINE`."""
+        size = self._fine.shape[1]
+        if size < min(wanted, 2 * FINE):
+            wider = np.empty((4, min(max(2 * size, wanted), 2 * FINE)))
+            wider[:, : self._fine_to] = self._fine[:, : self._fine_to]
+            self._fine = wider
 
     def between(self, start: float, end: float, count: int) -> Drawn:
         """What lies in [start, end] s in at most about `count` columns."""
