@@ -6,6 +6,7 @@ is given. Runs take real time, so this needs about two minutes.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import tempfile
@@ -87,9 +88,11 @@ class Stage:
 
 def main(folder: Path) -> None:
     """Make all pictures in `folder`."""
+    folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as out:
-        stage = Stage(folder, Path(out), None)
+    # the log names the runs folder: a relative one says nothing of this computer
+    with tempfile.TemporaryDirectory() as home, contextlib.chdir(home):
+        stage = Stage(folder, Path("runs"), None)
         stage.until(lambda: stage.session.expectation is not None)
         stage.shoot("window_first_start")
         stage.session.connect_bench("sim")
@@ -160,6 +163,9 @@ def _after(stage: Stage) -> None:
     stage.live(1.5)
     window.review.manual.set_asked.emit(0.25)
     stage.live(2.0)
+    session.read_field()
+    stage.until(lambda: not session.reading_field, 20)
+    stage.live(0.3)
     stage.shoot("window_manual")
     session.stop("picture taken")
     stage.until(lambda: session.manual is None)
@@ -220,7 +226,8 @@ def _compare(stage: Stage) -> None:
     stage.live(0.6)
     window.review.show_tab(1)
     cards = window.review.runs.cards
-    for card in [c for c in cards if c.entry.status == "complete"][:3]:
+    pulses = [c for c in cards if c.entry.title == "Pulses"]
+    for card in [c for c in pulses if c.entry.status == "complete"][:3]:
         card.tick.setChecked(True)
     window.review.runs.compare.click()
     stage.until(window.centre.compare_bar.isVisible)
@@ -234,7 +241,7 @@ def _compare(stage: Stage) -> None:
 
 def _monitor(stage: Stage) -> None:
     window, session = stage.window, stage.session
-    window.review.show_tab(0)
+    window.review.show_tab(1)
     session.watch(True)
     stage.until(
         lambda: (
