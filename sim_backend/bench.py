@@ -203,7 +203,13 @@ def open_bench(
                 "The scene reads the field; the bench has no [field_meter]."
             )
         meter_row = meter_dialect(spec.field_meter.dialect)
-        probe = meter_far_end(plant, meter_row, clock)
+        probe = meter_far_end(
+            plant,
+            meter_row,
+            clock,
+            noise=scene.simulated.field_noise,
+            seed=scene.simulated.seed,
+        )
         far_end = plug_in(probe, meter_row.serial, clock, "field-meter", meter_faults)
         meter = Teslameter(meter_row, far_end.url, clock)
     return Bench(

@@ -17,8 +17,9 @@ from tactile_lab.store.folder import INPUTS, RunFolder
 
 Settings = Mapping[str, Mapping[str, str]]
 
-MOVED = frozenset({"output", "setpoint_A"})
-"""Settings that a run itself moves; the recorded current tells of them."""
+MOVED = frozenset({"output", "setpoint_A", "range"})
+"""Settings that a run itself moves: the recorded current tells of the coil's, and a
+teslameter picks its range as the field needs it."""
 
 
 def origin(plan: Plan, bench: Bench, notes: Mapping[str, str]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from tactile_lab.signals import SIGNALS
 Noise = Annotated[float, Unit("V", least=0.0)]
 HalfWidth = Annotated[float, Unit("A", least=0.0)]
 Pull = Annotated[float, Unit("N", least=0.0)]
+FieldNoise = Annotated[float, Unit("T", least=0.0)]
 
 CELSIUS, ZERO_CELSIUS = "°C", 273.15
 """Unit, and its zero in K."""
@@ -167,6 +168,7 @@ class Simulated(Table):
         follower: voltage followers' bandwidth (3 MHz) and slew rate (13 V/us).
         follower_offset: offset voltage of the followers, V.
         input_bias: a follower's input bias into V_C2, A; 65 pA through R_L is 32 mV.
+        field_noise: standard deviation of a teslameter's reading, T.
         hum: amplitude of 50 Hz mains hum on every channel, V.
         coil_lag: the coil's L/R, s.
         eddy_lag: lag of the field behind the current, s.
@@ -185,6 +187,7 @@ class Simulated(Table):
     follower: bool = True
     follower_offset: Voltage = 0.0
     input_bias: Current = 65e-12
+    field_noise: FieldNoise = 2e-6
     hum: Noise = 0.0
     coil_lag: Pause = 1.1e-3
     eddy_lag: Pause = 3e-3
