@@ -70,8 +70,8 @@ def begin(window: Window, target: str | None, bench: str | None) -> None:
         window.opening.open_run(path)
     window.opening.list_runs()
     window.page.setFocus()
-    if bench is not None:
-        window.session.connect_bench(bench)
+    if bench is not None:  # in a turn of its own: the scene is painted meanwhile
+        QTimer.singleShot(0, lambda: window.session.connect_bench(bench))
 
 
 def _close_on_signals(window: Window) -> None:
