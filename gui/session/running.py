@@ -178,13 +178,13 @@ class Running:
     def _follow(
         self, twin: LiveTwin, execution: Execution, ended: threading.Event
     ) -> None:
-        """Advance the twin to where the samples are, slice by slice, to the end."""
-        from gui.session.twin import EVERY as SLICE
+        """Advance the twin behind the samples, slice by slice, and to their end."""
+        from gui.session.twin import BEHIND, EVERY
 
         over = False
         while not over:
-            over = ended.wait(SLICE)
-            part = twin.until(execution.live.reach)
+            over = ended.wait(EVERY)
+            part = twin.until(execution.live.reach - (0.0 if over else BEHIND))
             if part is not None:
                 self._tell(Twinned(part))
 

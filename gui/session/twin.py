@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 
 from gui.lanes.twinned import TwinSlice
@@ -15,6 +12,10 @@ from tactile_lab.scene.scene import Scene
 
 EVERY = 0.3
 """Seconds between slices."""
+
+BEHIND = 0.15
+"""How far the twin of a run in progress stays behind the samples, s: the host hears of
+a set-point only after the samples that it moved."""
 
 STEP = 1e-3
 """Length of a bin of the twin, s."""
@@ -31,16 +32,6 @@ class LiveTwin:
     def add(self, at: float, amperes: float) -> None:
         """A set-point was applied at run time `at` s."""
         self._follower.add(at, amperes)
-
-    def run(
-        self, reach: Callable[[], float | None], tell: Callable[[TwinSlice], None]
-    ) -> None:
-        """Follow a run until `reach()` is None; call in a thread of its own."""
-        while (until := reach()) is not None:
-            part = self.until(until)
-            if part is not None:
-                tell(part)
-            time.sleep(EVERY)
 
     def until(self, end: float) -> TwinSlice | None:
         """Advance to `end` s; None where there is nothing new or no answer."""

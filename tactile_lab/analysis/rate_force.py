@@ -73,9 +73,10 @@ def mean_slope(
         NotIdentifiableError: fewer than 3 different forces.
     """
     force, rate = np.asarray(forces, float), np.asarray(rates, float)
-    if np.unique(force).size < 3:
+    fired = np.unique(force).size
+    if fired < 3:
         raise NotIdentifiableError(
-            f"{np.unique(force).size} different forces made it fire, 3 are needed for "
+            f"{fired or 'no'} force{'s' * (fired > 1)} made it fire, 3 are needed for "
             "a slope"
         )
     apart = force - force.mean()

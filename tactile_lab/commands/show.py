@@ -107,39 +107,39 @@ def _print(summary: dict[str, Any]) -> None:
     click.echo(f"{summary['run']}: {summary['status']}, {kind}")
     for key in ("reason", "started", "protocol", "scene", "bench"):
         if summary[key]:
-            click.echo(f"{key:<11} {summary[key]}")
+            click.echo(f"{key:<13}{summary[key]}")
     for key, text in summary["notes"].items():
-        click.echo(f"{key:<11} {text}")
+        click.echo(f"{key:<13}{text}")
     if summary["temperature_K"] is not None:
-        click.echo(f"temperature {summary['temperature_K'] - ZERO_CELSIUS:.4g} °C")
+        click.echo(f"temperature  {summary['temperature_K'] - ZERO_CELSIUS:.4g} °C")
     for name, identity in summary["instruments"].items():
-        click.echo(f"{name:<11} {identity}")
+        click.echo(f"{name:<13}{identity}")
     for line in summary["instruments_changed"]:
-        click.echo(f"changed     {line}")
+        click.echo(f"changed      {line}")
     if found := summary["detection"]:
         why = ", from the noise" if found["from"] == "noise" else ""
         threshold = show(found["threshold_V"], "V", 3)
         click.echo(
-            f"detection   {found['signal']}, {found['kind']} at {threshold}{why}"
+            f"detection    {found['signal']}, {found['kind']} at {threshold}{why}"
         )
     if summary["duration_s"] is not None:
-        click.echo(f"duration    {show(summary['duration_s'], 's')}")
+        click.echo(f"duration     {show(summary['duration_s'], 's')}")
     for name, signal in summary["signals"].items():
         rate = show(signal["sample_rate_Hz"], "S/s")
         step = show(signal["resolution"], signal["unit"], 3)
-        click.echo(f"{name:<11} {signal['samples']} samples, {rate}, step {step}")
+        click.echo(f"{name:<13}{signal['samples']} samples, {rate}, step {step}")
     if summary["spikes"] is not None:
-        click.echo(f"spikes      {summary['spikes']}")
+        click.echo(f"spikes       {summary['spikes']}")
     for trial in summary["trials"]:
         click.echo(
-            f"trial       {trial['label']:<12} {trial['start_s']:.3f} to "
+            f"trial        {trial['label']:<12} {trial['start_s']:.3f} to "
             f"{trial['end_s']:.3f} s, {trial['spikes']} spikes"
         )
     if summary["overrange_blocks"]:
-        click.echo(f"over range  in {summary['overrange_blocks']} blocks")
+        click.echo(f"over range   in {summary['overrange_blocks']} blocks")
     if summary["loss"]:
         click.echo(summary["loss"]["text"])
     for name, digest in summary["inputs"].items():
         click.echo(f"kept        {name}  sha256 {digest[:16]}")
     for figure in summary["figures"]:
-        click.echo(f"figure      {figure}")
+        click.echo(f"figure       {figure}")

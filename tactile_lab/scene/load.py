@@ -158,7 +158,7 @@ def _find(path: str | Path | None) -> Path:
         names = ", ".join(scene_names())
         hint = nearest(str(path), scene_names())
         raise SceneError(
-            f"Scene {path} does not exist; {hint + ' ' if hint else ''}"
+            f"Scene {path} does not exist{'; ' + hint if hint else '.'} "
             f"Scenes that ship: {names}."
         )
     return file

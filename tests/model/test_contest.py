@@ -8,7 +8,7 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.compare import general
 from tactile_lab.model.compare.contest import Method, Truth, judge, ours
 from tactile_lab.model.compare.problem import OutOfTimeError, Problem
-from tactile_lab.model.compare.tables import best_rival, table, write_csv
+from tactile_lab.model.compare.tables import fastest, table, write_csv
 from tactile_lab.waveform import Waveform
 
 PROBLEM = Problem(
@@ -53,6 +53,7 @@ def test_verdicts(exact, tmp_path):
     assert [r.verdict for r in rows] == ["timed out", "NaN", "wrong count", "right"]
     assert rows[3].spike_error < 1e-12
     assert "**wrong: 1 spikes**" in table(rows)
-    assert best_rival(rows) == rows[3]
+    assert fastest(rows, ours=False) == rows[3]
+    assert fastest(rows, ours=True) is None
     write_csv(rows, tmp_path / "rows.csv")
     assert (tmp_path / "rows.csv").read_text().count("\n") == 5
