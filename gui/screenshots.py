@@ -160,6 +160,7 @@ def _after(stage: Stage) -> None:
         window.opening.close_run()
     window.review.show_tab(2)
     session.begin_manual()
+    stage.until(lambda: session.manual is not None, 60)
     stage.live(1.5)
     window.review.manual.set_asked.emit(0.25)
     stage.live(2.0)

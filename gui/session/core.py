@@ -95,6 +95,7 @@ class Core(QObject):
         self.queue: list[Queued] = []
         self.manual: ManualCoil | None = None
         self.reading_field = False
+        self.taking = False
         self.bench_overrides: tuple[str, ...] = ()
         self.errand: Errand | None = None
         self.readings: dict[str, float] = {}

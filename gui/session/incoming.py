@@ -13,6 +13,7 @@ from gui.session.messages import (
     Begun,
     Broken,
     Checked,
+    CoilByHand,
     Ended,
     Errand,
     FieldByHand,
@@ -111,6 +112,8 @@ class Incoming(Core):
                 self.errand = told
                 self.log(Level.WARNING, "runner", told.text)
                 self.changed.emit()
+            case CoilByHand():
+                self._taken(told)
             case FieldByHand(mean=mean, text=text):
                 self.reading_field = False
                 if mean is not None:
@@ -267,6 +270,16 @@ class Incoming(Core):
         if self._after_monitor is not None and not self.monitor.alive:
             wanted, self._after_monitor = self._after_monitor, None
             self.start(*wanted)
+
+    def _taken(self, told: CoilByHand) -> None:
+        self.taking = False
+        if told.coil is None:
+            self._set_fault(Fault("The coil cannot be driven by hand.", told.problem))
+        elif self.state is State.READY and told.request is self._check_request:
+            self.manual = told.coil
+            self.manual.start()
+            self.log(Level.WARNING, "coil", "Manual control on", safety=True)
+            self.changed.emit()
 
     def _mind_manual(self, manual: ManualCoil) -> None:
         manual.alive()

@@ -18,6 +18,7 @@ from tactile_lab.bench import CoilLimits, OffReport
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
     from gui.session.expectation import Expectation
+    from tactile_lab.acquisition.by_hand import ManualCoil
     from tactile_lab.acquisition.ending import CoilState, Executed
 
 
@@ -147,6 +148,15 @@ class Reported:
     problem: str
 
 
+@dataclass(frozen=True, eq=False)
+class CoilByHand:
+    """The coil is ready to be driven by hand, or why not; never sent through a pipe."""
+
+    request: Request
+    coil: ManualCoil | None
+    problem: str
+
+
 @dataclass(frozen=True)
 class FieldByHand:
     """The field was read on request, or why not."""
@@ -202,6 +212,7 @@ Told = (
     | Recorded
     | Reported
     | Errand
+    | CoilByHand
     | FieldByHand
     | Samples
     | Twinned

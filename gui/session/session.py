@@ -13,12 +13,11 @@ from gui.lanes.decimate import FloatArray
 from gui.session import chips
 from gui.session.commands import CheckBench, MakePlan, MakeTwin
 from gui.session.core import Core, Queued
-from gui.session.field import read_in_background
+from gui.session.hand import read_field, take_coil
 from gui.session.incoming import Incoming
 from gui.session.messages import Level
 from gui.session.request import Request, bench_request
 from gui.state import Fault, Snapshot, State
-from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import check_scope, open_bench
 from tactile_lab.quantity import show
@@ -116,36 +115,26 @@ class Session(Incoming):
 
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""
-        if self.state is not State.READY or self.manual or not self._check_request:
+        request = self._check_request
+        if self.state is not State.READY or self.manual or self.taking or not request:
             return
         self.monitor.stop()
-        try:
-            bench = open_bench(self._check_request.load(), realtime=True)
-            self.manual = ManualCoil(bench)
-        except (TactileLabError, OSError) as error:
-            self._set_fault(Fault("The coil cannot be driven by hand.", str(error)))
-            return
-        self.manual.start()
-        self.log(Level.WARNING, "coil", "Manual control on", safety=True)
-        self.changed.emit()
+        self.taking = True
+        take_coil(request, self.inbox)
 
     def read_field(self) -> None:
         """Read the field between runs, or while the coil is driven by hand."""
+        manual, request = self.manual, self._check_request
         if self.reading_field or self.state is not State.READY:
             return
-        try:
-            if self.manual is not None:
-                bench = self.manual.bench
-            elif self._check_request is not None:
-                bench = open_bench(self._check_request.load(), realtime=True)
-            else:
-                return
-        except (TactileLabError, OSError) as error:
-            self.log(Level.ERROR, "meter", f"The field was not read: {error}")
+        if manual is not None:
+            read_field(lambda: manual.bench, self.inbox)
+        elif request is not None:
+            read_field(lambda: open_bench(request.load(), realtime=True), self.inbox)
+        else:
             return
         self.reading_field = True
         self.changed.emit()
-        read_in_background(bench, self.inbox)
 
     def set_inputs(self, channels: str) -> str:
         """Set the scope's inputs for all that follows; why not, "" if it went well.

@@ -67,7 +67,7 @@ class Field(QFrame):
         self._check: QCheckBox | None = None
         name = label(parameter.title)
         name.setToolTip(self._tip())
-        name.setMinimumWidth(94)
+        name.setMinimumWidth(106)
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(7)

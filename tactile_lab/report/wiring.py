@@ -167,7 +167,7 @@ def _gate(
         f"V_C1 rests at {show(V_C1, 'V')}, the model at "
         f"{show(rest_V_C1(run.circuit), 'V')}: a V_GS of {show(gate.value, 'V')} "
         f"({show(gate.low, 'V')} to {show(gate.high, 'V')}, 95 %) explains it; "
-        "`threshold_search` refines it (0.65 mN per mV)."
+        "threshold_search refines it (0.65 mN per mV)."
     )
     return said, {"value": gate.value, "low_95": gate.low, "high_95": gate.high}
 

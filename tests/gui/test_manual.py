@@ -54,3 +54,13 @@ def test_field_is_read_on_request(lab) -> None:
     lab.until(lambda: not session.reading_field)
     assert "field" in session.readings
     assert window.review.manual.read.isEnabled()
+
+
+def test_a_coil_that_comes_too_late_is_not_taken(lab) -> None:
+    session = lab.session
+    session.begin_manual()
+    assert session.manual is None, "the bench is opened beside the window's thread"
+    session._enter(State.RUNNING)
+    lab.until(lambda: not session.taking)
+    assert session.manual is None
+    session._enter(State.READY)
