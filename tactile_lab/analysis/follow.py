@@ -35,6 +35,7 @@ class Follower:
         self._circuit = circuit
         self._magnet = magnet
         self._points: SimpleQueue[tuple[float, float]] = SimpleQueue()
+        self._later: tuple[float, float] | None = None
         self._state = start or rest(circuit)
         self._amperes = 0.0
 
@@ -66,12 +67,8 @@ class Follower:
             SolverError: the model cannot follow this force.
         """
         times, amperes = [self.reached], [self._amperes]
-        while True:
-            try:
-                at, value = self._points.get_nowait()
-            except Empty:
-                break
-            at = min(max(at, times[-1]), end)
+        while (point := self._next(end)) is not None:
+            at, value = max(point[0], times[-1]), point[1]
             if at > times[-1]:
                 times.append(at)
                 amperes.append(amperes[-1])
@@ -87,3 +84,12 @@ class Follower:
             self._circuit, self._state, force, end, keep=KEEP, tolerance=TOLERANCE
         )
         return out
+
+    def _next(self, end: float) -> tuple[float, float] | None:
+        """The next set-point applied by `end` s; a later one waits for its turn."""
+        try:
+            point = self._later or self._points.get_nowait()
+        except Empty:
+            return None
+        self._later = point if point[0] > end else None
+        return point if self._later is None else None
