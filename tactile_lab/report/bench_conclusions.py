@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
@@ -132,10 +133,16 @@ def force_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
     """F(I) - F(0) by Eq. (2) from current and field, and independent readings."""
     levels = np.array([t.trial.level or 0.0 for t in trials])
     by_field = [_force_by_field(run, t.trial) for t in trials]
-    sentences, values = [], {"F_minus_F0_by_field_N": by_field}
+    bands = [run.uncertain(force) for force in by_field]
+    sentences = []
+    values: dict[str, object] = {
+        "F_minus_F0_by_field_N": by_field,
+        "F_minus_F0_uncertainty_N_95": bands,
+    }
     known = [
         f"{t.trial.label} as {show(force, 'N', 3)}"
-        for t, force in zip(trials, by_field, strict=True)
+        + ("" if band is None else f" ± {show(band, 'N', 2)}")
+        for t, force, band in zip(trials, by_field, bands, strict=True)
         if force is not None
     ]
     if known:
@@ -168,6 +175,15 @@ def force_check(run: RunData, trials: Sequence[TrialFinding]) -> Conclusion:
             "15 mm x 15 mm has 2.25e-4 m²."
         )
     found = {**values, "read_over_eq2": scale, "standard_error": error}
+    if run.force_uncertainty is not None:
+        shared = run.force_uncertainty
+        offset = shared.absolute * abs(float(levels.sum())) / strength
+        open_ = scale * math.hypot(shared.relative, offset)
+        found["eq2_uncertainty_95"] = open_
+        said += (
+            " What calibration and geometry leave open in Eq. (2) adds "
+            f"±{open_:.2g} (95 %)."
+        )
     return Conclusion((*sentences, said), found)
 
 

@@ -207,6 +207,10 @@ def test_force_check_finds_the_slip_in_table_1():
     assert found.values["read_over_eq2"] == pytest.approx(0.0996, rel=1e-3)
     assert "2.25e-4" in found.sentences[0]
     assert "No independent readings" in find(run).conclusion.sentences[0]
+    assert "eq2_uncertainty_95" not in found.values
+    known = replace(run, parameters=read, force_uncertainty=ForceUncertainty(0.0, 0.1))
+    values = find(known).conclusion.values
+    assert values["eq2_uncertainty_95"] == pytest.approx(0.1 * values["read_over_eq2"])
 
 
 def test_monitor_tells_the_distance_to_threshold():
