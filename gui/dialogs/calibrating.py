@@ -22,6 +22,9 @@ MAGNET = (
     ("B2_per_ampere", "Field of the coil"),
 )
 
+TALL, LOW = 200, 118
+"""Height of the loop while it grows and beside its findings, pixels."""
+
 
 class Calibrating(QWidget):
     """Geometry of Eq. (2); the field calibration with its loop; the force check."""
@@ -39,7 +42,7 @@ class Calibrating(QWidget):
         self.field = push("Calibrate the field", "primary")
         self.progress = label("", "muted", wrap=True)
         self.loop = LoopPlot(theme)
-        self.loop.setFixedHeight(200)
+        self.loop.setFixedHeight(TALL)
         self.loop.hide()
         self.findings = label("", "", wrap=True)
         self.findings.hide()
@@ -73,6 +76,7 @@ class Calibrating(QWidget):
         self.progress.setText(text)
         self.field.setEnabled(not busy)
         if busy:
+            self.loop.setFixedHeight(TALL)
             self.findings.hide()
             self.use.hide()
 
@@ -84,6 +88,7 @@ class Calibrating(QWidget):
     def show_conclusion(self, found: Conclusion) -> None:
         """Show slope, loop and uncertainty, and offer the file."""
         self._file = found.calibration
+        self.loop.setFixedHeight(LOW)  # the words need the room; Results has it large
         self.findings.setText("\n".join(found.statements))
         self.findings.show()
         self.use.setVisible(found.calibration is not None)
