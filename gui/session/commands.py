@@ -54,8 +54,49 @@ class RecordWatch:
 
 
 @dataclass(frozen=True)
+class TakeCoil:
+    """Open a coil source to drive it by hand; it stays off.
+
+    Attributes:
+        run: number that tells its messages from others'.
+        request: names the bench.
+    """
+
+    run: int
+    request: Request
+
+
+@dataclass(frozen=True)
+class SetCoil:
+    """Have a coil that was taken go to `current`, A."""
+
+    run: int
+    current: float
+
+
+@dataclass(frozen=True)
+class RenewLease:
+    """The window lives: a coil that was taken may stay on for another 2 s."""
+
+    run: int
+
+
+@dataclass(frozen=True)
+class ReadField:
+    """Read the field once.
+
+    Attributes:
+        run: of a coil that was taken from the same bench; 0 if there is none.
+        request: names the bench.
+    """
+
+    run: int
+    request: Request
+
+
+@dataclass(frozen=True)
 class StopRun:
-    """Switch the coil off and end a run; why."""
+    """Switch the coil off and end a run, a watch or what is done by hand; why."""
 
     run: int
     reason: str
@@ -116,6 +157,10 @@ Command = (
     StartRun
     | StartWatch
     | RecordWatch
+    | TakeCoil
+    | SetCoil
+    | RenewLease
+    | ReadField
     | StopRun
     | TakeNote
     | ErrandDone

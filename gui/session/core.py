@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, Signal
 from gui.lanes.source import LiveSource
 from gui.session.coil import CoilWatch
 from gui.session.commands import MakePlan
-from gui.session.link import Link, RunAfar
+from gui.session.link import HandAfar, Link, RunAfar
 from gui.session.messages import (
     Checked,
     Errand,
@@ -25,7 +25,6 @@ from gui.session.messages import (
 from gui.session.monitor import Monitor
 from gui.session.request import Request
 from gui.state import CoilView, Fault, State
-from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.trial import Outcome
 
@@ -93,9 +92,8 @@ class Core(QObject):
         self.outcomes: list[Outcome] = []
         self.trial: tuple[int, str] | None = None
         self.queue: list[Queued] = []
-        self.manual: ManualCoil | None = None
+        self.manual: HandAfar | None = None
         self.reading_field = False
-        self.taking = False
         self.bench_overrides: tuple[str, ...] = ()
         self.errand: Errand | None = None
         self.readings: dict[str, float] = {}
@@ -192,10 +190,10 @@ class Core(QObject):
 
     def _coil_state(self) -> CoilState | None:
         if self.manual is not None:
-            return self.manual.state
-        if self._run is not None and self._run.alive:
-            return self._run.coil
-        return None
+            return self.manual.coil
+        # until its end has been taken from the queue: there is no gap to guess in
+        running = self.state in (State.RUNNING, State.ABORTING)
+        return self._run.coil if running and self._run is not None else None
 
     def _next_in_queue(self) -> None:
         free = self.state is State.READY and self.manual is None

@@ -23,12 +23,17 @@ from gui.session.commands import (
     Leave,
     MakePlan,
     MakeTwin,
+    ReadField,
     RecordWatch,
+    RenewLease,
+    SetCoil,
     StartRun,
     StartWatch,
     StopRun,
+    TakeCoil,
     TakeNote,
 )
+from gui.session.hand import Hand, read_field
 from gui.session.looking import Looking
 from gui.session.messages import Planned, Told, Twins
 from gui.session.request import Request
@@ -51,7 +56,7 @@ class Engine:
     def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
         self._pipe, self._realtime = pipe, realtime
         self._sending = threading.Lock()
-        self._runs: dict[int, Running | Looking] = {}
+        self._runs: dict[int, Running | Looking | Hand] = {}
 
     def serve(self) -> None:
         """Do what is asked until the window has gone; then leave every coil off."""
@@ -73,14 +78,10 @@ class Engine:
     def _do(self, command: Command) -> None:
         match command:
             case StartRun(run=number):
-                self._runs = {n: r for n, r in self._runs.items() if r.alive}
-                self._runs[number] = Running(
-                    command, self._teller(number), realtime=self._realtime
-                )
-                self._runs[number].start()
+                tell = self._teller(number)
+                self._begin(number, Running(command, tell, realtime=self._realtime))
             case StartWatch(run=number):
-                self._runs[number] = Looking(command, self._teller(number))
-                self._runs[number].start()
+                self._begin(number, Looking(command, self._teller(number)))
             case RecordWatch(run=number):
                 watch = self._runs.get(number)
                 if isinstance(watch, Looking):
@@ -89,17 +90,34 @@ class Engine:
                 if number in self._runs:
                     self._runs[number].stop(reason)
             case TakeNote(run=number, text=text, time=at):
-                if number in self._runs:
-                    self._runs[number].note(text, at)
+                if isinstance(run := self._runs.get(number), Running):
+                    run.note(text, at)
             case ErrandDone(run=number):
-                if number in self._runs:
-                    self._runs[number].errand_done()
+                if isinstance(run := self._runs.get(number), Running):
+                    run.errand_done()
+            case TakeCoil(run=number):
+                self._begin(number, Hand(command, self._teller(number)))
+            case SetCoil(run=number, current=current):
+                if isinstance(hand := self._runs.get(number), Hand):
+                    hand.hold(current)
+            case RenewLease(run=number):
+                if isinstance(hand := self._runs.get(number), Hand):
+                    hand.renew()
+            case ReadField(run=number, request=request):
+                found = self._runs.get(number)
+                held = found if isinstance(found, Hand) else None
+                start(lambda: self.tell(0, read_field(request, held)), "read field")
             case MakePlan(serial=serial, request=request):
                 start(lambda: self.tell(0, _planned(serial, request)), "plan")
             case CheckBench(request=request):
                 start(lambda: self._check(request), "check")
             case MakeTwin():
                 start(lambda: self.tell(0, _twins(command)), "twin of a run")
+
+    def _begin(self, number: int, run: Running | Looking | Hand) -> None:
+        self._runs = {n: r for n, r in self._runs.items() if r.alive}
+        self._runs[number] = run
+        run.start()
 
     def _check(self, request: Request) -> None:
         self.tell(0, check_bench(request, realtime=self._realtime))

@@ -1,50 +1,137 @@
-"""What is done by hand between runs: benches are opened and read in threads.
-
-Opening one loads drivers and, for the simulated bench, compiles its model.
-"""
+"""The bench by hand in the engine: the coil held at a current, the field read."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
-from queue import SimpleQueue
+from typing import TYPE_CHECKING
 
-from gui.session.messages import CoilByHand, FieldByHand, Told
+from gui.session.commands import TakeCoil
+from gui.session.messages import CoilByHand, FieldByHand, Gone, HandOff, Told
 from gui.session.request import Request
 from gui.session.threads import start
-from tactile_lab.bench import Bench
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
 
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.by_hand import ManualCoil
+    from tactile_lab.bench import Bench
 
-def take_coil(request: Request, inbox: SimpleQueue[Told]) -> None:
-    """Make the coil of a request's bench ready to be driven by hand; it stays off."""
+EVERY = 0.02
+"""Seconds between two looks at the coil."""
 
-    def work() -> None:
+AT_LEAST = 0.2
+"""Seconds after which its state is told although nothing changed: each word asks the
+window for a renewal of the lease."""
+
+
+class Hand:
+    """Drives the coil of one bench as the window says, until stopped.
+
+    What it is asked goes straight to the coil's thread. The lease is the window's: if
+    it is not renewed for 2 s, that thread switches off.
+
+    Args:
+        asked: whose coil.
+        tell: tells the window, from any thread.
+    """
+
+    def __init__(self, asked: TakeCoil, tell: Callable[[Told], None]) -> None:
+        self._asked, self._tell = asked, tell
+        self._coil: ManualCoil | None = None
+        self._current: float | None = None
+        self._stop_asked: str | None = None
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Open the source; its output stays off."""
+        self._thread = start(self._main, "coil by hand")
+
+    def stop(self, reason: str) -> None:
+        """Switch off; returns at once."""
+        with self._lock:
+            self._stop_asked = reason
+            coil = self._coil
+        if coil is not None:
+            coil.stop(reason)
+
+    def hold(self, current: float) -> None:
+        """Go to `current`, A, as soon as the source is open, and stay."""
+        with self._lock:
+            self._current = current
+            coil = self._coil
+        if coil is not None:
+            coil.hold(current)
+
+    def renew(self) -> None:
+        """The window lives."""
+        if self._coil is not None:
+            self._coil.alive()
+
+    @property
+    def bench(self) -> Bench | None:
+        """What the coil belongs to; None before it is made."""
+        return None if self._coil is None else self._coil.bench
+
+    @property
+    def alive(self) -> bool:
+        """Whether the coil has not been left yet."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def join(self, timeout: float) -> None:
+        """Wait for the end, at most `timeout` s."""
+        if self._thread is not None:
+            self._thread.join(timeout)
+
+    def _main(self) -> None:
+        try:
+            self._tell(self._drive())
+        finally:
+            self._tell(Gone())
+
+    def _drive(self) -> HandOff:
         from tactile_lab.acquisition.by_hand import ManualCoil
 
         try:
-            coil = ManualCoil(open_bench(request.load(), realtime=True))
+            bench = open_bench(self._asked.request.load(), realtime=True)
+            coil = ManualCoil(bench)
         except (TactileLabError, OSError) as error:
-            inbox.put(CoilByHand(request, None, str(error)))
-        else:
-            inbox.put(CoilByHand(request, coil, ""))
+            return HandOff(None, str(error), opened=False)
+        coil.start()
+        with self._lock:
+            self._coil = coil
+            reason, current = self._stop_asked, self._current
+        if reason is not None:
+            coil.stop(reason)
+        elif current is not None:
+            coil.hold(current)
+        self._watch(coil)
+        return HandOff(coil.off, coil.failure)
 
-    start(work, "take coil")
+    def _watch(self, coil: ManualCoil) -> None:
+        """Tell the coil's state as it changes, to the very last."""
+        last, said = None, 0.0
+        while not coil.ended:
+            applied = coil.thread.take_applied()
+            state = coil.state
+            if applied or state != last or time.monotonic() - said > AT_LEAST:
+                read = any(one.measured is not None for one in applied)
+                self._tell(CoilByHand(state, bool(applied), read))
+                last, said = state, time.monotonic()
+            coil.thread.join(EVERY)
 
 
-def read_field(opened: Callable[[], Bench], inbox: SimpleQueue[Told]) -> None:
-    """Read the field a few times."""
+def read_field(request: Request, hand: Hand | None) -> FieldByHand:
+    """Read the field a few times; of the bench in `hand`, if there is one."""
+    from tactile_lab.acquisition import by_hand
 
-    def work() -> None:
-        from tactile_lab.acquisition import by_hand
-
-        try:
-            found = by_hand.read_field(opened())
-        except (TactileLabError, OSError) as error:
-            inbox.put(FieldByHand(None, f"The field was not read: {error}"))
-        else:
-            text = f"{show(found.mean, 'T', 4)} ± {show(found.spread, 'T', 2)}"
-            inbox.put(FieldByHand(found.mean, f"Field {text}"))
-
-    start(work, "read field")
+    try:
+        bench = hand.bench if hand is not None else None
+        found = by_hand.read_field(bench or open_bench(request.load(), realtime=True))
+    except (TactileLabError, OSError) as error:
+        return FieldByHand(None, f"The field was not read: {error}")
+    text = f"{show(found.mean, 'T', 4)} ± {show(found.spread, 'T', 2)}"
+    return FieldByHand(found.mean, f"Field {text}")

@@ -17,6 +17,7 @@ from gui.session.messages import (
     Ended,
     Errand,
     FieldByHand,
+    HandOff,
     Level,
     Line,
     Lost,
@@ -30,7 +31,6 @@ from gui.session.messages import (
 )
 from gui.state import Fault, State, milliamperes
 from tactile_lab.acquisition import events
-from tactile_lab.acquisition.by_hand import ManualCoil
 from tactile_lab.bench import OffReport
 from tactile_lab.trial import Outcome
 
@@ -45,8 +45,6 @@ class Incoming(Core):
 
     def poll(self) -> bool:
         """Take all that engine and threads told; whether samples came too."""
-        if self.manual is not None:
-            self._mind_manual(self.manual)
         self._mind_monitor()
         while True:
             try:
@@ -113,7 +111,9 @@ class Incoming(Core):
                 self.log(Level.WARNING, "runner", told.text)
                 self.changed.emit()
             case CoilByHand():
-                self._taken(told)
+                self._by_hand(told)
+            case HandOff():
+                self._hand_off(told)
             case FieldByHand(mean=mean, text=text):
                 self.reading_field = False
                 if mean is not None:
@@ -177,13 +177,17 @@ class Incoming(Core):
         """The engine died. A guard, where the source has one, switches it off."""
         self._stop_source()
         self.log(Level.ERROR, "engine", f"The engine ended: {told.why}")
+        kept = ""
+        if self.manual is None:
+            kept = "Data up to then are kept (`tactile-lab recover`). "
+        self.manual, self.reading_field = None, False
         if told.driving or self.state is State.CONNECTING:
             self.coil.left(OffReport(False, None, "not verified"))
             self._set_fault(
                 Fault(
                     "The process that drives the instruments has ended.",
-                    "Data up to then are kept (`tactile-lab recover`). Look at the "
-                    "source: its guard switches it off, a simulated one is gone.",
+                    f"{kept}Look at the source: its guard switches it off, a simulated "
+                    "one is gone.",
                 )
             )
 
@@ -271,29 +275,26 @@ class Incoming(Core):
             wanted, self._after_monitor = self._after_monitor, None
             self.start(*wanted)
 
-    def _taken(self, told: CoilByHand) -> None:
-        self.taking = False
-        if told.coil is None:
-            self._set_fault(Fault("The coil cannot be driven by hand.", told.problem))
-        elif self.state is State.READY and told.request is self._check_request:
-            self.manual = told.coil
-            self.manual.start()
-            self.log(Level.WARNING, "coil", "Manual control on", safety=True)
-            self.changed.emit()
+    def _by_hand(self, told: CoilByHand) -> None:
+        """Note what the coil does; the engine hears that the window lives."""
+        if told.acted:
+            self.coil.sign_of_life(read_back=told.read_back)
+        if self.manual is not None:
+            self.manual.renew()
 
-    def _mind_manual(self, manual: ManualCoil) -> None:
-        manual.alive()
-        for applied in manual.thread.take_applied():
-            self.coil.sign_of_life(read_back=applied.measured is not None)
-        if not manual.ended:
-            return
+    def _hand_off(self, told: HandOff) -> None:
         self.manual = None
-        self.coil.left(manual.off)
-        if manual.off is None or not manual.off.verified:
-            text = manual.failure or "The coil's thread ended without a word."
-            self._set_fault(Fault("The coil's state is unknown.", text))
-        elif manual.failure:
-            self._set_fault(Fault("Manual control ended.", manual.failure))
+        if not told.opened:
+            self._set_fault(Fault("The coil cannot be driven by hand.", told.problem))
+            return
+        off = told.off or OffReport(False, None, "not verified")
+        self.coil.left(off)
+        if not off.verified:
+            self._set_fault(
+                Fault("The coil's state is unknown.", told.problem or off.text)
+            )
+        elif told.problem:
+            self._set_fault(Fault("Manual control ended.", told.problem))
         self.log(Level.GOOD, "safety", "Manual control off", safety=True)
         self.changed.emit()
 

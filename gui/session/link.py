@@ -8,19 +8,26 @@ from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from gui.session.commands import (
+    CheckBench,
     Command,
     ErrandDone,
     Leave,
+    MakePlan,
+    MakeTwin,
+    ReadField,
     RecordWatch,
+    RenewLease,
+    SetCoil,
     StartRun,
     StartWatch,
     StopRun,
+    TakeCoil,
     TakeNote,
 )
-from gui.session.messages import Gone, Lost, Samples, Told
+from gui.session.messages import CoilByHand, Gone, Lost, Samples, Told
 from gui.session.request import Request
 from gui.session.threads import start
 
@@ -31,9 +38,12 @@ if TYPE_CHECKING:
 
 Inbox = SimpleQueue[Told]
 
+OPENING = (MakePlan, CheckBench, MakeTwin, ReadField)
+"""What an engine is started for; the rest concerns something in one that has died."""
 
-class RunAfar:
-    """A run in the engine.
+
+class Afar:
+    """Something in the engine that holds instruments.
 
     Attributes:
         coil: as told last; None before the first word.
@@ -45,8 +55,35 @@ class RunAfar:
         self.coil: CoilState | None = None
 
     def stop(self, reason: str) -> None:
-        """Switch the coil off and end the run; returns at once."""
+        """Switch the coil off and end; returns at once."""
         self._link.ask(StopRun(self._number, reason))
+
+    @property
+    def alive(self) -> bool:
+        """Whether it may still hold instruments."""
+        return not self._gone.is_set()
+
+    def join(self, timeout: float) -> bool:
+        """Wait for the end, at most `timeout` s; whether it came."""
+        return self._gone.wait(timeout)
+
+    def hear(self, told: Told) -> None:
+        """Something came from it; called by the reading thread."""
+        if isinstance(told, Samples | CoilByHand):
+            self.coil = told.coil
+        if isinstance(told, Gone):
+            self._gone.set()
+        self._inbox.put(told)
+
+    def lose(self) -> bool:
+        """The engine has ended; whether this had not."""
+        had = self.alive
+        self._gone.set()
+        return had
+
+
+class RunAfar(Afar):
+    """A run, or a watch, in the engine."""
 
     def note(self, text: str, at: float) -> None:
         """Put a note into the run's log, stamped with its time, s."""
@@ -60,28 +97,24 @@ class RunAfar:
         """The person has done what the run waits for."""
         self._link.ask(ErrandDone(self._number))
 
-    @property
-    def alive(self) -> bool:
-        """Whether the run may still hold instruments."""
-        return not self._gone.is_set()
 
-    def join(self, timeout: float) -> bool:
-        """Wait for the end, at most `timeout` s; whether it came."""
-        return self._gone.wait(timeout)
+class HandAfar(Afar):
+    """A coil that the engine drives by hand; `CoilByHand` tells its state."""
 
-    def hear(self, told: Told) -> None:
-        """Something came from this run; called by the reading thread."""
-        if isinstance(told, Samples):
-            self.coil = told.coil
-        if isinstance(told, Gone):
-            self._gone.set()
-        self._inbox.put(told)
+    def hold(self, current: float) -> None:
+        """Go to `current`, A, as fast as the slew limit lets it, and stay."""
+        self._link.ask(SetCoil(self._number, current))
 
-    def lose(self) -> bool:
-        """The engine has ended; whether this run had not."""
-        had = self.alive
-        self._gone.set()
-        return had
+    def renew(self) -> None:
+        """Show that the window lives; without it the coil goes off after 2 s."""
+        self._link.ask(RenewLease(self._number))
+
+    def read_field(self, request: Request) -> None:
+        """Read the field of the bench that the coil belongs to."""
+        self._link.ask(ReadField(self._number, request))
+
+
+SomeAfar = TypeVar("SomeAfar", bound=Afar)
 
 
 class Link:
@@ -100,7 +133,7 @@ class Link:
         self._inbox, self._separate, self._realtime = inbox, separate, realtime
         self._pipe: Connection | None = None
         self._process: BaseProcess | threading.Thread | None = None
-        self._runs: dict[int, RunAfar] = {}
+        self._runs: dict[int, Afar] = {}
         self._last = 0
         self._lock = threading.Lock()
         self._closing = False
@@ -117,17 +150,23 @@ class Link:
         """Start a run; what it tells is put into `inbox`."""
         kept = dict(notes or {})
         return self._begin(
-            lambda number: StartRun(number, request, out, kept, report), inbox
+            RunAfar, inbox, lambda number: StartRun(number, request, out, kept, report)
         )
 
     def watch(self, request: Request, inbox: Inbox) -> RunAfar:
         """Start to watch; what it tells is put into `inbox`."""
-        return self._begin(lambda number: StartWatch(number, request), inbox)
+        return self._begin(RunAfar, inbox, lambda number: StartWatch(number, request))
 
-    def _begin(self, command: Callable[[int], Command], inbox: Inbox) -> RunAfar:
+    def take_coil(self, request: Request, inbox: Inbox) -> HandAfar:
+        """Open the coil source to drive it by hand; `inbox` is told its state."""
+        return self._begin(HandAfar, inbox, lambda number: TakeCoil(number, request))
+
+    def _begin(
+        self, kind: type[SomeAfar], inbox: Inbox, command: Callable[[int], Command]
+    ) -> SomeAfar:
         with self._lock:
             self._last += 1
-            made = RunAfar(self, self._last, inbox)
+            made = kind(self, self._last, inbox)
             pipe = self._pipe or self._open()
             self._runs[self._last] = made
             _send(pipe, command(self._last))
@@ -138,9 +177,7 @@ class Link:
         with self._lock:
             if self._pipe is not None:
                 _send(self._pipe, command)
-            elif not isinstance(
-                command, StopRun | TakeNote | ErrandDone | Leave | RecordWatch
-            ):
+            elif isinstance(command, OPENING):
                 _send(self._open(), command)
 
     @property

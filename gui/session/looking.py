@@ -47,12 +47,6 @@ class Looking:
         if watching is not None:
             watching.stop(reason)
 
-    def note(self, text: str, at: float) -> None:
-        """Nothing is recorded that could hold a note."""
-
-    def errand_done(self) -> None:
-        """Nobody is asked for anything."""
-
     @property
     def alive(self) -> bool:
         """Whether it has not ended yet."""

@@ -18,7 +18,6 @@ from tactile_lab.bench import CoilLimits, OffReport
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
     from gui.session.expectation import Expectation
-    from tactile_lab.acquisition.by_hand import ManualCoil
     from tactile_lab.acquisition.ending import CoilState, Executed
 
 
@@ -148,13 +147,34 @@ class Reported:
     problem: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class CoilByHand:
-    """The coil is ready to be driven by hand, or why not; never sent through a pipe."""
+    """The coil driven by hand, just now. Each is answered by renewing the lease.
 
-    request: Request
-    coil: ManualCoil | None
+    Attributes:
+        coil: what its thread knows.
+        acted: the source acknowledged something since this was told last.
+        read_back: and its current was read back.
+    """
+
+    coil: CoilState
+    acted: bool
+    read_back: bool
+
+
+@dataclass(frozen=True)
+class HandOff:
+    """The coil is driven by hand no more.
+
+    Attributes:
+        off: how it was left; None if nobody knows.
+        problem: why it ended by itself, "" if it was asked to.
+        opened: whether the source was touched at all.
+    """
+
+    off: OffReport | None
     problem: str
+    opened: bool = True
 
 
 @dataclass(frozen=True)
@@ -195,7 +215,7 @@ class Gone:
 
 @dataclass(frozen=True)
 class Lost:
-    """The engine has ended by itself; `driving` is whether a run was in progress."""
+    """The engine has ended by itself; `driving` is whether it had a coil or a scope."""
 
     why: str
     driving: bool
@@ -213,6 +233,7 @@ Told = (
     | Reported
     | Errand
     | CoilByHand
+    | HandOff
     | FieldByHand
     | Samples
     | Twinned

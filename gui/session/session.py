@@ -11,15 +11,14 @@ from pathlib import Path
 
 from gui.lanes.decimate import FloatArray
 from gui.session import chips
-from gui.session.commands import CheckBench, MakePlan, MakeTwin
+from gui.session.commands import CheckBench, MakePlan, MakeTwin, ReadField
 from gui.session.core import Core, Queued
-from gui.session.hand import read_field, take_coil
 from gui.session.incoming import Incoming
 from gui.session.messages import Level
 from gui.session.request import Request, bench_request
 from gui.state import Fault, Snapshot, State
 from tactile_lab.errors import TactileLabError
-from tactile_lab.plugins import check_scope, open_bench
+from tactile_lab.plugins import check_scope
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
 
@@ -81,14 +80,14 @@ class Session(Incoming):
         Runs that wait in the queue are held until somebody resumes it.
         """
         self._hold_queue()
-        if self._run is not None and self._run.alive:
+        if self.manual is not None:
+            self.manual.stop(reason)
+            self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
+        elif self._run is not None and self._run.alive:
             self._run.stop(reason)
             if self.state is State.RUNNING:
                 self._enter(State.ABORTING)
                 self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
-        elif self.manual is not None:
-            self.manual.stop(reason)
-            self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
         elif self.monitor.alive:
             self.monitor.stop()
             self.log(Level.INFO, "safety", "Monitor off; the coil was not in use")
@@ -116,23 +115,22 @@ class Session(Incoming):
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""
         request = self._check_request
-        if self.state is not State.READY or self.manual or self.taking or not request:
+        if self.state is not State.READY or self.manual or request is None:
             return
         self.monitor.stop()
-        self.taking = True
-        take_coil(request, self.inbox)
+        self.manual = self.link.take_coil(request, self.inbox)
+        self.log(Level.WARNING, "coil", "Manual control on", safety=True)
+        self.changed.emit()
 
     def read_field(self) -> None:
         """Read the field between runs, or while the coil is driven by hand."""
         manual, request = self.manual, self._check_request
-        if self.reading_field or self.state is not State.READY:
+        if self.reading_field or self.state is not State.READY or request is None:
             return
         if manual is not None:
-            read_field(lambda: manual.bench, self.inbox)
-        elif request is not None:
-            read_field(lambda: open_bench(request.load(), realtime=True), self.inbox)
+            manual.read_field(request)
         else:
-            return
+            self.link.ask(ReadField(0, request))
         self.reading_field = True
         self.changed.emit()
 
@@ -185,7 +183,8 @@ class Session(Incoming):
     def busy(self) -> bool:
         """Whether closing needs a question first."""
         live = self._run is not None and self._run.alive
-        return live or self.manual is not None
+        running = self.state in (State.RUNNING, State.ABORTING)
+        return live or running or self.manual is not None
 
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""
@@ -213,7 +212,8 @@ class Session(Incoming):
         if self._run is not None:
             self._run.join(timeout)
         if self.manual is not None:
-            self.manual.thread.join(max(0.0, until - time.monotonic()))
+            self.manual.join(max(0.0, until - time.monotonic()))
+        self.poll()
         return not self.busy
 
     def close(self) -> None:

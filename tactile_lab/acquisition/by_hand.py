@@ -48,7 +48,10 @@ class ManualCoil:
         self.coil: Coil = bench.coil
         self._clock = bench.clock
         self._stop = StopRequest(bench.clock)
-        self._lease = Lease(bench.clock)
+        self._lease = Lease(
+            bench.clock,
+            holder=("Whoever drives the coil by hand", "a window or script that hangs"),
+        )
         self.thread = CoilThread(bench.coil, bench.clock, self._stop, self._lease)
         self._energised = False
 

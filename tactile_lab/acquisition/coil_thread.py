@@ -8,7 +8,7 @@ from tactile_lab.acquisition.instrument_thread import InstrumentThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Coil, OffReport
 from tactile_lab.clock import Clock
-from tactile_lab.errors import InstrumentError, InterlockError
+from tactile_lab.errors import InstrumentError
 from tactile_lab.waveform import Waveform
 
 READ_BACK_EVERY = 0.25
@@ -105,11 +105,7 @@ class CoilThread(InstrumentThread):
             self.coil.beat()
             if self._stop.requested:
                 return
-            if self._lease.expired:
-                raise InterlockError(
-                    "The deciding loop gave no sign of life for longer than its lease; "
-                    "the coil was switched off. Look for a stuck disk or scope."
-                )
+            self._lease.check()
             if self._energise:
                 self.coil.energise()
                 self.settings.update(self.coil.settings())

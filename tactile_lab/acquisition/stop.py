@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tactile_lab.clock import Clock
+from tactile_lab.errors import InterlockError
 
 LEASE = 2.0
 """Seconds the coil stays live without a sign of life from the deciding loop."""
@@ -40,11 +41,23 @@ class StopRequest:
 
 
 class Lease:
-    """The deciding loop's sign of life, which the coil thread watches."""
+    """A sign of life, which the coil thread watches.
 
-    def __init__(self, clock: Clock, length: float = LEASE) -> None:
+    Args:
+        clock: of the coil.
+        length: how long one sign of life lasts, s.
+        holder: who shows it, and where to look if he does not, for a person.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        length: float = LEASE,
+        holder: tuple[str, str] = ("The deciding loop", "a stuck disk or scope"),
+    ) -> None:
         self._clock = clock
         self._length = length
+        self._holder = holder
         self._until: float | None = None
 
     def renew(self) -> None:
@@ -55,7 +68,15 @@ class Lease:
         """Stop watching: the loop ended in good order."""
         self._until = None
 
-    @property
-    def expired(self) -> bool:
-        """Whether the loop has shown no life for longer than the lease."""
-        return self._until is not None and self._clock.now() > self._until
+    def check(self) -> None:
+        """Nothing, as long as it holds.
+
+        Raises:
+            InterlockError: its holder has shown no life for longer than the lease.
+        """
+        if self._until is not None and self._clock.now() > self._until:
+            who, where = self._holder
+            raise InterlockError(
+                f"{who} gave no sign of life for longer than its lease of "
+                f"{self._length:g} s; the coil was switched off. Look for {where}."
+            )

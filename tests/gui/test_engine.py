@@ -4,22 +4,41 @@ import json
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib import resources
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from gui.session.commands import StartRun
+from gui.session.commands import (
+    ReadField,
+    RenewLease,
+    SetCoil,
+    StartRun,
+    StopRun,
+    TakeCoil,
+)
 from gui.session.engine import Engine
-from gui.session.messages import Samples
+from gui.session.messages import CoilByHand, FieldByHand, HandOff, Samples
 from gui.session.request import Request
 from gui.session.session import Session
 from gui.session.threads import start
 from gui.state import State, Truth, truth
+from sim_backend.serve import ServedBench
 
 LONGEST = 90.0
+BENCH = """
+name = "served"
+simulated = false
+[coil]
+dialect = "patient.toml"
+port = "{port}"
+[magnet]
+r = "6 mm"
+"""
 SCENE = """
 [protocol]
 name = "pulses"
@@ -99,3 +118,128 @@ def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
     session.close()
     assert not session.link.alive
     assert ended(tmp_path / "runs")["status"] == "running", "`recover` mends it"
+
+
+class Source:
+    """A current source at a port of its own: it outlives window and engine."""
+
+    def __init__(self, folder: Path) -> None:
+        self.log = folder / "deeds.jsonl"
+        self.served = ServedBench(coil="pty", log=self.log)
+        self.served.start()
+        row = resources.files("drivers").joinpath("dialects", "kepco-bop.toml")
+        (folder / "patient.toml").write_text(
+            row.read_text().replace("[serial]", '[serial]\ntimeout = "2 s"')
+        )
+        self.bench = folder / "bench.toml"
+        self.bench.write_text(BENCH.format(port=self.served.addresses["coil"]))
+        self.request = Request("demo", ('record.signals=["force"]',), str(self.bench))
+
+    @property
+    def output(self) -> bool:
+        """Whether the output is on, from what the source was told."""
+        told = self.log.read_text()
+        whole = told[: told.rfind("\n") + 1]
+        deeds = [json.loads(line) for line in whole.splitlines()]
+        return bool([d["value"] for d in deeds if d["what"] == "output"][-1])
+
+
+@pytest.fixture
+def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Source]:
+    if os.name != "posix":
+        pytest.skip("needs a pseudo-terminal")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    made = Source(tmp_path)
+    yield made
+    made.served.close()
+
+
+def wait_for(done: Callable[[], object], poll: Callable[[], object]) -> None:
+    end = time.monotonic() + LONGEST
+    while not done():
+        assert time.monotonic() < end
+        poll()
+        time.sleep(0.005)
+
+
+def hears(
+    pipe: Connection, wanted: Callable[[object], object], *, lives: bool = True
+) -> object:
+    """What the engine tells, as soon as it is what is wanted; `lives`: the window."""
+    while True:
+        assert pipe.poll(LONGEST), "the engine tells nothing"
+        number, told = pipe.recv()
+        if wanted(told):
+            return told
+        if lives and isinstance(told, CoilByHand):
+            pipe.send(RenewLease(number))
+
+
+def flows(told: object) -> bool:
+    return isinstance(told, CoilByHand) and abs((told.coil.measured or 0) - 0.1) < 2e-3
+
+
+@pytest.fixture
+def pipe() -> Iterator[Connection]:
+    """An engine's window, which says nothing by itself."""
+    ours, theirs = Pipe()
+    serving = start(Engine(theirs).serve, "engine")
+    yield ours
+    ours.close()
+    serving.join(LONGEST)
+    assert not serving.is_alive()
+
+
+def test_window_that_hangs_loses_the_coil_by_hand(
+    pipe: Connection, source: Source
+) -> None:
+    pipe.send(TakeCoil(1, source.request))
+    pipe.send(SetCoil(1, 0.1))
+    off = hears(pipe, lambda told: isinstance(told, HandOff), lives=False)
+    assert off.off.verified and "sign of life" in off.problem
+    assert not source.output
+
+
+def test_stop_by_hand_is_verified_and_field_is_read(pipe: Connection) -> None:
+    request = Request("demo", ('record.signals=["force", "field"]',), "sim")
+    pipe.send(TakeCoil(1, request))
+    pipe.send(SetCoil(1, 0.1))
+    hears(pipe, flows)
+    pipe.send(StopRun(1, "enough"))
+    off = hears(pipe, lambda told: isinstance(told, HandOff))
+    assert off.off.verified and off.problem == ""
+    pipe.send(ReadField(0, request))
+    read = hears(pipe, lambda told: isinstance(told, FieldByHand))
+    assert abs(read.mean) < 1e-4
+
+
+def test_window_that_has_gone_leaves_the_coil_by_hand_off(source: Source) -> None:
+    ours, theirs = Pipe()
+    serving = start(Engine(theirs).serve, "engine")
+    ours.send(TakeCoil(1, source.request))
+    ours.send(SetCoil(1, 0.1))
+    hears(ours, flows)
+    assert source.output
+    ours.close()
+    serving.join(LONGEST)
+    assert not serving.is_alive()
+    assert not source.output
+
+
+@pytest.mark.timeout(400)
+def test_engine_that_dies_by_hand_is_switched_off_by_its_guard(
+    app: QApplication, tmp_path: Path, source: Source
+) -> None:
+    session = Session(tmp_path / "runs")
+    session.connect_bench(str(source.bench))
+    wait_for(lambda: session.state is State.READY, session.poll)
+    session.begin_manual()
+    session.manual.hold(0.1)
+    wait_for(lambda: (session.coil_view().current or 0) > 0.09, session.poll)
+    assert source.output and truth(session.state, session.coil_view()) is Truth.LIVE
+    os.kill(session.link.pid, signal.SIGKILL)
+    wait_for(lambda: session.state is State.FAULT, session.poll)
+    assert session.manual is None and not session.busy
+    assert truth(session.state, session.coil_view()) is Truth.UNKNOWN
+    wait_for(lambda: not source.output, session.poll)
+    session.close()

@@ -1,6 +1,9 @@
 """The bench by hand: scope inputs between runs, the field on request."""
 
-from gui.state import State
+from gui.session.link import HandAfar
+from gui.session.messages import CoilByHand, HandOff
+from gui.state import State, Truth, truth
+from tactile_lab.acquisition.ending import CoilState
 
 
 def test_inputs_are_set_for_all_that_follows(lab) -> None:
@@ -56,11 +59,56 @@ def test_field_is_read_on_request(lab) -> None:
     assert window.review.manual.read.isEnabled()
 
 
-def test_a_coil_that_comes_too_late_is_not_taken(lab) -> None:
+def test_a_current_that_is_set_while_the_source_opens_is_not_lost(lab) -> None:
     session = lab.session
     session.begin_manual()
-    assert session.manual is None, "the bench is opened beside the window's thread"
-    session._enter(State.RUNNING)
-    lab.until(lambda: not session.taking)
-    assert session.manual is None
-    session._enter(State.READY)
+    session.manual.hold(0.05)
+    lab.until(lambda: abs((session.coil_view().current or 0.0) - 0.05) < 2e-3)
+    session.stop("test is over")
+    lab.until(lambda: session.manual is None)
+    assert session.state is State.READY and session.coil_view().verified_off
+
+
+def test_stop_counts_while_the_source_opens(lab) -> None:
+    session = lab.session
+    session.begin_manual()
+    session.stop("at once")
+    session.manual.hold(0.1)
+    lab.until(lambda: session.manual is None)
+    view = session.coil_view()
+    assert session.state is State.READY
+    assert view.output is False and view.verified_off and abs(view.current) < 2e-3
+
+
+def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
+    session = lab.session
+    renewed: list[bool] = []
+    hand = HandAfar(session.link, 0, session.inbox)
+    hand.renew = lambda: renewed.append(True)
+    session.manual = hand
+    state = CoilState(live=True, setpoint=0.1, measured=0.1, off=None)
+    for _ in range(3):
+        hand.hear(CoilByHand(state, acted=True, read_back=True))
+    lab.until(lambda: len(renewed) == 3)
+    assert session.coil_view().current == 0.1
+    hand.hear(HandOff(None, "The coil's thread ended without a word."))
+    lab.until(lambda: session.manual is None)
+    assert truth(session.state, session.coil_view()) is Truth.UNKNOWN
+    assert (
+        session.state is State.FAULT and "without a word" in session.fault.consequence
+    )
+    session.acknowledge()
+    session.connect_bench("sim")
+
+
+def test_a_field_is_read_while_the_coil_is_held(lab) -> None:
+    session = lab.session
+    session.readings.clear()
+    session.begin_manual()
+    session.manual.hold(0.5)
+    lab.until(lambda: abs((session.coil_view().current or 0.0) - 0.5) < 2e-3)
+    session.read_field()
+    lab.until(lambda: not session.reading_field)
+    assert abs(session.readings["field"] - 5.5e-3) < 1e-4, "11 mT/A, of that coil"
+    session.stop("test is over")
+    lab.until(lambda: session.manual is None)

@@ -164,7 +164,7 @@ def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
 def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
     window, session = lab.window, lab.session
     session.begin_manual()
-    lab.until(lambda: session.manual is not None and session.manual.thread.opened)
+    lab.until(lambda: session.manual.coil is not None)
     window.review.manual.current.setText("5 A")
     window.review.manual.set.click()
     assert session.coil_view().output is not True, "beyond the limit nothing is sent"
