@@ -13,9 +13,10 @@ from gui.lanes.compare import Comparison
 from gui.lanes.expected import PlanSource
 from gui.lanes.source import LiveSource
 from gui.panels import Panels
+from gui.records import Records
 from gui.review.entries import Entry, entries
 from gui.review.gathering import Gathering
-from gui.session.messages import Level, Planned, Twins
+from gui.session.messages import Level, Planned
 from gui.session.threads import start
 from gui.showing import lanes_shown
 from gui.state import State
@@ -36,7 +37,6 @@ class Opening(QObject):
     """
 
     changed = Signal()
-    loaded = Signal(object)
     failed = Signal(str)
     listed = Signal(object)
     compared = Signal(object)
@@ -47,8 +47,11 @@ class Opening(QObject):
         self.run: RunSource | Comparison | None = None
         self.ending = ""
         self.gathering = Gathering(panels.review.results, self)
-        self._tracks: object = None
-        self.loaded.connect(self._show_run)
+        self._model: object = None
+        self._records = Records(panels.session, self)
+        self._records.loaded.connect(self._show_run)
+        self._records.exchanged.connect(self._exchange)
+        self._records.failed.connect(self.say)
         self.failed.connect(self.say)
         self.listed.connect(self._list)
         self.compared.connect(self._show_comparison)
@@ -127,18 +130,7 @@ class Opening(QObject):
 
     def open_run(self, folder: Path) -> None:
         """Open a run from disk in the same lanes; read away from this thread."""
-
-        def work() -> None:
-            from gui.lanes.stored import RunSource
-
-            try:
-                source = RunSource(folder)
-            except (TactileLabError, OSError) as error:
-                self.failed.emit(str(error))
-                return
-            self.loaded.emit(source)
-
-        start(work, "open run")
+        self._records.open(folder)
 
     def list_runs(self) -> None:
         """Read the run folder anew, away from this thread."""
@@ -191,27 +183,18 @@ class Opening(QObject):
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
         self.gathering.end(done, source)
+        self._records.exchange(done.folder)
         self.list_runs()
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""
         self.gathering.reported(folder, self.run or self._panels.session.source)
 
-    def twin_made(self, twins: Twins) -> None:
-        """Put the model beside the run on disk, if that is still on screen."""
-        run = self.run
-        if run is None or isinstance(run, Comparison) or run.path != twins.folder:
-            return
-        if twins.problem:
-            self.say(twins.problem)
-        else:
-            run.add_twin(twins.parts)
-
     def take_fetched(self) -> None:
         """Repaint where samples of a run on disk have been read."""
         if self.run is not None and self.run.take_fetched():
-            if self.run.tracks is not self._tracks:
-                self._tracks = self.run.tracks
+            if self.run.model is not self._model:
+                self._model = self.run.model
                 self.gathering.compare_with_model(self.run)
             self.show_lanes()
             self._panels.centre.stack.refresh()
@@ -232,9 +215,10 @@ class Opening(QObject):
 
     def leave_run(self) -> None:
         """Let go of the run from disk on screen."""
+        self._records.forget()
         if self.run is not None:
             self.run.close()
-            self.run = None
+            self.run = self._records.shown = None
             self._panels.centre.compare_bar.show_comparison(None)
             self._panels.session.run_name = ""
         self._panels.centre.notice.hide()
@@ -246,7 +230,7 @@ class Opening(QObject):
             self.say("A run is in progress; old runs open when it has ended.")
             return
         self.leave_run()
-        self.run = source
+        self.run = self._records.shown = source
         panels.session.run_name = f"Looking at {source.path.name}"
         view = panels.centre.view
         view.set_now(source.reach, source.length)
@@ -256,16 +240,31 @@ class Opening(QObject):
         panels.centre.stack.show_source(source)
         view.show_all()
         panels.centre.stack.show_values()
-        panels.session.make_twin(source.path, source.current, source.length)
         status = str(source.info.get("status"))
         self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
         self.gathering.stored(source)
         panels.review.runs.show_current(source.path)
-        panels.centre.progress.show_run(
-            panels.session.snapshot(), source.holds, source.length, source.reach,
-            None, self.ending,
-        )  # fmt: skip
+        self._show_progress(source)
         self.changed.emit()
+
+    def _exchange(self, source: RunSource) -> None:
+        """Show the record in place of what was seen live; nothing else moves."""
+        panels = self._panels
+        if self._busy or self.run is not None:
+            source.close()
+            return
+        self.run = self._records.shown = source
+        panels.centre.view.set_now(source.reach, source.length)
+        self.show_lanes()
+        panels.centre.stack.exchange_source(source)
+        panels.review.runs.show_current(source.path)
+        self._show_progress(source)
+
+    def _show_progress(self, source: RunSource) -> None:
+        self._panels.centre.progress.show_run(
+            self._panels.session.snapshot(), source.holds, source.length,
+            source.reach, None, self.ending,
+        )  # fmt: skip
 
     def _show_comparison(self, comparison: Comparison) -> None:
         session, centre = self._panels.session, self._panels.centre

@@ -153,7 +153,7 @@ def _after(stage: Stage) -> None:
     if cards:
         window.opening.open_run(cards[0].entry.folder)
         stage.until(lambda: window.opening.run is not None and
-                    window.opening.run.tracks is not None)  # fmt: skip
+                    window.opening.run.model is not None)  # fmt: skip
         window.centre.view.show_span(9.2, 0.6)
         stage.live(0.4)
         stage.shoot("window_old_run")

@@ -22,7 +22,7 @@ def lanes_shown(
     if session.monitor.alive:
         return lanes_for(WATCHED, twin=False)
     if run is not None:
-        return lanes_for(run.signals, twin=run.tracks is not None)
+        return lanes_for(run.signals, twin=run.model is not None)
     expectation = session.plan_on_screen
     if expectation is None:
         return None

@@ -225,7 +225,6 @@ class Window(QMainWindow):
         session.trial_ended.connect(self.opening.trial_ended)
         session.run_ended.connect(self.opening.run_ended)
         session.reported.connect(self.opening.reported)
-        session.twinned.connect(self.opening.twin_made)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
         self.banner.log_asked.connect(self.centre.log.show_safety)

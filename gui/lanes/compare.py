@@ -49,7 +49,7 @@ class Comparison:
     """
 
     running = False
-    tracks = None
+    model = None
 
     def __init__(self, members: list[Member]) -> None:
         self.members = members

@@ -60,10 +60,22 @@ def rate_at(spikes: FloatArray, time: float) -> float:
 
 
 def difference(measured: Drawn, model: Drawn) -> Drawn:
-    """Measured less model, at the measured times that the model covers."""
-    if measured.empty or model.empty:
+    """Measured less model, at the measured times that the model covers.
+
+    A measured column is a mean over its width; so is what is taken from it, or every
+    ramp would leave a difference where the columns of the two do not fall together.
+    """
+    if measured.empty or model.time.size < 2:
         return Drawn.nothing()
     inside = measured.time <= model.time[-1]
     time = measured.time[inside]
-    rest = measured.mean[inside] - np.interp(time, model.time, model.mean)
+    step = np.diff(measured.time, append=np.inf)
+    typical = float(np.median(step[:-1])) if step.size > 1 else 0.0
+    ends = np.minimum(time + np.minimum(step[inside], typical), model.time[-1])
+    area = np.concatenate([[0.0], np.cumsum(np.diff(model.time) * model.mean[:-1])])
+    over = np.interp(ends, model.time, area) - np.interp(time, model.time, area)
+    plain = np.interp(time, model.time, model.mean)
+    width = ends - time
+    expected = np.divide(over, width, out=plain, where=width > 0)
+    rest = measured.mean[inside] - expected
     return Drawn(time, rest, rest, rest, measured.gap[inside])

@@ -62,12 +62,17 @@ class LaneStack(QFrame):
 
     def show_source(self, source: Source) -> None:
         """Show another source in the same lanes."""
+        for row in self.rows:
+            row.plot.painter.range = (0.0, 1.0)
+            row.plot.painter.manual = None
+        self.exchange_source(source)
+
+    def exchange_source(self, source: Source) -> None:
+        """Show another source of the same data: ranges stay."""
         self.source = source
         self.navigator.source = source
         for row in self.rows:
             row.plot.source = source
-            row.plot.painter.range = (0.0, 1.0)
-            row.plot.painter.manual = None
             row.tint()
         self.refresh()
         self.show_values()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,8 @@ import numpy as np
 
 from gui.lanes.decimate import Drawn, FloatArray, columns, line_between
 from gui.lanes.expected import Hold, settled
-from gui.lanes.twinned import TwinSlice, TwinTracks
+from gui.lanes.recorded_twin import RecordedTwin
+from gui.lanes.twinned import TwinSlice
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
@@ -86,6 +87,7 @@ class RunSource:
 
     Attributes:
         info: contents of `run.json`.
+        model: the twin, once it has come.
         fetched: set each time samples asked for have arrived.
     """
 
@@ -95,7 +97,7 @@ class RunSource:
         self._run = Run.load(path)
         self.path = path
         self.info: dict[str, Any] = self._run.info
-        self.tracks: TwinTracks | None = None
+        self.model: RecordedTwin | None = None
         self.fetched = threading.Event()
         run = self._run
         self._pyramids = {name: Pyramid(run.signal(name)) for name in run.signals}
@@ -143,24 +145,23 @@ class RunSource:
         time, field = time[inside], field[inside]
         return np.column_stack([np.interp(time, at, force) / self._gain, field])
 
-    def add_twin(self, parts: Iterable[TwinSlice]) -> None:
-        """Put the twin beside the data."""
-        tracks = TwinTracks()
-        for part in parts:
-            tracks.add(part)
-        self.tracks = tracks
+    def add_twin(
+        self, whole: TwinSlice, ask: Callable[[float, float, int], None]
+    ) -> None:
+        """Put the twin beside the data; `ask` has a part of it sampled closely."""
+        self.model = RecordedTwin(whole, ask)
         self.fetched.set()
 
-    @property
-    def current(self) -> FloatArray:
-        """Shape (n, 2): time, s, and applied current, A."""
-        time, force = self._slow["force"]
-        return np.column_stack([time, force / self._gain])
+    def add_twin_part(self, part: TwinSlice) -> None:
+        """A part of the twin that was asked for has come."""
+        if self.model is not None:
+            self.model.add(part)
+            self.fetched.set()
 
     @property
     def twin_spikes(self) -> FloatArray:
         """The twin's."""
-        return np.empty(0) if self.tracks is None else self.tracks.spikes
+        return np.empty(0) if self.model is None else self.model.spikes
 
     def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
         """The stored signal; where zoomed in, samples as soon as they are read."""
@@ -181,9 +182,9 @@ class RunSource:
 
     def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
         """The model's."""
-        if self.tracks is None:
+        if self.model is None:
             return Drawn.nothing()
-        return self.tracks.between(signal, start, end, count)
+        return self.model.between(signal, start, end, count)
 
     def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
         """The run is over: what was applied is shown, not what was planned."""

@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gui.session.request import Request
 
 
@@ -133,19 +130,26 @@ class CheckBench:
     request: Request
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class MakeTwin:
-    """Compute the twin of a finished run.
+    """Solve the model beside a finished run, in `folder`."""
+
+    folder: Path
+
+
+@dataclass(frozen=True)
+class LookAtTwin:
+    """Sample the twin of the run in `folder` closely.
 
     Attributes:
-        folder: of the run.
-        current: shape (n, 2): time, s, and applied current, A.
-        length: of the run, s.
+        start, end: on the run's time axis, s.
+        bins: how many.
     """
 
     folder: Path
-    current: NDArray[np.float64]
-    length: float
+    start: float
+    end: float
+    bins: int
 
 
 @dataclass(frozen=True)
@@ -167,5 +171,6 @@ Command = (
     | MakePlan
     | CheckBench
     | MakeTwin
+    | LookAtTwin
     | Leave
 )

@@ -74,6 +74,7 @@ class Core(QObject):
     reported = Signal(object)
     recorded = Signal(object)
     twinned = Signal(object)
+    twin_seen = Signal(object)
     queue_changed = Signal()
 
     def __init__(

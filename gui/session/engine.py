@@ -14,6 +14,8 @@ import signal
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gui.session.checking import check_bench
 from gui.session.commands import (
@@ -21,6 +23,7 @@ from gui.session.commands import (
     Command,
     ErrandDone,
     Leave,
+    LookAtTwin,
     MakePlan,
     MakeTwin,
     ReadField,
@@ -35,11 +38,14 @@ from gui.session.commands import (
 )
 from gui.session.hand import Hand, read_field
 from gui.session.looking import Looking
-from gui.session.messages import Planned, Told, Twins
+from gui.session.messages import Planned, Told, Twins, TwinSeen
 from gui.session.request import Request
 from gui.session.running import Running
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
+
+if TYPE_CHECKING:
+    from gui.session.whole_twin import WholeTwin
 
 LEAVE = 60.0
 """Longest wait for runs to end after the window has gone, s."""
@@ -57,6 +63,8 @@ class Engine:
         self._pipe, self._realtime = pipe, realtime
         self._sending = threading.Lock()
         self._runs: dict[int, Running | Looking | Hand] = {}
+        self._twin: WholeTwin | None = None
+        self._solving = threading.Lock()
 
     def serve(self) -> None:
         """Do what is asked until the window has gone; then leave every coil off."""
@@ -111,8 +119,8 @@ class Engine:
                 start(lambda: self.tell(0, _planned(serial, request)), "plan")
             case CheckBench(request=request):
                 start(lambda: self._check(request), "check")
-            case MakeTwin():
-                start(lambda: self.tell(0, _twins(command)), "twin of a run")
+            case MakeTwin(folder=folder) | LookAtTwin(folder=folder):
+                start(lambda: self._tell_twin(command, folder), "twin of a run")
 
     def _begin(self, number: int, run: Running | Looking | Hand) -> None:
         self._runs = {n: r for n, r in self._runs.items() if r.alive}
@@ -121,6 +129,24 @@ class Engine:
 
     def _check(self, request: Request) -> None:
         self.tell(0, check_bench(request, realtime=self._realtime))
+
+    def _tell_twin(self, asked: MakeTwin | LookAtTwin, folder: Path) -> None:
+        """Solve the model beside a run, unless it was the last; tell what is asked."""
+        try:
+            with self._solving:
+                twin = self._twin
+                if twin is None or twin.folder != folder:
+                    from gui.session.whole_twin import WholeTwin
+
+                    self._twin = twin = WholeTwin(folder)
+            if isinstance(asked, MakeTwin):
+                told: Told = Twins(folder, twin.whole(), "")
+            else:
+                part = twin.part(asked.start, asked.end, asked.bins)
+                told = TwinSeen(folder, part)
+        except (TactileLabError, OSError) as error:
+            told = Twins(folder, None, f"No model beside {folder.name}: {error}")
+        self.tell(0, told)
 
     def _teller(self, number: int) -> Callable[[Told], None]:
         return lambda told: self.tell(number, told)
@@ -163,15 +189,3 @@ def _planned(serial: int, request: Request) -> Planned:
     except Exception as error:  # a protocol of the user's own may raise anything
         problem = f"The plan broke: {type(error).__name__}: {error}"
     return Planned(serial, request, found, problem)
-
-
-def _twins(asked: MakeTwin) -> Twins:
-    from gui.session.twin import twin_of
-
-    folder = asked.folder
-    try:
-        scene = Request(str(folder / "scene.toml"), (), None).load()
-        parts = twin_of(scene, asked.current, asked.length)
-    except (TactileLabError, OSError) as error:
-        return Twins(folder, (), f"No model beside {folder.name}: {error}")
-    return Twins(folder, tuple(parts), "")

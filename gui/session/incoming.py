@@ -28,6 +28,7 @@ from gui.session.messages import (
     Told,
     Twinned,
     Twins,
+    TwinSeen,
 )
 from gui.state import Fault, State, milliamperes
 from tactile_lab.acquisition import events
@@ -122,6 +123,8 @@ class Incoming(Core):
                 self.changed.emit()
             case Twins():
                 self.twinned.emit(told)
+            case TwinSeen():
+                self.twin_seen.emit(told)
             case Lost():
                 self._lost(told)
             case Line():

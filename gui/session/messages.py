@@ -204,8 +204,16 @@ class Twins:
     """The twin of a finished run, or why there is none."""
 
     folder: Path
-    parts: tuple[TwinSlice, ...]
+    whole: TwinSlice | None
     problem: str
+
+
+@dataclass(frozen=True, eq=False)
+class TwinSeen:
+    """A part of the twin of a finished run, seen closely."""
+
+    folder: Path
+    part: TwinSlice
 
 
 @dataclass(frozen=True)
@@ -238,6 +246,7 @@ Told = (
     | Samples
     | Twinned
     | Twins
+    | TwinSeen
     | Gone
     | Lost
     | Line

@@ -9,9 +9,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from gui.lanes.decimate import FloatArray
 from gui.session import chips
-from gui.session.commands import CheckBench, MakePlan, MakeTwin, ReadField
+from gui.session.commands import CheckBench, LookAtTwin, MakePlan, MakeTwin, ReadField
 from gui.session.core import Core, Queued
 from gui.session.incoming import Incoming
 from gui.session.messages import Level
@@ -70,9 +69,13 @@ class Session(Incoming):
         self._serial += 1
         self.link.ask(MakePlan(self._serial, request))
 
-    def make_twin(self, folder: Path, current: FloatArray, length: float) -> None:
+    def make_twin(self, folder: Path) -> None:
         """Have the twin of a run on disk computed; `twinned` tells the result."""
-        self.link.ask(MakeTwin(folder, current, length))
+        self.link.ask(MakeTwin(folder))
+
+    def look_at_twin(self, folder: Path, start: float, end: float, bins: int) -> None:
+        """Have that twin sampled between two times, s; `twin_seen` tells the result."""
+        self.link.ask(LookAtTwin(folder, start, end, bins))
 
     def stop(self, reason: str = "STOP in the window") -> None:
         """Coil off, now. Reaches the coil's thread directly and never waits.

@@ -50,12 +50,3 @@ class LiveTwin:
             bins[signal] = Bins(grid, (end - begin) / count, value, value, value)
         spikes = np.empty(0) if out.spike_times is None else out.spike_times
         return TwinSlice(bins, spikes, end)
-
-
-def twin_of(scene: Scene, current: np.ndarray, end: float) -> list[TwinSlice]:
-    """The twin of a whole run; `current` has rows of time, s, and current, A."""
-    twin = LiveTwin(scene)
-    for at, amperes in current:
-        twin.add(float(at), float(amperes))
-    part = twin.until(end)
-    return [] if part is None else [part]

@@ -5,8 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.decimate import Drawn
-from gui.lanes.twinned import TwinTracks, joined
-from gui.session.twin import LiveTwin, twin_of
+from gui.lanes.recorded_twin import CLOSE, RecordedTwin
+from gui.lanes.twinned import TwinSlice, TwinTracks, joined
+from gui.session.twin import LiveTwin
+from gui.session.whole_twin import binned
 from tactile_lab.model.simulate import simulate
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
@@ -15,10 +17,19 @@ SCENE = load("demo")
 POINTS = [(0.1, 0.0), (0.2, 0.3), (0.3, 0.6), (0.9, 0.2), (1.2, 0.0)]
 
 
+def in_one_piece() -> TwinSlice:
+    twin = LiveTwin(SCENE)
+    for point in POINTS:
+        twin.add(*point)
+    part = twin.until(1.5)
+    assert part is not None
+    return part
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(0.01, 1.45), max_size=6))
 def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
-    whole = twin_of(SCENE, np.array(POINTS), 1.5)[0]
+    whole = in_one_piece()
     twin, tracks = LiveTwin(SCENE), TwinTracks()
     fed = 0
     for end in [*sorted(cuts), 1.5]:
@@ -33,7 +44,7 @@ def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
 
 
 def test_set_points_hold_until_the_next() -> None:
-    part = twin_of(SCENE, np.array(POINTS), 1.5)[0]
+    part = in_one_piece()
     time, value = np.array(POINTS).T
     steps, held = np.repeat(time, 2)[1:], np.repeat(value, 2)[:-1]
     force = Waveform(
@@ -62,3 +73,82 @@ def test_nothing_joined_to_something_is_that() -> None:
     assert joined(Drawn.nothing(), line) is line
     assert joined(line, Drawn.nothing()) is line
     assert joined(line, line).time.size == 4
+
+
+RESULT = simulate(
+    SCENE.circuit,
+    Waveform(np.array([0.0, 0.2, 1.5]), np.array([0.0, 0.16, 0.16])),
+    keep=("V_C1", "V_C2", "V_K", "spikes"),
+    until=1.5,
+)
+
+
+@given(
+    start=st.floats(0.0, 1.4), width=st.floats(1e-6, 0.1), count=st.integers(2, 300),
+    signal=st.sampled_from(["V_C1", "V_C2", "V_K"]),
+)  # fmt: skip
+def test_bins_hold_all_the_model_does(start, width, count, signal) -> None:
+    end = start + width
+    spikes = RESULT.spike_times
+    assert spikes is not None and spikes.size > 5
+    inside = spikes[(spikes >= start) & (spikes < end)]
+    bins = binned(RESULT, signal, inside, start, end, count)
+    assert np.all(bins.low <= bins.mean) and np.all(bins.mean <= bins.high)
+    peak = {"V_C1": 0.0, "V_C2": 3.0, "V_K": 3.0}[signal]
+    for spike in inside:
+        at = min(int((spike - start) / bins.width), count - 1)
+        assert bins.high[at] >= peak, "a spike falls between the bins"
+
+
+def parts(asked: list[tuple[float, float, int]]) -> RecordedTwin:
+    def slice_(start: float, end: float, count: int) -> TwinSlice:
+        spikes = np.empty(0)
+        bins = {"V_C1": binned(RESULT, "V_C1", spikes, start, end, count)}
+        return TwinSlice(bins, spikes, end)
+
+    twin = RecordedTwin(slice_(0.0, 1.5, 1500), lambda *part: asked.append(part))
+    twin.answer = lambda: twin.add(  # type: ignore[attr-defined]
+        slice_(max(asked[-1][0], 0.0), min(asked[-1][1], 1.5), asked[-1][2])
+    )
+    return twin
+
+
+def test_wide_views_ask_for_nothing() -> None:
+    asked: list[tuple[float, float, int]] = []
+    drawn = parts(asked).between("V_C1", 0.0, 1.5, 1000)
+    assert not drawn.empty and not asked
+    assert parts(asked).between("V_K", 0.0, 1e-3, 1000).empty and not asked
+
+
+@given(
+    start=st.floats(0.0, 1.45), width=st.floats(1e-5, 0.04),
+    count=st.integers(200, 6000),
+)  # fmt: skip
+def test_a_close_look_is_asked_for_once_and_then_exact(start, width, count) -> None:
+    asked: list[tuple[float, float, int]] = []
+    twin = parts(asked)
+    end = start + width
+    twin.between("V_C1", start, end, count)
+    twin.between("V_C1", start, end, count)
+    assert len(asked) == 1, "one look at a time"
+    assert asked[0][0] <= start and asked[0][1] >= end and asked[0][2] == CLOSE
+    twin.answer()
+    for _ in range(3):
+        drawn = twin.between("V_C1", start, end, count)
+    assert len(asked) == 1, "the answer is as fine as another one would be"
+    middle = (drawn.time >= start) & (drawn.time <= end)
+    exact = RESULT.sample("V_C1", drawn.time[middle])
+    assert np.allclose(drawn.mean[middle], exact, atol=1e-3)
+
+
+def test_looks_at_a_few_places_do_not_drive_each_other_out() -> None:
+    asked: list[tuple[float, float, int]] = []
+    twin = parts(asked)
+    places = [(0.3, 0.31), (0.6, 0.64), (0.9, 0.94)]
+    for _ in range(4):
+        for start, end in places:
+            before = len(asked)
+            twin.between("V_C1", start, end, 1000)
+            if len(asked) > before:
+                twin.answer()
+    assert len(asked) == len(places)

@@ -188,10 +188,25 @@ def test_old_run_opens_in_the_same_lanes(lab) -> None:
     lab.until(lambda: window.opening.run is not None)
     run = window.opening.run
     assert np.allclose(run.spikes, live_spikes, atol=1e-3)
-    lab.until(lambda: run.tracks is not None)
+    lab.until(lambda: run.model is not None)
     window.centre.view.show_span(0.2, 0.001)
+    lab.until(lambda: run.twin("V_C2", 0.2, 0.201, 1000).time.size > 500)
     run.trace("V_C2", 0.2, 0.201, 1000)
     lab.until(lambda: run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+
+
+def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
+    window, opening = lab.window, lab.window.opening
+    folder = lab.complete_run()
+    lab.until(lambda: opening.run is not None)
+    assert opening.run.path == folder
+    assert window.session.run_name == folder.name
+    assert window.centre.stack.source is opening.run
+    assert opening.run.model is not None, "the model does not blink"
+    live = window.session.source
+    window.centre.view.show_span(0.2, 0.001)
+    lab.until(lambda: opening.run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+    assert live.trace("V_C2", 0.2, 0.201, 1000).time.size < 10, "seen live: bins"
 
 
 def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
