@@ -109,7 +109,7 @@ class Actions(QObject):
         form = panels.setup.form
         return [
             Key(("Ctrl+R",), "Run", panels.setup.start),
-            Key(("Ctrl+Return",), "Queue", panels.setup.enqueue),
+            Key(("Ctrl+Return",), "Queue; save a queued run", panels.setup.enqueue),
             Key(("Space",), "Freeze the display", tools.freeze.toggle, single=True),
             Key(("F",), "Follow", tools.follow.click, single=True),
             Key(("A",), "Fit the whole run", view.show_all, single=True),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
@@ -170,6 +171,21 @@ def scrolling(inner: QWidget) -> QScrollArea:
     return area
 
 
+BAR = 10
+"""Width of a scroll bar, px, as the style sheet has it."""
+
+
+def with_gutter(area: QScrollArea, inside: QLayout) -> QScrollArea:
+    """Keep `inside` as wide with a scroll bar as without: the bar has its own room."""
+
+    def make_room(least: int, most: int) -> None:
+        inside.setContentsMargins(0, 0, 0 if most > least else BAR, 0)
+
+    make_room(0, 0)
+    area.verticalScrollBar().rangeChanged.connect(make_room)
+    return area
+
+
 def column(parent: QWidget, margin: int = 0, spacing: int = 6) -> QVBoxLayout:
     """A vertical layout on `parent`."""
     layout = QVBoxLayout(parent)
@@ -192,6 +208,25 @@ def elided(widget: QLabel, text: str) -> None:
     width = max(widget.width(), 40)
     widget.setText(metrics.elidedText(text, Qt.TextElideMode.ElideRight, width))
     widget.setToolTip(text)
+
+
+class Elided(QLabel):
+    """A label that shortens its text with an ellipsis to the room it has."""
+
+    def __init__(self, text: str, role: str = "") -> None:
+        super().__init__()
+        self.whole = text
+        if role:
+            self.setProperty("role", role)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(text)
+        self.setText(text)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Shorten anew."""
+        super().resizeEvent(event)
+        room, way = self.contentsRect().width(), Qt.TextElideMode.ElideRight
+        self.setText(self.fontMetrics().elidedText(self.whole, way, room))
 
 
 def empty(layout: QLayout) -> None:

@@ -23,14 +23,17 @@ PANELS = (
         "Choose a protocol; its form is made from its typed parameters. A blue mark "
         "is a value changed from its default, red says why a value cannot be used. The "
         "star keeps the parameters under a name, as a scene in the folder presets. The "
-        "form is locked while running. The preview is the force as the coil will "
-        "really play it; below it stands what the run costs.",
+        "form is locked while running, and a line above it says what it shows. The "
+        "preview is the force as the coil will really play it; below the form stands "
+        "what the run costs.",
     ),
     (
         "Queue",
         "Queue has a run follow; so does a scene or a run dropped while one is in "
-        "progress. Waiting runs show their cost and can be moved and taken out. After "
-        "a STOP or a fault the queue is held until you resume it.",
+        "progress. Waiting runs show their cost and can be moved and taken out. A "
+        "click, or Enter, puts one's parameters into the form, also during a run; "
+        "<b>Save to queue</b> replaces them at its place. After a STOP or a fault the "
+        "queue is held until you resume it.",
     ),
     (
         "Lanes",

@@ -49,6 +49,7 @@ _PATHS = {
     "check": '<circle cx="12" cy="12" r="9"/><path d="M8 12.5l2.8 2.8L16.2 9.5"/>',
     "tick": '<path d="M5 12.5l4.5 4.5L19 7.5" stroke-width="3"/>',
     "note": '<path d="M4 4h16v11l-5 5H4zM15 20v-5h5M8 9h8M8 13h4"/>',
+    "edit": '<path d="M4 20l1-4.5L16.5 4l3.5 3.5L8.5 19zM14 6.5l3.5 3.5"/>',
     "chevron": '<path d="M6 9l6 6 6-6"/>',
     "folder": '<path d="M3 6h6l2 2.5h10V19H3z"/>',
     "file": '<path d="M6 3h8l4 4v14H6zM14 3v4h4"/>',

@@ -14,6 +14,10 @@ QFrame[role="panel"] { background: $panel; border: 1px solid $border;
   border-radius: 8px; }
 QFrame[role="card"] { background: $sunken; border: 1px solid $border;
   border-radius: 6px; }
+QFrame[role="card"]:focus, QFrame[role="card-chosen"]:focus {
+  border: 2px solid $accent; }
+QFrame[role="card-chosen"] { background: $selected; border: 1px solid $accent;
+  border-radius: 6px; }
 QFrame[role="lanecard"] { background: $sunken; border: 0;
   border-right: 1px solid $border; }
 QFrame[role="line"] { background: $border; border: 0; max-height: 1px;
@@ -44,6 +48,10 @@ QLabel[role="pill-bad"] { background: $red_soft; color: $red; border-radius: 9px
   padding: 2px 9px; font-size: 11px; font-weight: 600; }
 QLabel[role="pill"] { background: $selected; color: $selected_text; border-radius: 9px;
   padding: 2px 9px; font-size: 11px; font-weight: 600; }
+QLabel[role="strip"] { background: $selected; color: $selected_text;
+  border-radius: 6px; padding: 5px 9px; font-size: 12px; }
+QLabel[role="strip-warn"] { background: $amber_soft; color: $amber;
+  border-radius: 6px; padding: 5px 9px; font-size: 12px; }
 QLabel[role="hname"] { color: $header_text; font-weight: 600; }
 QLabel[role="hidentity"] { color: $header_text; font-weight: 600; font-size: 15px; }
 QLabel[role="hsub"] { color: $header_muted; font-size: 11px; }

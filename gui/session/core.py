@@ -43,11 +43,13 @@ class Queued:
         title: for people.
         request: what to run.
         expectation: its plan; None until it is computed.
+        left: how it left the queue, in words; "" while it waits.
     """
 
     title: str
     request: Request
     expectation: Expectation | None = None
+    left: str = ""
 
 
 class Core(QObject):
@@ -61,6 +63,7 @@ class Core(QObject):
     Attributes:
         expectation: plan of what the form asks for; None until it is computed.
         running: plan of the run in progress or the last one; None without one.
+        running_request, running_title: what that was asked to do, and its name.
         queue_held: whether the queue waits to be resumed, as it does after a STOP.
         bench_overrides: ``bench.key=value`` texts that change the connected bench.
     """
@@ -111,6 +114,8 @@ class Core(QObject):
         self.folder: Path | None = None
         self._run: RunAfar | None = None
         self.running: Expectation | None = None
+        self.running_request: Request | None = None
+        self.running_title = ""
         self.queue_held = False
         self._serial = 0
         self._queue_serial = 0
@@ -143,7 +148,8 @@ class Core(QObject):
         self.fault, self.source, self.outcomes, self.trial = None, None, [], None
         self.elapsed, self.expected = 0.0, None
         self.run_name = title
-        self.running = expectation
+        self.running, self.running_request = expectation, request
+        self.running_title = title
         self._run = self.link.run(
             request, self.out, self.inbox, self.notes, report=self.reports
         )
@@ -166,8 +172,16 @@ class Core(QObject):
 
     def unqueue(self, number: int) -> None:
         """Take a waiting run out of the queue."""
-        del self.queue[number]
+        self.queue.pop(number).left = "was taken out of the queue"
         self.queue_changed.emit()
+
+    def replace_queued(
+        self, item: Queued, request: Request, expectation: Expectation
+    ) -> None:
+        """Have a waiting run do something else, at its place in the queue."""
+        item.request, item.expectation = request, expectation
+        self.queue_changed.emit()
+        self._next_in_queue()
 
     def move_queued(self, number: int, by: int) -> None:
         """Move a waiting run up (-1) or down (1)."""
@@ -203,17 +217,19 @@ class Core(QObject):
         if self.queue[0].expectation is None:
             return  # its plan is being computed
         item = self.queue.pop(0)
+        item.left = "has started with the parameters it had"
         self.queue_changed.emit()
         self.start(item.request, item.title, item.expectation)
 
     def _queue_planned(self, told: Planned) -> None:
         """The plan of a waiting run is there; one that cannot run is taken out."""
         item = self._queue_plans.pop(told.serial)
-        if item not in self.queue:
-            return
+        if item not in self.queue or item.request != told.request:
+            return  # it has left, or does something else by now
         item.expectation = told.expectation
         if told.expectation is None:
             self.queue.remove(item)
+            item.left = f"was taken out of the queue: {told.problem}"
             text = f"{item.title} was taken out of the queue: {told.problem}"
             self.log(Level.ERROR, "queue", text)
         self.queue_changed.emit()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QRect, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -11,6 +11,8 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QLineEdit,
+    QStyle,
+    QStyleOptionFrame,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -22,13 +24,53 @@ from gui.setup.texts import FieldError, entry_of, exact, text_of
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse
 
+NAME = 100
+"""Width of the column of names, px: longer ones take two lines."""
+
+
+INSIDE = 2
+"""Margin that a line edit keeps on both sides of its text, px."""
+
 
 class QuantityEdit(QLineEdit):
-    """A line edit; arrow keys change the number by one in its leading digit's place."""
+    """A line edit; arrow keys change the number by one in its leading digit's place.
+
+    While nobody edits it, text longer than the field ends in an ellipsis.
+    """
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__()
         self._parameter = parameter
+
+    @property
+    def shown(self) -> str:
+        """The text as far as it fits; all of it while it is edited."""
+        room = self._room().width()
+        if self.hasFocus():
+            return self.text()
+        way = Qt.TextElideMode.ElideRight
+        return self.fontMetrics().elidedText(self.text(), way, room)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the text, shortened where it does not fit."""
+        shown = self.shown
+        if shown == self.text():
+            super().paintEvent(event)
+            return
+        option = QStyleOptionFrame()
+        self.initStyleOption(option)
+        painter = QPainter(self)
+        panel = QStyle.PrimitiveElement.PE_PanelLineEdit
+        self.style().drawPrimitive(panel, option, painter, self)
+        painter.setPen(option.palette.text().color())
+        painter.drawText(self._room(), Qt.AlignmentFlag.AlignVCenter, shown)
+
+    def _room(self) -> QRect:
+        option = QStyleOptionFrame()
+        self.initStyleOption(option)
+        contents = QStyle.SubElement.SE_LineEditContents
+        room = self.style().subElementRect(contents, option, self)
+        return room.adjusted(INSIDE, 0, -INSIDE, 0)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Step with the arrow keys."""
@@ -65,16 +107,17 @@ class Field(QFrame):
         self._edit: QLineEdit | None = None
         self._box: QComboBox | None = None
         self._check: QCheckBox | None = None
-        name = label(parameter.title)
+        name = label(parameter.title, wrap=True)
         name.setToolTip(self._tip())
-        name.setMinimumWidth(106)
+        name.setFixedWidth(NAME)
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(7)
+        row.setSpacing(6)
         row.addWidget(self._mark)
         row.addWidget(name, 0)
         editor = self._editor()
         name.setBuddy(editor)
+        self.setFocusProxy(editor)
         editor.setAccessibleName(parameter.title)
         editor.setAccessibleDescription(self._tip())
         editor.setToolTip(self._tip())
@@ -133,6 +176,8 @@ class Field(QFrame):
         colour = "palette(highlight)" if self.is_changed else "transparent"
         self._mark.setStyleSheet(f"background: {colour}; border-radius: 1px;")
         self._mark.setToolTip(f"Default: {self.default or 'none'}")
+        if self._edit is not None:
+            self._edit.setToolTip(f"{self.text}\n{self._tip()}".strip())
 
     def show_problem(self, problem: str) -> None:
         """Show why the value cannot be used, "" if it can."""

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-import inspect
-from pathlib import Path
+from collections.abc import Callable
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout
 
-from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
-from gui.parts import IconButton, column, elided, label, line, push, scrolling
+from gui.parts import BAR, IconButton, label, line
 from gui.session.messages import Planned
 from gui.session.request import Request
 from gui.session.session import Queued, Session
+from gui.setup.buttons import Buttons
 from gui.setup.estimate import EstimateView
-from gui.setup.form import Form
+from gui.setup.page import Page
+from gui.setup.picker import Picker, about
 from gui.setup.preset_button import PresetButton
-from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
+from gui.setup.strip import Strip
+from gui.setup.subject import Subject
 from gui.setup.texts import FieldError
 from gui.state import Snapshot, State, run_problem
 from tactile_lab.errors import TactileLabError
-from tactile_lab.plugins import protocol_class, protocol_names, scene_path
-from tactile_lab.scene.load import load
-from tactile_lab.scene.scene import Scene
+
+LOW = 660
+"""Height of the panel, px, below which the queue shows one row instead of three."""
 
 SETTLE = 250
 """Milliseconds without a keystroke before the plan is computed anew."""
@@ -42,44 +43,48 @@ class SetupPanel(QFrame):
         self.setAccessibleName("Protocol")
         self.setMinimumWidth(304)
         self._session, self._theme = session, theme
-        self._path: str | None = None
         self._snapshot = Snapshot()
-        self._start_planned = False
+        self._in_progress = False
+        self._planned_for: Request | None = None
+        self._once_planned: Callable[[], None] | None = None
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(SETTLE)
         self._timer.timeout.connect(self.plan_now)
-        self.picker = QComboBox()
-        self.picker.setAccessibleName("Protocol")
-        self.picker.setMaxVisibleItems(20)
-        self.about = label("", "muted", wrap=True)
-        self.source = label("", "small")
-        self.preview = WaveformPreview(theme)
-        self.form = Form()
+        self.picker = Picker()
+        self.strip = Strip()
+        self.page = Page(theme)
+        self.form = self.page.form
+        self.subject = Subject(session, self.form)
         self.star = PresetButton(
             theme, self.form, session.out.resolve().parent / "presets", self.request
         )
         self.estimate = EstimateView()
         self.problem = label("", "error", wrap=True)
-        self.warnings = label("", "warning", wrap=True)
-        self.run = push("Run", "primary")
-        self.queue_button = push("Queue")
+        self.buttons = Buttons(theme)
+        self.run = self.buttons.run
         self.queue = QueueView(theme)
         self._lay_out()
-        self.picker.activated.connect(self._picked)
+        self._connect()
+
+    def _connect(self) -> None:
+        session, queue, buttons = self._session, self.queue, self.buttons
+        self.picker.picked.connect(self._picked)
         self.form.changed.connect(self._form_changed)
+        self.subject.changed.connect(self._show_subject)
         self.star.failed.connect(self._show_problem)
-        self.run.clicked.connect(self.start)
-        self.queue_button.clicked.connect(self.enqueue)
-        self.queue.removed.connect(session.unqueue)
-        self.queue.moved.connect(session.move_queued)
-        self.queue.resumed.connect(session.resume_queue)
-        session.queue_changed.connect(
-            lambda: self.queue.show_queue(session.queue, held=session.queue_held)
+        buttons.run.clicked.connect(self.start)
+        buttons.queue.clicked.connect(self.enqueue)
+        buttons.save.clicked.connect(self.save)
+        buttons.cancel.clicked.connect(self.cancel)
+        queue.edited.connect(self.edit)
+        queue.removed.connect(lambda item: session.unqueue(session.queue.index(item)))
+        queue.moved.connect(
+            lambda item, by: session.move_queued(session.queue.index(item), by)
         )
+        queue.resumed.connect(session.resume_queue)
+        session.queue_changed.connect(self._show_queue)
         session.planned.connect(self._planned)
-        theme.changed.connect(self._tint)
-        self._tint()
 
     # --- scenes ---------------------------------------------------------------------
 
@@ -89,22 +94,7 @@ class SetupPanel(QFrame):
         Raises:
             SceneError: it cannot be used.
         """
-        scene = load(None if path is None else Path(path), overrides)
-        self._path = path
-        self._fill_picker(scene)
-        kind = type(scene.protocol)
-        values = {key: getattr(scene.protocol, key) for key in kind.model_fields}
-        self.form.show_protocol(kind, values)
-        self._describe()
-        self.plan_now()
-
-    def show_protocol(self, name: str) -> None:
-        """Show a protocol with its ready scene, else with its defaults."""
-        ready = scene_path(name)
-        if ready.is_file():
-            self.open_scene(name)
-            return
-        self.open_scene(inspect.getfile(protocol_class(name)))
+        self.subject.open(path, overrides)
 
     @property
     def kind_name(self) -> str:
@@ -117,9 +107,7 @@ class SetupPanel(QFrame):
         Raises:
             FieldError: a field cannot be used.
         """
-        session = self._session
-        overrides = (*self.form.overrides(), *session.bench_overrides)
-        return Request(self._path, overrides, session.bench_choice)
+        return self.subject.request()
 
     # --- plan, run, queue -------------------------------------------------------------
 
@@ -135,22 +123,53 @@ class SetupPanel(QFrame):
             self._show_problem(str(error))
 
     def start(self) -> None:
-        """Run what the form says."""
-        if self._blocked():
-            return
-        self._session.start(self.request(), self.title, self._session.expectation)
+        """Run what the form says, as soon as that is planned."""
+        if not self._blocked() and self._is_planned(self.start):
+            self._session.start(self.request(), self.title, self._session.expectation)
 
     def start_when_planned(self) -> None:
         """Have the plan that is being computed run, unless something is in its way."""
         self._session.expectation = None
-        self._start_planned = True
+        self._once_planned = self.start
 
     def enqueue(self) -> None:
-        """Have it follow the run in progress."""
-        if self.form.problem or self._session.plan_problem:
+        """Have it follow the run in progress; an edited run is saved instead."""
+        if self.subject.edited is not None:
+            self.save()
+        elif not self._unusable and self._is_planned(self.enqueue):
+            expectation = self._session.expectation
+            self._session.enqueue(Queued(self.title, self.request(), expectation))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show as much of the queue as leaves room for the form."""
+        super().resizeEvent(event)
+        self.queue.set_rows(3 if self.height() > LOW else 1)
+
+    def edit(self, item: Queued) -> None:
+        """Take up a waiting run's parameters into the form."""
+        problem = self.subject.edit(item)
+        if problem:
+            self.strip.say(problem, warning=True)
+        elif self.form.fields:
+            self.form.fields[0].setFocus()
+
+    def save(self) -> None:
+        """Replace the edited run's parameters, as soon as they are planned."""
+        item, plan = self.subject.edited, self._session.expectation
+        if item is None or self._unusable or not self._is_planned(self.save):
             return
-        expectation = self._session.expectation
-        self._session.enqueue(Queued(self.title, self.request(), expectation))
+        assert plan is not None
+        request = self.request()
+        self.subject.leave()
+        self._session.replace_queued(item, request, plan)
+        self.queue.focus_on(item)
+
+    def cancel(self) -> None:
+        """Leave the edited run as it is."""
+        item = self.subject.edited
+        self.subject.leave()
+        if item is not None:
+            self.queue.focus_on(item)
 
     @property
     def title(self) -> str:
@@ -159,90 +178,109 @@ class SetupPanel(QFrame):
         return "Run" if kind is None else kind.title
 
     def render_snapshot(self, snapshot: Snapshot) -> None:
-        """Lock the form and say why Run is off."""
+        """Lock the form, say what it shows, and why a button is off."""
         self._snapshot = snapshot
-        locked = snapshot.state in (State.RUNNING, State.ABORTING)
-        self.form.lock(locked)
-        self.picker.setEnabled(not locked)
-        self._reset.setEnabled(not locked)
-        self.star.setEnabled(not locked)
-        reason = self._blocked()
-        self.run.setEnabled(not reason)
-        self.run.setToolTip(reason or "Run what the form says (Ctrl+R)")
-        words = {State.RUNNING: "Running …", State.ABORTING: "Stopping …"}
-        self.run.setText(words.get(snapshot.state, "Run"))
-        can_queue = not self.form.problem and not self._session.plan_problem
-        self.queue_button.setEnabled(
-            can_queue and snapshot.state is not State.DISCONNECTED
+        busy = snapshot.state in (State.RUNNING, State.ABORTING)
+        self._in_progress = busy and self._shows_run_in_progress()
+        editing = self.subject.edited is not None
+        self.form.lock(busy and not editing)
+        self._reset.setEnabled(not busy or editing)
+        self.star.setEnabled(not busy or editing)
+        self.picker.setEnabled(not busy and not editing)
+        self.strip.show_subject(
+            self.subject, self._session, locked=busy, shown=self._in_progress
         )
+        if editing:
+            self.buttons.show_edit(self._unusable)
+        else:
+            can_queue = not self._unusable and snapshot.state is not State.DISCONNECTED
+            self.buttons.show_next(snapshot.state, self._blocked(), queue=can_queue)
 
     def show_head(self, time: float | None) -> None:
-        """Put the preview's play-head."""
-        self.preview.show_head(time)
+        """Put the preview's play-head, where it shows the run in progress."""
+        self.page.preview.show_head(time if self._in_progress else None)
+
+    @property
+    def _unusable(self) -> str:
+        """Why the form cannot be used, "" if it can."""
+        return self.form.problem or self._session.plan_problem
 
     def _blocked(self) -> str:
-        problem = self.form.problem or self._session.plan_problem
+        """Why a run cannot start now, "" if it can."""
+        if self.subject.edited is not None:
+            return "Save or cancel the changes to the queued run first."
+        problem = self._unusable
         if not problem and self._session.expectation is None:
             problem = "The plan is being computed."
         return run_problem(self._snapshot, form_problem=problem)
 
+    def _is_planned(self, then: Callable[[], None]) -> bool:
+        """Whether the plan is that of the form; if not, `then` follows it."""
+        planned = self._planned_for == self.request()
+        if not planned or self._session.expectation is None:
+            self.plan_now()
+            self._once_planned = then
+            return False
+        return True
+
     def _planned(self, planned: Planned) -> None:
         expectation = planned.expectation
+        self._planned_for = planned.request
         self._show_problem(planned.problem)
         self.star.mark()
         if expectation is not None:
-            self.preview.show_preview(expectation.preview)
+            self.page.preview.show_preview(expectation.preview)
+            self.page.show_warnings(expectation.warnings)
             self.estimate.show_estimate(expectation.estimate)
-            self.warnings.setText(
-                "\n".join(f"⚠ {text}" for text in expectation.warnings[:3])
-            )
-            self.warnings.setToolTip("\n".join(expectation.warnings))
-            self.warnings.setVisible(bool(expectation.warnings))
         self.render_snapshot(self._snapshot)
-        if self._start_planned:
-            self._start_planned = False
-            self.start()
+        then, self._once_planned = self._once_planned, None
+        if then is not None:
+            then()
 
     def _show_problem(self, problem: str) -> None:
         self._session.plan_problem = problem
         self.problem.setText(problem)
         self.problem.setVisible(bool(problem))
         if problem:
-            self.preview.show_preview(None, problem)
+            self.page.preview.show_preview(None, problem)
             self.estimate.show_estimate(None)
-            self.warnings.hide()
+            self.page.show_warnings(())
+
+    # --- what is shown ----------------------------------------------------------------
 
     def _form_changed(self) -> None:
-        self._start_planned = False
-        if self.form.problem:
-            self._show_problem(self.form.problem)
+        self._once_planned, self.subject.lost = None, ""
+        self._show_problem(self.form.problem)
         self._timer.start()
         self.render_snapshot(self._snapshot)
 
-    def _picked(self, index: int) -> None:
+    def _show_subject(self) -> None:
+        """Another protocol, or another run, is in the form."""
+        kind = self.form.protocol
+        if kind is not None:
+            self.picker.show_protocol(kind)
+            self.page.about.setText(about(kind))
+        self._show_queue()
+        self.plan_now()
+
+    def _show_queue(self) -> None:
+        session = self._session
+        self.queue.show_queue(
+            session.queue, held=session.queue_held, edited=self.subject.edited
+        )
+        self.render_snapshot(self._snapshot)
+
+    def _shows_run_in_progress(self) -> bool:
+        """Whether the form holds what the run in progress was asked to do."""
+        if self.subject.edited is not None or self.form.problem:
+            return False
+        return self.request() == self._session.running_request
+
+    def _picked(self, scene: str) -> None:
         try:
-            self.show_protocol(str(self.picker.itemData(index)))
+            self.open_scene(scene)
         except TactileLabError as error:
             self._show_problem(str(error))
-
-    def _fill_picker(self, scene: Scene) -> None:
-        names = list(protocol_names())
-        if scene.protocol.name not in names:
-            names.append(scene.protocol.name)
-        if [self.picker.itemData(i) for i in range(self.picker.count())] != names:
-            self.picker.clear()
-            for name in names:
-                own = name == scene.protocol.name
-                kind = type(scene.protocol) if own else protocol_class(name)
-                self.picker.addItem(kind.title, name)
-        self.picker.setCurrentIndex(names.index(scene.protocol.name))
-
-    def _describe(self) -> None:
-        kind = self.form.protocol
-        first = ((kind.__doc__ or "") if kind else "").strip().split("\n\n")[0]
-        self.about.setText(" ".join(first.replace("`", "").split()))
-        name = "demo" if self._path is None else Path(self._path).name
-        elided(self.source, f"scene: {name}")
 
     def _lay_out(self) -> None:
         self.help = IconButton(self._theme, "help", "Help on this panel")
@@ -257,42 +295,28 @@ class SetupPanel(QFrame):
         head.addWidget(self._open)
         head.addWidget(self._reset)
         head.addWidget(self.help)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(8)
-        buttons.addWidget(self.run, 3)
-        buttons.addWidget(self.queue_button, 2)
-        inner = QWidget()
-        middle = column(inner, spacing=9)
-        middle.addWidget(self.about)
-        caption = QHBoxLayout()
-        caption.addWidget(label("WAVEFORM", "section"))
-        caption.addStretch(1)
-        caption.addWidget(label("mN against s", "small"))
-        middle.addLayout(caption)
-        middle.addWidget(self.preview)
-        middle.addWidget(label("PARAMETERS", "section"))
-        middle.addWidget(self.form)
-        middle.addWidget(self.warnings)
-        middle.addStretch(1)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(14, 10, 14, 12)
-        whole.setSpacing(8)
-        whole.addLayout(head)
-        whole.addWidget(self.picker)
-        whole.addWidget(scrolling(inner), 1)
-        whole.addWidget(self.problem)
-        whole.addWidget(line())
-        whole.addWidget(self.estimate)
-        whole.addLayout(buttons)
-        whole.addWidget(self.queue)
-        self._drop = label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small")
-        whole.addWidget(self._drop)
         self.problem.hide()
-        self.warnings.hide()
-
-    def _tint(self) -> None:
-        tokens = self._theme.tokens
-        play = icon("play", tokens.on_accent)
-        play.addPixmap(pixmap("play", tokens.faint), QIcon.Mode.Disabled)
-        self.run.setIcon(play)
-        self.queue_button.setIcon(icon("queue", tokens.text))
+        whole = QGridLayout(self)
+        whole.setContentsMargins(14, 10, 14 - BAR, 12)
+        whole.setHorizontalSpacing(0)
+        whole.setVerticalSpacing(8)
+        whole.addLayout(head, 0, 0)
+        for at, part in enumerate(
+            (
+                self.picker,
+                self.strip,
+                self.page,
+                self.problem,
+                line(),
+                self.estimate,
+                self.buttons,
+                self.queue,
+                label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small"),
+            ),
+            start=1,
+        ):
+            # the page's scroll bar lies in the margin
+            whole.addWidget(part, at, 0, 1, 2 if part is self.page else 1)
+            whole.setRowStretch(at, int(part is self.page))
+        whole.setColumnStretch(0, 1)
+        whole.setColumnMinimumWidth(1, BAR)

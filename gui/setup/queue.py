@@ -1,31 +1,117 @@
-"""Runs that wait for the one in progress; they can be moved and taken out any time."""
+"""Runs that wait for the one in progress; they can be edited, moved and taken out."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
 
 from gui.look.theme import Theme
-from gui.parts import IconButton, column, empty, label, panel, push, scrolling
+from gui.parts import (
+    Elided,
+    IconButton,
+    column,
+    empty,
+    label,
+    push,
+    row,
+    scrolling,
+)
 from gui.session.session import Queued
 from gui.setup.estimate import words_of
 from gui.state import minutes
 
-ROW = 50
-MOST, LOW = 3, 800
-"""Rows shown without scrolling; one less in windows lower than `LOW` px."""
+BUTTON = 30
+ROW = 59
+"""Height of a waiting run with the space below it, px."""
+
+
+class QueueCard(QFrame):
+    """One waiting run: what it costs, and what can be done with it."""
+
+    edited = Signal(object)
+    removed = Signal(object)
+    moved = Signal(object, int)
+
+    def __init__(
+        self, theme: Theme, item: Queued, place: tuple[int, int], *, editing: bool
+    ) -> None:
+        super().__init__()
+        self.item, self.editing = item, editing
+        number, count = place
+        self.setProperty("role", "card-chosen" if editing else "card")
+        self.setFixedHeight(ROW - 5)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        cost = "computing its plan …"
+        if item.expectation is not None:
+            time, samples, disk, heat = words_of(item.expectation.estimate)
+            cost = f"{time} · {samples} samples · {disk} · heat {heat}"
+        state = ", being edited" if editing else ""
+        self.setAccessibleName(f"{number + 1}: {item.title}, {cost}{state}")
+        self.setAccessibleDescription("Enter edits it, Delete takes it out")
+        self.setToolTip(f"{item.title}: {cost}\nClick or Enter edits it")
+        self.parts: dict[str, QWidget] = {"card": self}
+        whole = column(self, spacing=0)
+        whole.setContentsMargins(10, 2, 2, 5)
+        top = row(0)
+        top.addWidget(Elided(item.title), 1)
+        if editing:
+            top.addWidget(label("editing", "pill"))
+        for icon, words, wanted, told in (
+            ("edit", "Edit {}", not editing, lambda: self.edited.emit(item)),
+            ("up", "Move {} up", number > 0, lambda: self.moved.emit(item, -1)),
+            (
+                "down",
+                "Move {} down",
+                number < count - 1,
+                lambda: self.moved.emit(item, 1),
+            ),
+            (
+                "close",
+                "Take {} out of the queue",
+                True,
+                lambda: self.removed.emit(item),
+            ),
+        ):
+            if wanted:
+                button = IconButton(theme, icon, words.format(item.title))
+                button.clicked.connect(told)
+                self.parts[icon] = button
+                top.addWidget(button)
+            elif icon != "edit":  # the others stay below each other
+                top.addSpacing(BUTTON)
+        whole.addLayout(top)
+        whole.addWidget(Elided(cost, "small"))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Edit the run."""
+        if event.button() is Qt.MouseButton.LeftButton:
+            self.edited.emit(self.item)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Edit with Enter, take out with Delete."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.edited.emit(self.item)
+        elif event.key() == Qt.Key.Key_Delete:
+            self.removed.emit(self.item)
+        else:
+            super().keyPressEvent(event)
 
 
 class QueueView(QWidget):
     """The waiting runs, in order, each with its cost."""
 
-    removed = Signal(int)
-    moved = Signal(int, int)
+    edited = Signal(object)
+    removed = Signal(object)
+    moved = Signal(object, int)
     resumed = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
+        self.cards: list[QueueCard] = []
+        self._most = 1
         whole = column(self, spacing=5)
         head = QHBoxLayout()
         head.addWidget(label("QUEUE", "section"))
@@ -43,13 +129,30 @@ class QueueView(QWidget):
         whole.addWidget(self._area)
         self.show_queue([], held=False)
 
-    def show_queue(self, queue: list[Queued], *, held: bool) -> None:
-        """Show the waiting runs, and whether they wait to be resumed."""
+    def show_queue(
+        self, queue: list[Queued], *, held: bool, edited: Queued | None = None
+    ) -> None:
+        """Show the waiting runs.
+
+        Args:
+            queue: in order.
+            held: whether they wait to be resumed.
+            edited: the one whose parameters stand in the form.
+        """
+        focus = self._focus()
         empty(self._rows)
+        self.cards = []
         for number, item in enumerate(queue):
-            self._rows.addWidget(self._row(number, len(queue), item))
-        room = MOST if self.window().height() > LOW else MOST - 1
-        self._area.setFixedHeight(ROW * min(len(queue), room))
+            place = (number, len(queue))
+            card = QueueCard(self._theme, item, place, editing=item is edited)
+            card.edited.connect(self.edited)
+            card.removed.connect(self.removed)
+            card.moved.connect(self.moved)
+            self.cards.append(card)
+            if item is edited:
+                self._reveal(card)
+            self._rows.addWidget(card)
+        self._fit()
         total = sum(
             item.expectation.estimate.duration for item in queue if item.expectation
         )
@@ -57,36 +160,43 @@ class QueueView(QWidget):
         self._sum.setText(f"{len(queue)} {word} · {minutes(total)}" if queue else "")
         self.resume.setVisible(held)
         self.setVisible(bool(queue))
+        if focus is not None and self.cards:
+            self._give_focus(*focus)
 
-    def _row(self, number: int, count: int, item: Queued) -> QFrame:
-        made = panel("card")
-        made.setFixedHeight(ROW - 5)
-        name = label(item.title)
-        name.setToolTip(item.request.command())
-        cost = label("computing its plan …", "small")
-        if item.expectation is not None:
-            time, samples, disk, heat = words_of(item.expectation.estimate)
-            cost.setText(f"{time} · {samples} samples · {disk} · heat {heat}")
-        for words_ in (name, cost):
-            words_.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        made.setToolTip(f"{item.title}: {cost.text()}")
-        made.setAccessibleName(f"{number + 1}: {item.title}, {cost.text()}")
-        both = QWidget()
-        words = column(both, spacing=0)
-        words.addWidget(name)
-        words.addWidget(cost)
-        row = QHBoxLayout(made)
-        row.setContentsMargins(10, 2, 2, 2)
-        row.setSpacing(0)
-        row.addWidget(both, 1)
-        for icon, by, way in (("up", -1, "up"), ("down", 1, "down")):
-            if 0 <= number + by < count:
-                button = IconButton(self._theme, icon, f"Move {item.title} {way}")
-                button.clicked.connect(
-                    lambda _=False, by=by: self.moved.emit(number, by)
-                )
-                row.addWidget(button)
-        out = IconButton(self._theme, "close", f"Take {item.title} out of the queue")
-        out.clicked.connect(lambda: self.removed.emit(number))
-        row.addWidget(out)
-        return made
+    def set_rows(self, most: int) -> None:
+        """Show at most so many rows without scrolling."""
+        if most != self._most:
+            self._most = most
+            self._fit()
+            for card in self.cards:
+                if card.editing:
+                    self._reveal(card)
+
+    def _fit(self) -> None:
+        self._area.setFixedHeight(ROW * min(len(self.cards), self._most))
+
+    def focus_on(self, item: Queued) -> None:
+        """Give a waiting run the keyboard."""
+        for card in self.cards:
+            if card.item is item:
+                card.setFocus()
+                self._reveal(card)
+
+    def _reveal(self, card: QueueCard) -> None:
+        """Scroll to a row, once it has its place."""
+        QTimer.singleShot(0, card, lambda: self._area.ensureWidgetVisible(card, 0, 0))
+
+    def _focus(self) -> tuple[int, Queued, str] | None:
+        """Which part of which row has the keyboard."""
+        has = QApplication.focusWidget()
+        for number, card in enumerate(self.cards):
+            for name, part in card.parts.items():
+                if part is has:
+                    return number, card.item, name
+        return None
+
+    def _give_focus(self, number: int, item: Queued, name: str) -> None:
+        """The keyboard follows its run; where that has gone, the next takes it."""
+        there = [card for card in self.cards if card.item is item]
+        card = there[0] if there else self.cards[min(number, len(self.cards) - 1)]
+        card.parts.get(name, card).setFocus()

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 
+from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
 from gui.setup.kinds import Kind, parameter
 from gui.setup.texts import FieldError, entry_of, exact, listed
@@ -112,3 +113,37 @@ def test_kinds_are_found_from_types() -> None:
     file = protocol_class("waveform").model_fields
     assert parameter("file", file["file"]).kind is Kind.FILE
     assert parameter("duration", file["duration"]).optional
+
+
+@pytest.mark.parametrize("width", [260, 312])
+def test_all_fields_share_one_column(app: QApplication, width: int) -> None:
+    """At the panel's least and greatest width, less its margins."""
+    form = Form()
+    for name in NAMES:
+        form.show_protocol(protocol_class(name), {})
+        form.setFixedWidth(width)
+        form.show()
+        app.processEvents()
+        editors = [field.focusProxy() for field in form.fields]
+        assert len({editor.x() for editor in editors}) == 1, name
+        kinds = (Kind.SWITCH, Kind.FILE)
+        wide = [f.focusProxy() for f in form.fields if f.parameter.kind not in kinds]
+        assert len({editor.geometry().right() for editor in wide}) <= 1, name
+    form.hide()
+
+
+def test_long_list_is_shortened_where_it_is_not_edited(app: QApplication) -> None:
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    form.setFixedWidth(276)
+    form.show()
+    app.processEvents()
+    edit = form.field("levels").focusProxy()
+    assert isinstance(edit, QuantityEdit)
+    assert edit.shown == edit.text(), "the demo's levels fit the narrowest panel"
+    long = ", ".join(str(level) for level in range(10, 210, 10)) + " mN"
+    form.field("levels").set_text(long)
+    edit.clearFocus()
+    assert edit.shown.startswith("10, 20, 30") and edit.shown.endswith("…")
+    assert edit.toolTip().startswith(long)
+    form.hide()

@@ -1,12 +1,18 @@
 """The queue: what waits, what it costs, and what a STOP does to it."""
 
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
+
 from gui.parts import IconButton
+from gui.session.request import Request
 from gui.session.session import Queued
 from gui.state import State
 
 
 def busy(lab) -> None:
     """As while a run is in progress, without one."""
+    lab.session.running_request = lab.window.setup.request()
     lab.session._enter(State.RUNNING)
 
 
@@ -23,10 +29,8 @@ def test_dropped_scene_and_run_wait_with_their_cost(lab) -> None:
     window.opening.open_path(lab.folder / "short.toml")
     assert [item.title for item in session.queue] == ["short"]
     lab.until(lambda: session.queue[0].expectation is not None)
-    text = [
-        one.text() for one in window.setup.queue.findChildren(type(window.setup.about))
-    ]
-    assert any("samples" in words and "heat" in words for words in text), text
+    name = window.setup.queue.cards[0].accessibleName()
+    assert name.startswith("1: short") and "samples" in name and "heat" in name
     broken = lab.folder / "2026-11-21_100000_broken"
     broken.mkdir(exist_ok=True)
     (broken / "scene.toml").write_text('[protocol]\nname = "no such"\n')
@@ -79,4 +83,133 @@ def test_rows_are_moved_and_taken_out_by_their_buttons(lab) -> None:
     press("Move three up")
     press("Take two out of the queue")
     assert [item.title for item in session.queue] == ["three", "one"]
+    idle(lab)
+
+
+def three_waiting(lab) -> None:
+    """One, two and three wait, like the form but for the hold: 1, 2 and 3 s."""
+    session, asked = lab.session, lab.window.setup.request()
+    busy(lab)
+    for number, title in enumerate(("one", "two", "three"), start=1):
+        hold = (*asked.overrides, f'protocol.hold="{number} s"')
+        session.enqueue(Queued(title, Request(asked.path, hold, asked.bench)))
+    lab.until(lambda: all(item.expectation for item in session.queue))
+
+
+def type_into(field, text: str) -> None:
+    edit = field.findChild(QLineEdit)
+    edit.selectAll()
+    QTest.keyClicks(edit, text)
+
+
+def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
+    session, setup = lab.session, lab.window.setup
+    before = setup.form.texts()
+    lab.run()
+    lab.until(lambda: session.state is State.RUNNING)
+    three_waiting(lab)
+    shorter = session.queue[1].expectation.estimate.duration
+    QTest.mouseClick(setup.queue.cards[1], Qt.MouseButton.LeftButton)
+    assert setup.form.field("hold").text == "2 s"
+    assert "two, 2 of 3" in setup.strip.words
+    assert not setup.run.isVisible() and setup.buttons.save.isVisible()
+    type_into(setup.form.field("hold"), "7 s")
+    setup.buttons.save.click()
+    lab.until(lambda: setup.subject.edited is None)
+    item = session.queue[1]
+    assert [i.title for i in session.queue] == ["one", "two", "three"]
+    assert item.request.load().protocol.hold == 7.0
+    assert item.expectation.estimate.duration > shorter + 9, (
+        "two holds, 5 s longer each"
+    )
+    assert setup.form.texts() == before, "the form shows the next run again"
+    assert not any(e.isEnabled() for e in setup.form.findChildren(QLineEdit))
+    assert session.state is State.RUNNING and not setup.run.isEnabled()
+    idle_after_run(lab)
+
+
+def idle_after_run(lab) -> None:
+    lab.session.queue.clear()
+    lab.session.stop("test is over")
+    lab.until(lambda: lab.session.state is State.READY)
+    idle(lab)
+
+
+def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
+    session, setup = lab.session, lab.window.setup
+    setup.form.propose({"hold": "800 ms"})
+    before = setup.form.texts()
+    three_waiting(lab)
+    asked = [item.request for item in session.queue]
+    setup.queue.cards[2].setFocus()
+    QTest.keyClick(setup.queue.cards[2], Qt.Key.Key_Return)
+    assert setup.form.field("hold").text == "3 s"
+    type_into(setup.form.field("hold"), "9 s")
+    setup.edit(session.queue[0])
+    assert "First save or cancel" in setup.strip.words
+    assert setup.form.field("hold").text == "9 s", "nothing typed is lost by a click"
+    setup.buttons.cancel.click()
+    assert setup.form.texts() == before
+    assert [item.request for item in session.queue] == asked
+    idle(lab)
+    setup.form.undo.undo()
+
+
+def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
+    lab, monkeypatch
+) -> None:
+    session, setup = lab.session, lab.window.setup
+    started: list[str] = []
+    monkeypatch.setattr(
+        session, "start", lambda request, title, plan: started.append(title)
+    )
+    three_waiting(lab)
+    setup.edit(session.queue[0])
+    type_into(setup.form.field("hold"), "8 s")
+    session._enter(State.READY)
+    session._next_in_queue()
+    assert started == ["one"]
+    assert "one has started with the parameters it had" in setup.strip.words
+    assert "Your changes stay" in setup.strip.words
+    assert setup.form.field("hold").text == "8 s" and setup.buttons.run.isVisible()
+    busy(lab)
+    setup.edit(session.queue[0])
+    assert setup.form.field("hold").text == "2 s"
+    session.unqueue(0)
+    assert "two was taken out" in setup.strip.words
+    assert setup.form.field("hold").text == "8 s", "nothing was changed: back again"
+    idle(lab)
+
+
+def test_edit_that_cannot_run_is_not_saved(lab) -> None:
+    session, setup = lab.session, lab.window.setup
+    three_waiting(lab)
+    setup.edit(session.queue[0])
+    type_into(setup.form.field("hold"), "0 s")
+    save = setup.buttons.save
+    assert not save.isEnabled() and "above" in save.toolTip()
+    type_into(setup.form.field("hold"), "1 s")
+    type_into(setup.form.field("levels"), "5 N")
+    lab.until(lambda: "reach" in session.plan_problem)
+    assert "reachable" in save.toolTip()
+    setup.save()
+    assert setup.subject.edited is session.queue[0]
+    setup.start()
+    assert session.state is State.RUNNING and len(session.queue) == 3
+    setup.buttons.cancel.click()
+    idle(lab)
+
+
+def test_moved_run_keeps_the_keyboard(lab) -> None:
+    window, session = lab.window, lab.session
+    three_waiting(lab)
+    window.activateWindow()
+    window.setup.queue.cards[0].parts["down"].setFocus()
+    lab.until(lambda: window.setup.queue.cards[0].parts["down"].hasFocus())
+    QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Space)
+    assert [item.title for item in session.queue] == ["two", "one", "three"]
+    assert lab.app.focusWidget() is window.setup.queue.cards[1].parts["down"]
+    window.setup.queue.cards[1].setFocus()
+    QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Delete)
+    assert [item.title for item in session.queue] == ["two", "three"]
     idle(lab)

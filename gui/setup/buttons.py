@@ -1,0 +1,74 @@
+"""Run and Queue; Save and Cancel in their place while a queued run is edited."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import QWidget
+
+from gui.look.icons import icon, pixmap
+from gui.look.theme import Theme
+from gui.parts import push, row
+from gui.state import State
+
+WORDS = {State.RUNNING: "Running …", State.ABORTING: "Stopping …"}
+
+
+class Buttons(QWidget):
+    """The four buttons below the form."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.run = push("Run", "primary")
+        self.queue = push("Queue")
+        self.save = push("Save to queue", "primary")
+        self.cancel = push("Cancel", name="Cancel the edit of the queued run")
+        self.cancel.setToolTip("The queued run stays as it is")
+        side_by_side = row(8)
+        self.setLayout(side_by_side)
+        for button, share in (
+            (self.run, 3),
+            (self.queue, 2),
+            (self.save, 3),
+            (self.cancel, 2),
+        ):
+            side_by_side.addWidget(button, share)
+        theme.changed.connect(self._tint)
+        self._tint()
+        self.show_next(State.DISCONNECTED, "", queue=False)
+
+    def show_next(self, state: State, problem: str, *, queue: bool) -> None:
+        """Offer the form's run.
+
+        Args:
+            state: of the window.
+            problem: why it cannot start now, "" if it can.
+            queue: whether it can wait in the queue.
+        """
+        self._swap(editing=False)
+        self.run.setEnabled(not problem)
+        self.run.setToolTip(problem or "Run what the form says (Ctrl+R)")
+        self.run.setText(WORDS.get(state, "Run"))
+        self.queue.setEnabled(queue)
+        self.queue.setToolTip("Have it follow the runs before it (Ctrl+Return)")
+
+    def show_edit(self, problem: str) -> None:
+        """Offer to save the edited run; `problem` is why that cannot be done."""
+        self._swap(editing=True)
+        self.save.setEnabled(not problem)
+        self.save.setToolTip(
+            problem or "Replace the queued run's parameters (Ctrl+Return)"
+        )
+
+    def _swap(self, *, editing: bool) -> None:
+        for button in (self.run, self.queue):
+            button.setVisible(not editing)
+        for button in (self.save, self.cancel):
+            button.setVisible(editing)
+
+    def _tint(self) -> None:
+        tokens = self._theme.tokens
+        play = icon("play", tokens.on_accent)
+        play.addPixmap(pixmap("play", tokens.faint), QIcon.Mode.Disabled)
+        self.run.setIcon(play)
+        self.queue.setIcon(icon("queue", tokens.text))

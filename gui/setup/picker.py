@@ -1,0 +1,52 @@
+"""Choosing a protocol by name."""
+
+from __future__ import annotations
+
+import inspect
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QComboBox
+
+from tactile_lab.plugins import protocol_class, protocol_names, scene_path
+from tactile_lab.trial import Protocol
+
+
+class Picker(QComboBox):
+    """All protocols, and the one in the form where that is of the user's own."""
+
+    picked = Signal(str)
+    """The scene to open: the protocol's ready one, else the file that defines it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Protocol")
+        self.setMaxVisibleItems(20)
+        self.activated.connect(
+            lambda number: self.picked.emit(scene_of(str(self.itemData(number))))
+        )
+
+    def show_protocol(self, shown: type[Protocol]) -> None:
+        """Show which protocol is in the form."""
+        names = list(protocol_names())
+        if shown.name not in names:
+            names.append(shown.name)
+        if [self.itemData(i) for i in range(self.count())] != names:
+            self.clear()
+            for name in names:
+                kind = shown if name == shown.name else protocol_class(name)
+                self.addItem(kind.title, name)
+        self.setCurrentIndex(names.index(shown.name))
+        self.setToolTip(about(shown))
+
+
+def scene_of(protocol: str) -> str:
+    """Name of a protocol's ready scene, else path of the file that defines it."""
+    if scene_path(protocol).is_file():
+        return protocol
+    return inspect.getfile(protocol_class(protocol))
+
+
+def about(kind: type[Protocol]) -> str:
+    """The first paragraph of a protocol's description, in one line."""
+    first = (kind.__doc__ or "").strip().split("\n\n")[0]
+    return " ".join(first.replace("`", "").split())

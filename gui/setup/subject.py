@@ -1,0 +1,125 @@
+"""What the form is about: the next run, or a run that waits in the queue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+
+from gui.session.request import Request
+from gui.session.session import Queued, Session
+from gui.setup.form import Form
+from tactile_lab.errors import TactileLabError
+from tactile_lab.scene.load import load
+from tactile_lab.scene.scene import Scene
+from tactile_lab.trial import Protocol
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What stood in the form before a queued run was taken up."""
+
+    path: str | None
+    protocol: type[Protocol] | None
+    texts: dict[str, str]
+
+
+class Subject(QObject):
+    """Fills the form, and makes a request of it.
+
+    Attributes:
+        edited: the waiting run whose parameters stand in the form; None for the next.
+        lost: what became of an edited run that left the queue, "" if none did.
+    """
+
+    changed = Signal()
+
+    def __init__(self, session: Session, form: Form) -> None:
+        super().__init__(form)
+        self.edited: Queued | None = None
+        self.lost = ""
+        self.path: str | None = None
+        self._session, self._form = session, form
+        self._before = Kept(None, None, {})
+        self._taken_up: dict[str, str] = {}
+        session.queue_changed.connect(self._mind_queue)
+
+    def open(self, path: str | None, overrides: tuple[str, ...] = ()) -> None:
+        """Fill the form with a scene; an edit of a queued run is given up.
+
+        Raises:
+            SceneError: it cannot be used.
+        """
+        scene = load(None if path is None else Path(path), overrides)
+        self.edited, self.lost = None, ""
+        self._fill(path, scene)
+
+    def request(self) -> Request:
+        """What the form asks for; of a queued run only the parameters are replaced.
+
+        Raises:
+            FieldError: a field cannot be used.
+        """
+        session, texts = self._session, self._form.overrides()
+        if self.edited is None:
+            overrides = (*texts, *session.bench_overrides)
+            return Request(self.path, overrides, session.bench_choice)
+        asked = self.edited.request
+        rest = [text for text in asked.overrides if not text.startswith("protocol.")]
+        return Request(asked.path, (*texts, *rest), asked.bench)
+
+    @property
+    def touched(self) -> bool:
+        """Whether the edited run's parameters were changed in the form."""
+        return self.edited is not None and self._form.texts() != self._taken_up
+
+    def edit(self, item: Queued) -> str:
+        """Take up a waiting run's parameters; why not, "" if they stand in the form."""
+        if item is self.edited:
+            return ""
+        if self.edited is not None and self.touched:
+            return f"First save or cancel the changes to {self.edited.title}."
+        try:
+            scene = item.request.load()
+        except (TactileLabError, OSError) as error:
+            return f"{item.title} cannot be edited: {error}"
+        if self.edited is None:
+            texts = self._form.texts()
+            self._before = Kept(self.path, self._form.protocol, texts)
+        self.edited, self.lost = item, ""
+        self._fill(item.request.path, scene)
+        self._taken_up = self._form.texts()
+        return ""
+
+    def leave(self) -> None:
+        """Put back what stood in the form before the edit."""
+        if self.edited is None:
+            return
+        self.edited, before = None, self._before
+        self.path = before.path
+        if before.protocol is not None:
+            self._form.show_protocol(before.protocol, {})
+            self._form.set_texts(before.texts)
+        self.changed.emit()
+
+    def _fill(self, path: str | None, scene: Scene) -> None:
+        self.path = path
+        kind = type(scene.protocol)
+        values = {key: getattr(scene.protocol, key) for key in kind.model_fields}
+        self._form.show_protocol(kind, values)
+        self.changed.emit()
+
+    def _mind_queue(self) -> None:
+        """An edited run that has left the queue: what was changed stays in the form."""
+        item = self.edited
+        if item is None or item in self._session.queue:
+            return
+        words = f"{item.title} {item.left}."
+        if self.touched:
+            self.edited = None
+            words += " Your changes stay in the form: Queue makes a new run of them."
+            self.changed.emit()
+        else:
+            self.leave()
+        self.lost = words
