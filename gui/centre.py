@@ -134,7 +134,7 @@ class Centre(QWidget):
         self.splitter.setSizes([780, 200])
         self.splitter.setChildrenCollapsible(False)
         upper.setMinimumHeight(320)
-        lower.setMinimumHeight(136)
+        lower.setMinimumHeight(162)
         column(self).addWidget(self.splitter)
         self.empty = EmptyCard(self.stack, theme)
 

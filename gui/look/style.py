@@ -102,7 +102,8 @@ QToolButton[role="tab"] { background: transparent; border: 0; border-radius: 0;
 QToolButton[role="tab"]:hover { color: $text; }
 QToolButton[role="tab"]:checked { color: $text; border-bottom: 2px solid $accent;
   font-weight: 600; }
-QToolButton[role="tab"]:focus { background: $selected; }
+QToolButton[role="tab"]:focus { border: 2px solid $accent; border-radius: 6px;
+  padding: 6px 8px 8px 8px; }
 
 QLineEdit, QPlainTextEdit, QComboBox, QAbstractSpinBox { background: $field;
   border: 1px solid $border_strong; border-radius: 6px; padding: 3px 8px;
@@ -137,16 +138,17 @@ QScrollBar::handle:horizontal { background: $border_strong; border-radius: 4px;
   min-width: 30px; margin: 2px 1px; }
 QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
 QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
-QTableView { background: transparent; border: 0; gridline-color: $border;
+QTableView { background: transparent; border: 2px solid transparent;
+  border-radius: 6px; gridline-color: $border;
   selection-background-color: $selected; selection-color: $text; outline: 0; }
 QTableView::item { padding: 0 3px; border: 0; }
-QTableView:focus { border: 1px solid $accent; }
+QTableView:focus { border: 2px solid $accent; }
 QHeaderView { background: transparent; border: 0; }
 QHeaderView::section { background: transparent; border: 0;
   border-bottom: 1px solid $border; color: $muted; font-size: 11px;
   font-weight: 600; padding: 4px 6px; }
-QListView { background: transparent; border: 0; outline: 0; }
-QListView:focus { border: 1px solid $accent; border-radius: 6px; }
+QListView { background: transparent; border: 2px solid transparent; outline: 0; }
+QListView:focus { border: 2px solid $accent; border-radius: 6px; }
 QMenu { background: $panel; border: 1px solid $border_strong; padding: 5px; }
 QMenu::item { padding: 6px 22px; border-radius: 4px; }
 QMenu::item:selected { background: $selected; color: $selected_text; }

@@ -14,16 +14,15 @@ from PySide6.QtCore import (
 )
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QHBoxLayout,
     QLineEdit,
-    QTableView,
     QWidget,
 )
 
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, column, label
+from gui.record.log_table import LogTable
 from gui.session.messages import Level, Line
 
 Index = QModelIndex | QPersistentModelIndex
@@ -125,23 +124,20 @@ class LogView(QWidget):
         self.choices.choose(0)
         self.help = IconButton(theme, "help", "Help on steps and log")
         self.note = QLineEdit()
-        self.note.setPlaceholderText("Add a time-stamped note …  (N)")
+        self.note.setPlaceholderText("Add a note …  (N)")
         self.note.setAccessibleName("Note")
+        self.note.setToolTip("Stamped with wall-clock and run time; Enter adds it")
         self.note.setMinimumWidth(120)
         self.note.setMaximumWidth(280)
-        self.table = QTableView()
+        self.table = LogTable(self.filter)
         self._lay_out()
         self.choices.group.idClicked.connect(self._chosen)
         self.note.returnPressed.connect(self._noted)
         theme.changed.connect(self.table.viewport().update)
 
     def add(self, line: Line) -> None:
-        """Append a line and scroll to it, unless the user looks further up."""
-        bar = self.table.verticalScrollBar()
-        low = bar.value() >= bar.maximum() - 2
+        """Append a line."""
         self.model.add(line)
-        if low:
-            self.table.scrollToBottom()
 
     def show_safety(self) -> None:
         """Show the last lines about the coil."""
@@ -159,22 +155,6 @@ class LogView(QWidget):
             self.note.clear()
 
     def _lay_out(self) -> None:
-        table = self.table
-        table.setModel(self.filter)
-        table.setAccessibleName("Log")
-        table.setShowGrid(False)
-        table.setWordWrap(False)
-        table.horizontalHeader().hide()
-        table.verticalHeader().hide()
-        table.verticalHeader().setDefaultSectionSize(22)
-        table.verticalHeader().setMinimumSectionSize(18)
-        for where, width in enumerate((112, 28, 78)):
-            table.setColumnWidth(where, width)
-        table.horizontalHeader().setStretchLastSection(True)
-        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        table.setTabKeyNavigation(False)
-        table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         top = QHBoxLayout()
         top.setSpacing(10)
         top.addWidget(label("Run log", "title"))
@@ -184,4 +164,4 @@ class LogView(QWidget):
         top.addWidget(self.help)
         whole = column(self, spacing=6)
         whole.addLayout(top)
-        whole.addWidget(table, 1)
+        whole.addWidget(self.table, 1)
