@@ -116,12 +116,15 @@ _SHOWN = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M",
 def show(value: float, unit: str, digits: int = 4) -> str:
     """`value` (SI) for a person: "50 mN", with a prefix that keeps 1 to 999 in front.
 
-    Compound units and powers get no prefix. A true minus is used.
+    Areas are in m^2 or mm^2; other powers and compound units get no prefix. A true
+    minus is used.
     """
     if not math.isfinite(value):
         return f"{value} {unit}"
     prefix, number = "", value
-    if value != 0 and not any(c in unit for c in " ^²"):
+    if unit in ("m^2", "m²") and 0 < abs(value) < 0.01:
+        prefix, number = "m", value * 1e6
+    elif value != 0 and not any(c in unit for c in " ^²"):
         power = 3 * math.floor(math.log10(abs(value)) / 3 + 1e-12)
         power = min(max(power, -15), 9)
         number = value / 10.0**power

@@ -98,7 +98,7 @@ def test_what_is_shown_is_right_to_its_digits(value):
         (-0.2, "A", "−200 mA"),
         (999.96, "V", "1 kV"),
         (1e6, "S/s", "1 MS/s"),
-        (2.25e-4, "m^2", "0.000225 m^2"),
+        (2.25e-4, "m^2", "225 mm^2"),
         (float("inf"), "s", "inf s"),
     ],
 )

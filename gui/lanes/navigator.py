@@ -12,6 +12,7 @@ from PySide6.QtGui import (
     QMouseEvent,
     QPainter,
     QPaintEvent,
+    QPen,
     QPixmap,
     QWheelEvent,
 )
@@ -69,8 +70,8 @@ class Navigator(QWidget):
         self._window(painter, frame)
         painter.restore()
         if self.hasFocus():
-            painter.setPen(paint.pen(self._theme.tokens.accent))
-            painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+            painter.setPen(QPen(QColor(self._theme.tokens.accent), 2))
+            painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
 
     def _keep_run(self) -> None:
         """Draw the run anew where it differs from the picture; growing, not always."""

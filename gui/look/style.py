@@ -69,7 +69,7 @@ QPushButton:disabled, QToolButton:disabled { color: $faint; background: $sunken;
 QPushButton[role="primary"] { background: $accent; color: $on_accent;
   border: 1px solid $accent; font-weight: 600; }
 QPushButton[role="primary"]:hover { background: $accent_hover; }
-QPushButton[role="primary"]:focus { border: 2px solid $text; padding: 4px 11px; }
+QPushButton[role="primary"]:focus { border: 6px double $on_accent; padding: 0 7px; }
 QPushButton[role="primary"]:disabled { background: $selected; color: $faint;
   border-color: $selected; }
 QPushButton[role="danger"] { color: $red; border: 1px solid $red; font-weight: 600; }
@@ -102,7 +102,7 @@ QToolButton[role="tab"] { background: transparent; border: 0; border-radius: 0;
 QToolButton[role="tab"]:hover { color: $text; }
 QToolButton[role="tab"]:checked { color: $text; border-bottom: 2px solid $accent;
   font-weight: 600; }
-QToolButton[role="tab"]:focus { border: 2px solid $accent; border-radius: 6px;
+QToolButton[role="tab"]:focus { border: 2px solid $accent; border-radius: 5px;
   padding: 6px 8px 8px 8px; }
 
 QLineEdit, QPlainTextEdit, QComboBox, QAbstractSpinBox { background: $field;
@@ -122,12 +122,13 @@ QComboBox::down-arrow { image: url("$arrow"); width: 12px; height: 12px; }
 QComboBox QAbstractItemView { background: $panel; border: 1px solid $border_strong;
   selection-background-color: $selected; selection-color: $selected_text;
   outline: 0; padding: 4px; }
-QCheckBox { spacing: 8px; background: transparent; }
+QCheckBox { spacing: 8px; background: transparent; border: 2px solid transparent;
+  border-radius: 6px; padding: 1px; }
+QCheckBox:focus { border-color: $accent; }
 QCheckBox::indicator { width: 16px; height: 16px; border: 1px solid $border_strong;
   border-radius: 4px; background: $field; }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent;
   image: url("$check"); }
-QCheckBox::indicator:focus { border: 2px solid $accent; }
 
 QScrollArea, QScrollArea > QWidget > QWidget { background: transparent; border: 0; }
 QScrollBar:vertical { background: transparent; width: 10px; margin: 0; }
@@ -142,13 +143,14 @@ QTableView { background: transparent; border: 2px solid transparent;
   border-radius: 6px; gridline-color: $border;
   selection-background-color: $selected; selection-color: $text; outline: 0; }
 QTableView::item { padding: 0 3px; border: 0; }
-QTableView:focus { border: 2px solid $accent; }
+QTableView:focus { border-color: $accent; }
 QHeaderView { background: transparent; border: 0; }
 QHeaderView::section { background: transparent; border: 0;
   border-bottom: 1px solid $border; color: $muted; font-size: 11px;
   font-weight: 600; padding: 4px 6px; }
-QListView { background: transparent; border: 2px solid transparent; outline: 0; }
-QListView:focus { border: 2px solid $accent; border-radius: 6px; }
+QListView { background: transparent; border: 2px solid transparent;
+  border-radius: 6px; outline: 0; }
+QListView:focus { border-color: $accent; }
 QMenu { background: $panel; border: 1px solid $border_strong; padding: 5px; }
 QMenu::item { padding: 6px 22px; border-radius: 4px; }
 QMenu::item:selected { background: $selected; color: $selected_text; }

@@ -162,8 +162,8 @@ def assumptions(scene: Scene) -> tuple[str, ...]:
         ]
     else:
         lines = [
-            f"force from Eq. (2): r = {show(magnet.r, 'm')}, A1 = {magnet.A1:g} m², "
-            f"A2 = {magnet.A2:g} m², B1 = {show(magnet.B1, 'T')}, "
+            f"force from Eq. (2): r = {show(magnet.r, 'm')}, A1 = {show(magnet.A1, 'm²')}, "
+            f"A2 = {show(magnet.A2, 'm²')}, B1 = {show(magnet.B1, 'T')}, "
             f"B2 = {show(magnet.B2_per_ampere, 'T')} per ampere: {per_ampere}"
         ]
     if not bench.simulated:
