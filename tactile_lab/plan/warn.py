@@ -162,9 +162,10 @@ def assumptions(scene: Scene) -> tuple[str, ...]:
         ]
     else:
         lines = [
-            f"force from Eq. (2): r = {show(magnet.r, 'm')}, A1 = {show(magnet.A1, 'm²')}, "
-            f"A2 = {show(magnet.A2, 'm²')}, B1 = {show(magnet.B1, 'T')}, "
-            f"B2 = {show(magnet.B2_per_ampere, 'T')} per ampere: {per_ampere}"
+            f"force from Eq. (2): r = {show(magnet.r, 'm')}, "
+            f"A1 = {show(magnet.A1, 'm²')}, A2 = {show(magnet.A2, 'm²')}, "
+            f"B1 = {show(magnet.B1, 'T')}, B2 = {show(magnet.B2_per_ampere, 'T')} "
+            f"per ampere: {per_ampere}"
         ]
     if not bench.simulated:
         return tuple(lines)

@@ -157,7 +157,7 @@ def test_assumptions_are_stated():
     told = " ".join(plan(load(), preview=False).assumptions)
     for fact in (
         "r = 6 mm",
-        "A2 = 0.00225",
+        "A2 = 2250 mm²",
         "11 mT per ampere",
         "19200 baud",
         "200.6 mN",
