@@ -48,7 +48,7 @@ def _roles(session: Core) -> list[str]:
     wanted = {
         "coil": needs.coil,
         "scope": bool(needs.channels),
-        "meter": needs.field_meter,
+        "meter": needs.field_meter or needs.asked_field,
     }
     return [role for role, used in wanted.items() if used]
 
@@ -99,6 +99,9 @@ def _scope(session: Core) -> InstrumentView:
 
 def _meter(session: Core) -> InstrumentView:
     lamp, words = _found(session, "meter")
+    meter = None if session.spec is None else session.spec.field_meter
+    if meter is not None and meter.driver == "manual":
+        words = "a person reads it"
     field = session.readings.get("field")
     value = "—" if field is None else show(round(field, 5), "T", 3)
     if session.state is State.RUNNING and field is not None:

@@ -110,9 +110,10 @@ class TakeNote:
 
 @dataclass(frozen=True)
 class ErrandDone:
-    """The person has done what a run waits for."""
+    """The person has done what a run waits for; `answer` is what was typed."""
 
     run: int
+    answer: str = ""
 
 
 @dataclass(frozen=True)

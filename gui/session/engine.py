@@ -100,9 +100,9 @@ class Engine:
             case TakeNote(run=number, text=text, time=at):
                 if isinstance(run := self._runs.get(number), Running):
                     run.note(text, at)
-            case ErrandDone(run=number):
+            case ErrandDone(run=number, answer=answer):
                 if isinstance(run := self._runs.get(number), Running):
-                    run.errand_done()
+                    run.errand_done(answer)
             case TakeCoil(run=number):
                 self._begin(number, Hand(command, self._teller(number)))
             case SetCoil(run=number, current=current):

@@ -109,7 +109,7 @@ class Incoming(Core):
                     self.source.tracks.add(part)
             case Errand():
                 self.errand = told
-                self.log(Level.WARNING, "runner", told.text)
+                self.log(Level.WARNING, "runner", f"{told.doubt} {told.text}".strip())
                 self.changed.emit()
             case CoilByHand():
                 self._by_hand(told)

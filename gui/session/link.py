@@ -93,9 +93,9 @@ class RunAfar(Afar):
         """Keep the last minute of a watch as a run; `Recorded` tells the result."""
         self._link.ask(RecordWatch(self._number, out, dict(notes)))
 
-    def errand_done(self) -> None:
-        """The person has done what the run waits for."""
-        self._link.ask(ErrandDone(self._number))
+    def errand_done(self, answer: str) -> None:
+        """The person has done what the run waits for, and typed `answer`."""
+        self._link.ask(ErrandDone(self._number, answer))
 
 
 class HandAfar(Afar):

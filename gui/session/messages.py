@@ -187,9 +187,18 @@ class FieldByHand:
 
 @dataclass(frozen=True)
 class Errand:
-    """A person is asked to do something at the bench; the run waits for it."""
+    """A person is asked to do something at the bench; the run waits for it.
+
+    Attributes:
+        text: what.
+        current: at which the field is to be read off and typed, A; None where there is
+            something to do and nothing to type.
+        doubt: why it is asked again, "" the first time.
+    """
 
     text: str
+    current: float | None = None
+    doubt: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from gui.session.commands import StartRun
@@ -24,7 +25,7 @@ from gui.session.sampling import tell_samples
 from gui.session.threads import start
 from gui.state import Fault
 from tactile_lab.acquisition import events
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import RefusedError, TactileLabError
 
 if TYPE_CHECKING:
     from gui.session.twin import LiveTwin
@@ -51,7 +52,7 @@ class Running:
         self._execution: Execution | None = None
         self._twin: LiveTwin | None = None
         self._stop_asked: str | None = None
-        self._errand_done = threading.Event()
+        self._answers: SimpleQueue[str] = SimpleQueue()
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
 
@@ -72,9 +73,9 @@ class Running:
         if self._execution is not None and self.alive:
             self._execution.folder.log("note", text, time_s=at)
 
-    def errand_done(self) -> None:
-        """The person has done what the run waits for."""
-        self._errand_done.set()
+    def errand_done(self, answer: str) -> None:
+        """The person has done what the run waits for, and typed `answer`."""
+        self._answers.put(answer)
 
     @property
     def alive(self) -> bool:
@@ -95,16 +96,22 @@ class Running:
             self._tell(Gone())
 
     def _prepare(self) -> Execution | None:
+        from tactile_lab.acquisition.asked_field import AskedField
         from tactile_lab.acquisition.execution import Execution
 
         try:
+            scene = self._asked.request.load()
+            magnet = scene.bench.magnet
             execution = Execution(
-                self._asked.request.load(),
+                scene,
                 self._asked.out,
                 realtime=self._realtime,
                 emit=self._emit,
                 notes=self._asked.notes,
-                ask=self._ask,
+                ask=lambda text: self._ask(Errand(text)),
+                asked_field=AskedField(
+                    self._ask_field, lambda current: float(magnet.field(current))
+                ),
             )
         except (TactileLabError, OSError) as error:
             self._tell(Refused(Fault("The run was refused.", str(error))))
@@ -168,12 +175,26 @@ class Running:
             self._twin.add(event.time, sent)
         self._tell(event)
 
-    def _ask(self, text: str) -> None:
-        """Have the window ask a person; returns when it is done, or nobody cares."""
-        self._errand_done.clear()
-        self._tell(Errand(text))
-        while self.alive and not self._errand_done.wait(0.2):
-            pass
+    def _ask(self, errand: Errand) -> str:
+        """Have the window ask a person; what was typed.
+
+        Raises:
+            RefusedError: the run ended meanwhile.
+        """
+        self._tell(errand)
+        while self.alive:
+            try:
+                return self._answers.get(timeout=0.2)
+            except Empty:
+                pass
+        raise RefusedError("The run has ended; nobody needs to answer.")
+
+    def _ask_field(self, text: str) -> str:
+        """Have a person read the teslameter at the current that flows."""
+        doubt, _, question = text.rpartition("\n")
+        assert self._execution is not None
+        current = self._execution.coil_state.setpoint
+        return self._ask(Errand(question, current or 0.0, doubt))
 
     def _follow(
         self, twin: LiveTwin, execution: Execution, ended: threading.Event

@@ -106,13 +106,16 @@ class Session(Incoming):
             known = self.bench is not None
             self._enter(State.READY if known else State.DISCONNECTED)
 
-    def errand_done(self) -> None:
-        """The person has done what the run waits for."""
+    def errand_done(self, answer: str = "") -> None:
+        """The person has done what the run waits for, and typed `answer`."""
         if self.errand is not None:
-            self.log(Level.INFO, "runner", f"Done: {self.errand.text}")
+            said = f"Done: {self.errand.text}"
+            if self.errand.current is not None:
+                said = f"Typed {answer} at {show(self.errand.current, 'A')}"
+            self.log(Level.INFO, "runner", said)
             self.errand = None
             if self._run is not None:
-                self._run.errand_done()
+                self._run.errand_done(answer)
             self.changed.emit()
 
     def begin_manual(self) -> None:

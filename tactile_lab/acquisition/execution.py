@@ -236,13 +236,14 @@ class Execution:
         if probed and self._ask is None and self.bench.place_probes is None:
             raise SceneError(
                 f"{self.scene.name} needs a person who puts the probes on 0 V and V_S. "
-                "Run it in a terminal, or set protocol.calibrate = false."
+                "Run it in the window or in a terminal, or set protocol.calibrate = "
+                "false."
             )
         if self.needs.asked_field and self._asked_field is None:
             raise SceneError(
                 f"{self.scene.name} has a person read the teslameter, and nobody is "
-                "there to be asked. Run it in a terminal, or give the readings with "
-                "--field FILE, one a line."
+                "there to be asked. Run it in the window or in a terminal, or give the "
+                "readings with --field FILE, one a line."
             )
 
     def _drift(self) -> Drift | None:

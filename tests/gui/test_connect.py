@@ -5,6 +5,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
 from gui.dialogs.bench_text import bench_text, save_bench, show_bench, start_choice
@@ -16,7 +18,9 @@ from gui.session.messages import Errand
 from gui.session.request import Request
 from gui.state import Fault, State
 from tactile_lab.errors import RunFolderError, SceneError
+from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
+from tactile_lab.store.run import Run
 
 
 def test_bench_file_reads_back_as_chosen(tmp_path: Path) -> None:
@@ -121,16 +125,17 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
 
 def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     window, session = lab.window, lab.session
-    done: list[bool] = []
+    done: list[str] = []
     run = RunAfar(session.link, 0, session.inbox)
-    run.errand_done = lambda: done.append(True)
+    run.errand_done = done.append
     session._run = run
     session._enter(State.RUNNING)
     session.inbox.put(Errand("Put the probes on 0 V."))
     lab.until(window.errand.isVisible)
     assert "0 V" in window.errand.text.text()
+    assert window.errand.entry.isHidden(), "there is nothing to type"
     window.errand.done.click()
-    assert done and not window.errand.isVisible()
+    assert done == [""] and not window.errand.isVisible()
     session.inbox.put(Errand("Put them on V_S."))
     lab.until(window.errand.isVisible)
     session._run = None
@@ -193,3 +198,66 @@ def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     window.banner.acknowledge.click()
     assert session.state is State.DISCONNECTED
     assert window.centre.empty.isVisible()
+
+
+METER = """
+name = "read by hand"
+simulated = true
+[coil]
+baud = 19200
+[field_meter]
+driver = "manual"
+[magnet]
+r = "6 mm"
+"""
+
+
+def calibrate(lab) -> None:
+    """Start a short calibration on a bench whose teslameter a person reads."""
+    (lab.folder / "by-hand.toml").write_text(METER)
+    short = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
+    request = Request("calibrate_field", short, str(lab.folder / "by-hand.toml"))
+    lab.session.start(request, "Calibration")
+    lab.until(lambda: lab.window.errand.isVisible() or lab.session.fault)
+
+
+def test_a_person_reads_the_field_for_a_calibration(lab) -> None:
+    session, card = lab.session, lab.window.errand
+    calibrate(lab)
+    asked: list[float] = []
+    while session.state is State.RUNNING:
+        errand = session.errand
+        assert not card.doubt.text() or card.doubt.isHidden()
+        asked.append(errand.current)
+        held = card.coil.text().replace("\u00a0", " ")
+        assert f"holds {show(errand.current, 'A')}" in held
+        assert ("heat" in card.coil.text()) is (abs(errand.current) > 0.6)
+        assert not card.done.isEnabled(), "nothing is typed yet"
+        QTest.keyClicks(card.entry, f"{10.8 * errand.current:.2f}")
+        QTest.keyClick(card.entry, Qt.Key.Key_Return)
+        lab.until(lambda: session.errand or session.state is not State.RUNNING)
+    lab.until(lambda: not session.busy)
+    assert session.fault is None
+    assert asked[:5] == pytest.approx([1.0, 0.5, 0.0, -0.5, -1.0])
+    with Run.load(session.folder) as run:
+        assert run.field["field"] == pytest.approx([10.8e-3 * i for i in asked])
+    assert card.isHidden() and session.coil_view().verified_off
+
+
+def test_what_is_no_field_is_not_sent_and_what_is_doubted_is_asked_again(lab) -> None:
+    session, card = lab.session, lab.window.errand
+    calibrate(lab)
+    card.entry.setText("10.8 A")
+    assert not card.done.isEnabled() and "A" in card.understood.text()
+    QTest.keyClick(card.entry, Qt.Key.Key_Return)
+    assert session.errand is not None
+    card.entry.setText("−8000 µT")
+    assert card.understood.text() == "= −8 mT" and card.done.isEnabled()
+    card.done.click()
+    lab.until(lambda: session.errand is not None)
+    assert "check sign" in card.doubt.text() and card.doubt.isVisible()
+    assert "−8 mT at 1 A" in card.before.text()
+    assert card.entry.text() == "", "a second Enter alone confirms nothing"
+    card.stop.click()
+    lab.until(lambda: not session.busy)
+    assert card.isHidden() and session.coil_view().verified_off
