@@ -14,6 +14,9 @@ from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.scene.toml_text import to_toml
 
+BY_PERSON = "read by a person"
+"""In place of a teslameter's dialect: it has no output that could be read."""
+
 
 @dataclass
 class Choice:
@@ -22,7 +25,7 @@ class Choice:
     Attributes:
         name: of the bench.
         coil_port, coil_dialect: the current source.
-        meter_port, meter_dialect: the teslameter.
+        meter_port, meter_dialect: the teslameter; `BY_PERSON` needs no port.
         scope: driver of the oscilloscope, "" for none.
         scope_serial, scope_library: which one, and where the vendor's library lies.
         channels: (input, signal, range, offset, shunt) of each wired input.
@@ -82,7 +85,9 @@ def bench_text(choice: Choice) -> str:
             "channels": [_channel(choice, row) for row in choice.channels if row[1]],
         }
         data["scope"] = scope
-    if choice.meter_port:
+    if choice.meter_dialect == BY_PERSON:
+        data["field_meter"] = {"driver": "manual"}
+    elif choice.meter_port:
         meter = base.get("field_meter", {})
         data["field_meter"] = {
             **(meter if meter.get("dialect") == choice.meter_dialect else {}),
@@ -138,6 +143,8 @@ def _take_over(choice: Choice, data: dict[str, Any]) -> None:
         setattr(choice, f"{name}_port", "" if port.startswith("sim:") else port)
         if "dialect" in found:
             setattr(choice, f"{name}_dialect", str(found["dialect"]))
+    if data.get("field_meter", {}).get("driver") == "manual":
+        choice.meter_dialect = BY_PERSON
 
 
 def _short(text: str, symbol: str) -> str:

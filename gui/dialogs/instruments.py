@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
-from gui.dialogs.bench_text import Choice
+from gui.dialogs.bench_text import BY_PERSON, Choice
 from gui.parts import column, label, line, push
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
@@ -45,7 +45,7 @@ class Instruments(QWidget):
         self.coil_port, self.coil_row = self._ports("Coil source port"), QComboBox()
         self.meter_port, self.meter_row = self._ports("Teslameter port"), QComboBox()
         self.coil_row.addItems(rows_of("coil"))
-        self.meter_row.addItems(rows_of("meter"))
+        self.meter_row.addItems([*rows_of("meter"), BY_PERSON])
         self.scope = QComboBox()
         for driver, title in SCOPES:
             self.scope.addItem(title, driver)
@@ -55,6 +55,7 @@ class Instruments(QWidget):
         self.library.setPlaceholderText("vendor library, if not in the usual places")
         self.test_coil, self.test_meter = push("Test"), push("Test")
         self._lay_out()
+        self.meter_row.currentTextChanged.connect(self._allow)
         self.show_choice()
         self.scan.clicked.connect(self.look)
         self.found.connect(self._show_found)
@@ -165,6 +166,11 @@ class Instruments(QWidget):
                 self.tested.emit(role, str(error))
 
         start(work, f"test {role}")
+
+    def _allow(self, row: str) -> None:
+        """A teslameter that a person reads has no port."""
+        for widget in (self.meter_port, self.test_meter):
+            widget.setEnabled(row != BY_PERSON)
 
     def _ports(self, name: str) -> QComboBox:
         made = QComboBox()

@@ -73,6 +73,7 @@ QPushButton[role="primary"]:focus { border: 6px double $on_accent; padding: 0 7p
 QPushButton[role="primary"]:disabled { background: $selected; color: $faint;
   border-color: $selected; }
 QPushButton[role="danger"] { color: $red; border: 1px solid $red; font-weight: 600; }
+QPushButton[role="danger"]:disabled { color: $faint; border-color: $border; }
 QPushButton[role="danger"]:hover { background: $red_soft; }
 QPushButton[role="danger"]:focus { border: 2px solid $red; padding: 4px 11px; }
 QToolButton[role="flat"] { background: transparent; border: 1px solid transparent;
@@ -165,6 +166,13 @@ QSplitter::handle:hover { background: $selected; }
 QProgressBar { background: $sunken; border: 0; border-radius: 3px; max-height: 6px;
   min-height: 6px; }
 QProgressBar::chunk { background: $accent; border-radius: 3px; }
+QSlider { min-height: 22px; background: transparent; }
+QSlider::groove:horizontal { background: $border_strong; height: 4px;
+  border-radius: 2px; }
+QSlider::handle:horizontal { background: $accent; border: 2px solid $panel;
+  width: 16px; height: 16px; margin: -8px 0; border-radius: 10px; }
+QSlider::handle:horizontal:focus { border-color: $text; }
+QSlider::handle:horizontal:disabled { background: $border_strong; }
 QTextBrowser { background: $panel; border: 0; }
 """)
 

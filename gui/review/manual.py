@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSlider, QWidget
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QSlider,
+    QWidget,
+)
 
 from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
@@ -12,6 +18,12 @@ from gui.state import CoilView, Snapshot, State, Truth, milliamperes, truth
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse, show
 from tactile_lab.scene.bench_file import BenchSpec
+
+SIDES = (
+    Qt.AlignmentFlag.AlignLeft,
+    Qt.AlignmentFlag.AlignHCenter,
+    Qt.AlignmentFlag.AlignRight,
+)
 
 
 class ManualView(QWidget):
@@ -27,13 +39,14 @@ class ManualView(QWidget):
         super().__init__()
         self._limit = 0.0
         self._gain = 0.0
-        self._has_meter = False
+        self._no_meter = "No bench."
         self.begin = push("Take the coil by hand …")
         self.current = QLineEdit("0 mA")
         self.current.setAccessibleName("Coil current to set")
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(-100, 100)
         self.slider.setAccessibleName("Coil current to set, percent of the limit")
+        self._scale = [label("", "small") for _ in range(3)]
         self.set = push("Set", "primary")
         self.off = push("Coil off", "danger")
         self._problem = label("", "error", wrap=True)
@@ -57,16 +70,24 @@ class ManualView(QWidget):
     def show_bench(self, spec: BenchSpec | None) -> None:
         """Show limits and inputs of another bench."""
         self.inputs.show_bench(spec)
-        self._has_meter = spec is not None and spec.field_meter is not None
         if spec is None:
+            self._no_meter = "No bench."
             return
+        meter = spec.field_meter
+        self._no_meter = ""
+        if meter is None:
+            self._no_meter = "This bench has no teslameter of its own."
+        elif meter.driver == "manual":
+            self._no_meter = "A person reads this bench's teslameter."
         self._gain = spec.magnet.newtons_per_ampere
         if spec.coil is not None:
             limits = spec.coil.limits
             self._limit = limits.current
+            for mark, part in zip(self._scale, (-1.0, 0.0, 1.0), strict=True):
+                mark.setText(show(part * limits.current, "A"))
             self._limits.setText(
                 f"Limits: {show(limits.current, 'A')}, {show(limits.slew, 'A/s')}, "
-                f"{show(limits.continuous, 'A')} for ever. "
+                f"{show(limits.continuous, 'A')} continuous. "
                 f"{show(self._gain, 'N/A')} at this distance."
             )
 
@@ -84,17 +105,24 @@ class ManualView(QWidget):
         elif snapshot.coil is None:
             reason = "No coil source."
         self.begin.setToolTip(reason)
-        self.read.setEnabled(idle and self._has_meter and not reading)
-        self.read.setToolTip(
-            "" if self._has_meter else "This bench has no teslameter of its own."
-        )
+        self.read.setEnabled(idle and not self._no_meter and not reading)
+        self.read.setToolTip(self._no_meter)
         self.inputs.allow(idle and not on, reason)
         for widget in (self.current, self.slider, self.set, self.off):
             widget.setEnabled(on)
+        if not on:
+            self.current.setModified(False)
         self.check.setEnabled(idle and not on)
         self._show_coil(snapshot.coil)
         words = "not read" if field is None else show(round(field, 6), "T", 4)
         self._field.setText("reading …" if reading else words)
+
+    def follow(self, asked: float) -> None:
+        """Show what was asked of the coil, A, unless somebody is about to ask anew."""
+        edited = self.current.isModified() or self.current.hasFocus()
+        if not edited and not self.slider.isSliderDown():
+            self.current.setText(show(asked, "A") if asked else "0 mA")
+            self.slider.setValue(round(100 * asked / self._limit) if self._limit else 0)
 
     def _show_coil(self, coil: CoilView | None) -> None:
         self._now.setText("—" if coil is None else milliamperes(coil.current))
@@ -109,6 +137,7 @@ class ManualView(QWidget):
 
     def _slid(self, percent: int) -> None:
         self.current.setText(show(self._limit * percent / 100, "A", 3))
+        self.current.setModified(True)
 
     def _set(self) -> None:
         try:
@@ -122,6 +151,7 @@ class ManualView(QWidget):
             )
             return
         self._say("")
+        self.current.setModified(False)
         self.slider.setValue(round(100 * value / self._limit) if self._limit else 0)
         self.set_asked.emit(value)
 
@@ -143,7 +173,13 @@ class ManualView(QWidget):
         row.addWidget(self.current, 1)
         row.addWidget(self.set)
         whole.addLayout(row)
-        whole.addWidget(self.slider)
+        chosen = QGridLayout()
+        chosen.setVerticalSpacing(0)
+        chosen.addWidget(self.slider, 0, 0, 1, 3)
+        for place, (mark, side) in enumerate(zip(self._scale, SIDES, strict=True)):
+            chosen.addWidget(mark, 1, place, side)
+            chosen.setColumnStretch(place, 1)
+        whole.addLayout(chosen)
         whole.addWidget(self._problem)
         whole.addWidget(self.off)
         whole.addWidget(self._limits)

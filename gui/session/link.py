@@ -99,10 +99,17 @@ class RunAfar(Afar):
 
 
 class HandAfar(Afar):
-    """A coil that the engine drives by hand; `CoilByHand` tells its state."""
+    """A coil that the engine drives by hand; `CoilByHand` tells its state.
+
+    Attributes:
+        asked: current that it was asked to hold last, A.
+    """
+
+    asked = 0.0
 
     def hold(self, current: float) -> None:
         """Go to `current`, A, as fast as the slew limit lets it, and stay."""
+        self.asked = current
         self._link.ask(SetCoil(self._number, current))
 
     def renew(self) -> None:

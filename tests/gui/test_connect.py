@@ -9,9 +9,15 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
-from gui.dialogs.bench_text import bench_text, save_bench, show_bench, start_choice
+from gui.dialogs.bench_text import (
+    BY_PERSON,
+    bench_text,
+    save_bench,
+    show_bench,
+    start_choice,
+)
 from gui.dialogs.connect import Connect
-from gui.dialogs.instruments import rows_of
+from gui.dialogs.instruments import Instruments, rows_of
 from gui.review.conclusion import conclusion_of
 from gui.session.link import RunAfar
 from gui.session.messages import Errand
@@ -184,6 +190,20 @@ def test_dialog_keeps_what_it_does_not_show(tmp_path: Path) -> None:
     assert spec.hand_set == {"V_GS": 1.3}
     (channel,) = [c for c in spec.scope.channels if c.signal == "V_K"]
     assert (channel.coupling, channel.scale) == ("AC", 10.0)
+
+
+def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> None:
+    choice = start_choice()
+    page = Instruments(choice)
+    assert page.meter_port.isEnabled()
+    page.meter_row.setCurrentText(BY_PERSON)
+    assert not page.meter_port.isEnabled() and not page.test_meter.isEnabled()
+    spec = save_bench(page.take(), tmp_path / "bench.toml")
+    assert spec.field_meter is not None and spec.field_meter.driver == "manual"
+    again = start_choice()
+    show_bench(again, spec)
+    assert Instruments(again).meter_row.currentText() == BY_PERSON
+    page.deleteLater()
 
 
 def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:

@@ -1,5 +1,7 @@
 """The bench by hand: scope inputs between runs, the field on request."""
 
+from PySide6.QtTest import QTest
+
 from gui.session.link import HandAfar
 from gui.session.messages import CoilByHand, HandOff
 from gui.state import State, Truth, truth
@@ -99,6 +101,30 @@ def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
     )
     session.acknowledge()
     session.connect_bench("sim")
+
+
+def test_the_entry_follows_the_coil_unless_somebody_types(lab) -> None:
+    session, panel = lab.session, lab.window.review.manual
+    session.begin_manual()
+    session.manual.hold(0.2)
+    lab.window.render_state()
+    assert panel.current.text() == "200 mA" and panel.slider.value() == 10
+    panel.current.clear()
+    QTest.keyClicks(panel.current, "300 mA")
+    lab.window.render_state()
+    assert panel.current.text() == "300 mA", "what is being typed stays"
+    panel.set.click()
+    lab.until(lambda: abs((session.coil_view().current or 0.0) - 0.3) < 2e-3)
+    assert panel.current.text() == "300 mA" and panel.slider.value() == 15
+    panel.slider.setSliderDown(True)
+    panel.slider.setSliderPosition(20)
+    panel.slider.setSliderDown(False)
+    lab.window.render_state()
+    assert panel.current.text() == "400 mA", "chosen, not yet set"
+    session.stop("test is over")
+    lab.until(lambda: session.manual is None)
+    lab.window.render_state()
+    assert panel.current.text() == "0 mA", "nothing is asked of a coil that is off"
 
 
 def test_a_field_is_read_while_the_coil_is_held(lab) -> None:
