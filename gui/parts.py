@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
+    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLayout,
@@ -184,6 +187,33 @@ def with_gutter(area: QScrollArea, inside: QLayout) -> QScrollArea:
     make_room(0, 0)
     area.verticalScrollBar().rangeChanged.connect(make_room)
     return area
+
+
+def stack(
+    parent: QWidget,
+    parts: Sequence[QWidget | QLayout],
+    page: QWidget,
+    *,
+    spacing: int = 8,
+) -> QGridLayout:
+    """Parts below each other; `page`, one of them, takes the height that is left.
+
+    The page reaches `BAR` further to the right than the others: its scroll bar lies
+    in what is their margin.
+    """
+    grid = QGridLayout(parent)
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setHorizontalSpacing(0)
+    grid.setVerticalSpacing(spacing)
+    for at, part in enumerate(parts):
+        if isinstance(part, QLayout):
+            grid.addLayout(part, at, 0)
+        else:
+            grid.addWidget(part, at, 0, 1, 2 if part is page else 1)
+        grid.setRowStretch(at, int(part is page))
+    grid.setColumnStretch(0, 1)
+    grid.setColumnMinimumWidth(1, BAR)
+    return grid
 
 
 def column(parent: QWidget, margin: int = 0, spacing: int = 6) -> QVBoxLayout:

@@ -97,3 +97,8 @@ def lanes_for(signals: Iterable[str], *, twin: bool = True) -> tuple[Lane, ...]:
         elif lane.signal in wanted:
             chosen.append(lane)
     return tuple(chosen)
+
+
+def title_of(signal: str) -> str:
+    """A signal's name as its lane has it, rich text."""
+    return next(lane.title for lane in _LANES if lane.key == signal)

@@ -38,12 +38,14 @@ class Card:
     Attributes:
         name: of the quantity.
         value: with its unit; "—" where it cannot be told.
-        detail: its uncertainty and the model's value, or why there is none.
+        detail: its uncertainty, or why there is none.
+        model: the model's value, "" without one.
     """
 
     name: str
     value: str
     detail: str
+    model: str = ""
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def _card(
             beside = f"model {how(model)[0]}"
         except NotIdentifiableError:
             beside = "model: none"
-    return Card(name, value, " · ".join(text for text in (spread, beside) if text))
+    return Card(name, value, spread, beside)
 
 
 def _onset(steps: Sequence[Finding]) -> tuple[str, str]:
@@ -172,13 +174,14 @@ def _adaptation(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
             why = _capital(str(reason)) if why == "No step has fired." else why
             continue
         span = f"{found.low:.2g} to {found.high:.2g} s at {step.label}"
+        beside = ""
         try:
             own = fit_adaptation(model[at].times, step.hold) if model else None
             if own is not None:
-                span += f" · model {own.time_constant.value:.2g} s"
+                beside = f"model {own.time_constant.value:.2g} s"
         except NotIdentifiableError:
-            pass
-        return Card(name, f"{found.value:.3g} s", span)
+            beside = "model: none"
+        return Card(name, f"{found.value:.3g} s", span, beside)
     return Card(name, "—", why)
 
 
@@ -190,9 +193,9 @@ def _fall(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
     at = max(fell, key=lambda number_: steps[number_].level or 0.0)
     text = f"at {steps[at].label}"
     theirs = model[at].fall if model else None
-    if theirs is not None:
-        text += f" · model {100 * theirs:.0f} %"
-    return Card("Fall in the hold", f"{100 * (steps[at].fall or 0.0):.0f} %", text)
+    beside = "" if theirs is None else f"model {100 * theirs:.0f} %"
+    value = f"{100 * (steps[at].fall or 0.0):.0f} %"
+    return Card("Fall in the hold", value, text, beside)
 
 
 def _voltages(seen: Beside) -> list[Bar]:
@@ -221,4 +224,4 @@ def _spikes(seen: Beside) -> list[Bar]:
 
 
 def _capital(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
+    return f"{text[:1].upper()}{text[1:]}.".replace("|beta|", "|β|")

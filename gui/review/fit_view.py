@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from gui.look.fonts import sized
+from gui.lanes.lane import title_of
 from gui.look.theme import Theme
-from gui.parts import column, label, panel
+from gui.parts import column, label, panel, row
 from gui.review.fit import Bar, Card
+from gui.review.wording import unbroken
 
-ROW = 22
+ROW = 19
+"""Height of a bar's row, px."""
 
 
 class FitCards(QWidget):
@@ -43,10 +45,12 @@ class FitCards(QWidget):
             self._labels, cards, strict=False
         ):
             name.setText(card.name)
-            value.setText(card.value)
-            detail.setText(card.detail)
-            frame.setAccessibleName(f"{card.name}: {card.value}. {card.detail}")
-            frame.setToolTip(card.detail)
+            value.setText(unbroken(card.value))
+            small = [text for text in (card.detail, card.model) if text]
+            detail.setText(unbroken("\n".join(small)))
+            spoken = ", ".join(small)
+            frame.setAccessibleName(f"{card.name}: {card.value}. {spoken}")
+            frame.setToolTip(spoken)
         self.setVisible(bool(cards))
 
     @property
@@ -60,56 +64,69 @@ class TwinBars(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        head = QHBoxLayout()
+        self._theme = theme
+        self._rows: list[tuple[QLabel, _Gauge, QLabel]] = []
+        head = row()
         head.addWidget(label("Model beside the run", "title"))
         head.addStretch(1)
         head.addWidget(label("NRMSE · full bar 10 % or 20 ms", "small"))
-        self._bars = _Bars(theme)
+        self._grid = QGridLayout()
+        self._grid.setHorizontalSpacing(10)
+        self._grid.setVerticalSpacing(3)
+        self._grid.setColumnStretch(1, 1)
         whole = column(self, spacing=4)
         whole.addLayout(head)
-        whole.addWidget(self._bars)
+        whole.addLayout(self._grid)
         self.hide()
 
     def show_bars(self, bars: tuple[Bar, ...]) -> None:
         """Show the distances, or hide where there is no model."""
-        self._bars.show_bars(bars)
-        self.setVisible(bool(bars))
-
-
-class _Bars(QWidget):
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self._bars: tuple[Bar, ...] = ()
-        theme.changed.connect(self.update)
-
-    def show_bars(self, bars: tuple[Bar, ...]) -> None:
-        self._bars = bars
-        self.setFixedHeight(ROW * max(len(bars), 1))
+        while len(self._rows) < len(bars):
+            self._add_row()
+        for number, (name, gauge, text) in enumerate(self._rows):
+            for part in (name, gauge, text):
+                part.setVisible(number < len(bars))
+            if number < len(bars):
+                bar = bars[number]
+                name.setText(title_of(bar.signal))
+                gauge.show_share(bar.share, bar.signal)
+                text.setText(unbroken(bar.text))
         spoken = ", ".join(f"{bar.name} {bar.text}" for bar in bars)
         self.setAccessibleName(f"Measured less model: {spoken}")
+        self.setVisible(bool(bars))
+
+    def _add_row(self) -> None:
+        parts = label(""), _Gauge(self._theme), label("")
+        side = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        parts[2].setAlignment(side)
+        at = len(self._rows)
+        for where, part in enumerate(parts):
+            part.setFixedHeight(ROW)
+            self._grid.addWidget(part, at, where)
+        self._rows.append(parts)
+
+
+class _Gauge(QWidget):
+    """A bar in a signal's colour."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme, self._share, self._signal = theme, 0.0, "V_C1"
+        theme.changed.connect(self.update)
+
+    def show_share(self, share: float, signal: str) -> None:
+        """Show a length from 0 to 1."""
+        self._share, self._signal = share, signal
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw name, bar and number of each signal."""
+        """Draw the bar in its trough."""
         painter, tokens = QPainter(self), self._theme.tokens
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(sized(12))
-        left, right = 58.0, self.width() - 112.0
-        for row, bar in enumerate(self._bars):
-            top = float(ROW * row)
-            painter.setPen(QColor(tokens.text))
-            side = Qt.AlignmentFlag.AlignVCenter
-            painter.drawText(QRectF(0, top, left, ROW), side, bar.name)
-            painter.drawText(
-                QRectF(right + 6, top, self.width() - right - 6, ROW),
-                side | Qt.AlignmentFlag.AlignRight,
-                bar.text,
-            )
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(tokens.sunken))
-            middle = top + ROW / 2 - 3
-            painter.drawRoundedRect(QRectF(left, middle, right - left, 6), 3, 3)
-            painter.setBrush(QColor(tokens.trace(bar.signal)))
-            length = max(bar.share * (right - left), 3.0)
-            painter.drawRoundedRect(QRectF(left, middle, length, 6), 3, 3)
+        painter.setPen(Qt.PenStyle.NoPen)
+        middle = self.height() / 2 - 3
+        painter.setBrush(QColor(tokens.sunken))
+        painter.drawRoundedRect(QRectF(0, middle, self.width(), 6), 3, 3)
+        painter.setBrush(QColor(tokens.trace(self._signal)))
+        length = max(self._share * self.width(), 6.0)
+        painter.drawRoundedRect(QRectF(0, middle, length, 6), 3, 3)

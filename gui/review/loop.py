@@ -85,6 +85,4 @@ def axes(
         Qt.AlignmentFlag.AlignHCenter,
         x_name,
     )
-    painter.drawText(
-        QRectF(frame.right - 120, 2, 120, 16), Qt.AlignmentFlag.AlignRight, y_name
-    )
+    painter.drawText(QRectF(0, 2, 160, 16), Qt.AlignmentFlag.AlignLeft, y_name)

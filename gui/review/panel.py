@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from gui.look.theme import Theme
-from gui.parts import IconButton, column, scrolling
+from gui.parts import BAR, IconButton, scrolling, stack, with_gutter
 from gui.review.manual import ManualView
 from gui.review.results import ResultsView
 from gui.review.runs import RunsView
@@ -30,6 +30,10 @@ class ReviewPanel(QFrame):
         self.manual = ManualView(theme)
         self.export = IconButton(theme, "export", "Open the run's folder")
         self.help = IconButton(theme, "help", "Help on this panel")
+        manual = scrolling(self.manual)
+        inside = self.manual.layout()
+        assert inside is not None
+        with_gutter(manual, inside)
         self._pages = QStackedWidget()
         self._tabs = QButtonGroup(self)
         head = QHBoxLayout()
@@ -38,7 +42,7 @@ class ReviewPanel(QFrame):
             (
                 ("Results", self.results),
                 ("Runs", self.runs),
-                ("Manual", scrolling(self.manual)),
+                ("Manual", manual),
             )
         ):
             tab = QToolButton()
@@ -53,10 +57,8 @@ class ReviewPanel(QFrame):
         head.addStretch(1)
         head.addWidget(self.export)
         head.addWidget(self.help)
-        whole = column(self, margin=14, spacing=10)
-        whole.setContentsMargins(14, 6, 14, 12)
-        whole.addLayout(head)
-        whole.addWidget(self._pages, 1)
+        whole = stack(self, (head, self._pages), self._pages, spacing=10)
+        whole.setContentsMargins(14, 6, 14 - BAR, 12)
         self._tabs.idClicked.connect(self.show_tab)
         self.show_tab(0)
 

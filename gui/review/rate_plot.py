@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
@@ -73,31 +75,47 @@ class RatePlot(QWidget):
             line = frame.x(np.array([1e3 * f for f, _ in sorted(self._model)]))
             high = frame.y(np.array([rate for _, rate in sorted(self._model)]))
             paint.polyline(painter, line, high, paint.pen(tokens.twin))
-            key = frame.left + 148
-            painter.drawLine(QPointF(key, 10), QPointF(key + 16, 10))
-            painter.setPen(QColor(tokens.text))
-            legend = QRectF(key + 21, 2, 80, 16)
-            painter.drawText(legend, Qt.AlignmentFlag.AlignLeft, "model")
-        for index, name, colour in (
-            (1, "peak", tokens.rate),
-            (2, "final", tokens.force),
-        ):
-            x, y = frame.x(rows[:, 0]), frame.y(rows[:, index])
-            order = np.argsort(rows[:, 0], kind="stable")
-            paint.polyline(painter, x[order], y[order], paint.pen(colour))
+        order = np.argsort(rows[:, 0], kind="stable")
+        x = frame.x(rows[order, 0])
+        for column, mark, colour in ((1, _disc, tokens.rate), (2, _box, tokens.force)):
+            y = frame.y(rows[order, column])
+            paint.polyline(painter, x, y, paint.pen(colour))
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(colour))
             for a, b in zip(x.tolist(), y.tolist(), strict=True):
-                if index == 1:
-                    painter.drawEllipse(QPointF(a, b), 3.8, 3.8)
-                else:
-                    painter.drawRect(QRectF(a - 3.3, b - 3.3, 6.6, 6.6))
-            left = frame.left + 8 + 74 * (index - 1)
-            if index == 1:
-                painter.drawEllipse(QPointF(left, 10), 3.8, 3.8)
-            else:
-                painter.drawRect(QRectF(left - 3.3, 6.7, 6.6, 6.6))
+                mark(painter, a, b)
+        self._legend(painter, frame.right)
+
+    def _legend(self, painter: QPainter, right: float) -> None:
+        """Marks and names above the plot, from its right edge."""
+        tokens = self._theme.tokens
+        entries: list[tuple[str, str, Mark]] = [
+            ("peak", tokens.rate, _disc),
+            ("final", tokens.force, _box),
+        ]
+        if self._model:
+            entries.append(("model", tokens.twin, _dash))
+        for name, colour, mark in reversed(entries):
+            right -= painter.fontMetrics().horizontalAdvance(name)
             painter.setPen(QColor(tokens.text))
-            painter.drawText(
-                QRectF(left + 9, 2, 60, 16), Qt.AlignmentFlag.AlignLeft, name
-            )
+            painter.drawText(QRectF(right, 2, 80, 16), Qt.AlignmentFlag.AlignLeft, name)
+            painter.setPen(paint.pen(colour))
+            painter.setBrush(QColor(colour))
+            right -= 13
+            mark(painter, right, 10.0)
+            right -= 17
+
+
+Mark = Callable[[QPainter, float, float], None]
+
+
+def _disc(painter: QPainter, x: float, y: float) -> None:
+    painter.drawEllipse(QPointF(x, y), 3.8, 3.8)
+
+
+def _box(painter: QPainter, x: float, y: float) -> None:
+    painter.drawRect(QRectF(x - 3.3, y - 3.3, 6.6, 6.6))
+
+
+def _dash(painter: QPainter, x: float, y: float) -> None:
+    painter.drawLine(QPointF(x - 8, y), QPointF(x + 8, y))

@@ -18,12 +18,25 @@ from PySide6.QtWidgets import (
 
 from gui.lanes.decimate import FloatArray
 from gui.look.theme import Theme
-from gui.parts import column, label, panel, push, scrolling, set_role
+from gui.parts import (
+    column,
+    label,
+    panel,
+    push,
+    scrolling,
+    set_role,
+    stack,
+    with_gutter,
+)
 from gui.review.finding import Finding
 from gui.review.fit import Fit
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.loop import LoopPlot
 from gui.review.rate_plot import RatePlot
+from gui.review.wording import unbroken
+
+HEAD, ROW, MOST = 52, 26, 12
+"""Heights of the table's head and of a row, px; rows that always have room."""
 
 HEADINGS = ("Step", "Spikes", "First\nms", "Peak\nHz", "Final\nHz", "Fall\n%")
 
@@ -62,6 +75,7 @@ class ResultsView(QWidget):
         head.addWidget(self._mark)
         inner = QWidget()
         middle = column(inner, spacing=9)
+        page = with_gutter(scrolling(inner), middle)
         middle.addWidget(self.cards)
         middle.addWidget(self.plot, 2)
         middle.addWidget(self.loop, 2)
@@ -69,11 +83,9 @@ class ResultsView(QWidget):
         middle.addWidget(self.statements)
         middle.addStretch(1)
         middle.addWidget(self.bars)
-        whole = column(self, spacing=9)
-        whole.addLayout(head)
-        whole.addWidget(scrolling(inner), 1)
-        whole.addWidget(self._facts)
-        whole.addWidget(self.report)
+        middle.addWidget(self._facts)
+        middle.addWidget(self.report)
+        stack(self, (head, page), page, spacing=9)
 
     @property
     def mark(self) -> str:
@@ -125,7 +137,7 @@ class ResultsView(QWidget):
 
     def show_statements(self, statements: Sequence[str]) -> None:
         """Show what the report concludes."""
-        self.statements.setText("\n".join(statements))
+        self.statements.setText(unbroken("\n".join(statements)))
         self.statements.setVisible(bool(statements))
 
     def _arrange(self) -> None:
@@ -164,6 +176,7 @@ class ResultsView(QWidget):
                 )
                 item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
                 table.setItem(row, where, item)
+        table.setMinimumHeight(HEAD + ROW * min(max(len(findings), 4), MOST))
         if findings:
             table.scrollToBottom()
 
@@ -173,9 +186,10 @@ class ResultsView(QWidget):
         table.setStyleSheet("font-size: 12px;")
         table.setHorizontalHeaderLabels(list(HEADINGS))
         table.verticalHeader().hide()
-        table.verticalHeader().setDefaultSectionSize(26)
+        table.verticalHeader().setDefaultSectionSize(ROW)
         table.setShowGrid(False)
-        table.setMinimumHeight(150)
+        table.verticalHeader().setMinimumSectionSize(ROW)
+        table.setMinimumHeight(HEAD + 4 * ROW)
         table.setAlternatingRowColors(True)
         table.setTabKeyNavigation(False)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

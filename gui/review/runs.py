@@ -17,7 +17,17 @@ from PySide6.QtWidgets import (
 )
 
 from gui.look.theme import Theme
-from gui.parts import Segments, column, empty, label, push, scrolling, set_role
+from gui.parts import (
+    Segments,
+    column,
+    empty,
+    label,
+    push,
+    scrolling,
+    set_role,
+    stack,
+    with_gutter,
+)
 from gui.review.entries import SHOWN, Entry
 from gui.review.thumbnails import Thumbnails, ThumbnailView
 from gui.state import minutes
@@ -132,13 +142,9 @@ class RunsView(QWidget):
         top.addWidget(self.filter)
         top.addStretch(1)
         top.addWidget(self._count)
-        whole = column(self, spacing=8)
-        whole.addWidget(self.search)
-        whole.addLayout(top)
-        whole.addWidget(scrolling(inner), 1)
-        whole.addWidget(self.open)
-        whole.addWidget(self.rerun)
-        whole.addWidget(self.compare)
+        page = with_gutter(scrolling(inner), self._rows)
+        parts = (self.search, top, page, self.open, self.rerun, self.compare)
+        stack(self, parts, page)
         self.search.textChanged.connect(self._show)
         self.filter.group.idClicked.connect(self._show)
         self.open.clicked.connect(

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout
+from PySide6.QtWidgets import QFrame, QHBoxLayout
 
 from gui.look.theme import Theme
-from gui.parts import BAR, IconButton, label, line
+from gui.parts import BAR, IconButton, label, line, stack
 from gui.session.messages import Planned
 from gui.session.request import Request
 from gui.session.session import Queued, Session
@@ -296,27 +296,17 @@ class SetupPanel(QFrame):
         head.addWidget(self._reset)
         head.addWidget(self.help)
         self.problem.hide()
-        whole = QGridLayout(self)
+        parts = (
+            head,
+            self.picker,
+            self.strip,
+            self.page,
+            self.problem,
+            line(),
+            self.estimate,
+            self.buttons,
+            self.queue,
+            label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small"),
+        )
+        whole = stack(self, parts, self.page)
         whole.setContentsMargins(14, 10, 14 - BAR, 12)
-        whole.setHorizontalSpacing(0)
-        whole.setVerticalSpacing(8)
-        whole.addLayout(head, 0, 0)
-        for at, part in enumerate(
-            (
-                self.picker,
-                self.strip,
-                self.page,
-                self.problem,
-                line(),
-                self.estimate,
-                self.buttons,
-                self.queue,
-                label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small"),
-            ),
-            start=1,
-        ):
-            # the page's scroll bar lies in the margin
-            whole.addWidget(part, at, 0, 1, 2 if part is self.page else 1)
-            whole.setRowStretch(at, int(part is self.page))
-        whole.setColumnStretch(0, 1)
-        whole.setColumnMinimumWidth(1, BAR)

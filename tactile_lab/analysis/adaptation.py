@@ -94,19 +94,17 @@ def fit_adaptation(spike_times: ArrayLike, hold: tuple[float, float]) -> Adaptat
     if fall <= SMALLEST_FALL * count / length and _ends_as_fast(times):
         raise NotIdentifiableError("the rate does not fall during the hold")
     if beta >= 0 or theta[0] <= 0:
-        raise NotIdentifiableError(
-            "the fall shows no bend towards a final rate; a longer hold is needed"
-        )
+        raise NotIdentifiableError("no bend towards a final rate yet: hold longer")
     if length < SHORTEST_HOLD / -beta:
         raise NotIdentifiableError(
-            f"a hold of {length:.3g} s is shorter than 2/|beta|, about "
-            f"{SHORTEST_HOLD / -beta:.2g} s"
+            f"2/|beta|, about {SHORTEST_HOLD / -beta:.2g} s, exceeds the hold of "
+            f"{length:.3g} s"
         )
     if alpha.low <= 0:
         raise NotIdentifiableError("the fall is within the train's irregularity")
     if quantile * error >= -beta:
         raise NotIdentifiableError(
-            f"1/|beta| about {-1 / beta:.2g} s is no better known than itself"
+            f"1/|beta|, about {-1 / beta:.2g} s, is as uncertain as it is large"
         )
     spread = quantile * error / -beta
     constant = Estimate(

@@ -111,7 +111,7 @@ def onset(forces: Sequence[float], spikes: Sequence[int]) -> Onset:
     below = levels[~fired]
     if below.max() >= lowest:
         raise NotIdentifiableError(
-            f"{below.max() * 1e3:g} mN stayed silent though {lowest * 1e3:g} mN fired: "
-            "the sensor was not at rest, or drifts"
+            f"{below.max() * 1e3:g} mN silent though {lowest * 1e3:g} mN fired: not at "
+            "rest, or a drift"
         )
     return Onset(float(below.max()), lowest)

@@ -72,7 +72,7 @@ def test_too_few_intervals():
 
 def test_a_hold_shorter_than_two_time_constants():
     times = spikes_of_the_law(20.0, -0.3, 2.0, hold=3.0)
-    with pytest.raises(NotIdentifiableError, match=r"hold of 3 s is shorter"):
+    with pytest.raises(NotIdentifiableError, match=r"exceeds the hold of 3 s"):
         fit_adaptation(times, (0.0, 3.0))
 
 

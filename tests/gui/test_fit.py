@@ -1,11 +1,18 @@
 """Fits of the steps so far beside the model: numbers from trains made to order."""
 
+import re
+
 import numpy as np
+import pytest
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtWidgets import QLabel
 
 from gui.lanes.decimate import Drawn
 from gui.lanes.row import interval_text
 from gui.review.finding import Finding, finding
 from gui.review.fit import Beside, fit
+from gui.review.fit_view import FitCards, TwinBars
+from gui.review.wording import unbroken
 
 HOLD = (0.0, 2.0)
 
@@ -32,7 +39,7 @@ def test_cards_tell_onset_slope_and_why_not() -> None:
     cards = {card.name: card for card in fit(STEPS, seen()).cards}
     assert cards["Onset"].value == "100 mN"
     assert "80 to 120 mN" in cards["Onset"].detail
-    assert "model 100 mN" in cards["Onset"].detail
+    assert cards["Onset"].model == "model 100 mN"
     assert cards["Slope of the peak rate"].value == "0.125 Hz/mN"
     assert cards["Adaptation 1/|β|"].value == "—", "an even train does not adapt"
     assert cards["Adaptation 1/|β|"].detail.endswith(".")
@@ -56,10 +63,47 @@ def test_no_model_no_bars() -> None:
     alone = Beside(TRAIN, np.empty(0), {"V_C1": (Drawn.nothing(), Drawn.nothing())})
     found = fit(STEPS, alone)
     assert found.bars == () and found.model == ()
-    assert "model" not in found.cards[0].detail
+    assert found.cards[0].model == ""
 
 
 def test_silence_is_told_beside_the_last_interval() -> None:
     assert interval_text(np.array([1.0]), 2.0) == ""
     assert interval_text(np.array([1.0, 1.1]), 1.2) == "ISI 100.0 ms"
     assert interval_text(np.array([1.0, 1.1]), 3.1) == "ISI 100.0 ms · silent 2.0 s"
+
+
+def test_a_number_is_never_parted_from_its_unit() -> None:
+    assert unbroken("model 100 mN") == "model 100\u00a0mN"
+    assert unbroken("± 0.014") == "±\u00a00.014"
+    assert unbroken("4 intervals in the hold") == "4 intervals in the hold"
+    parts = re.split(r"[ \n]", unbroken("0.127 Hz/mN at 80 mN, 22 % of 7.4 s"))
+    assert [part.replace("\u2060", "").replace("\u00a0", " ") for part in parts] == [
+        "0.127 Hz/mN", "at", "80 mN,", "22 %", "of", "7.4 s",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_small_lines_of_cards_fit_two_lines_in_the_narrowest_panel(lab, count) -> None:
+    cards = FitCards()
+    cards.setFixedWidth(336 - 28)
+    cards.show_cards(fit(STEPS[:count], seen()).cards)
+    cards.show()
+    lab.app.processEvents()
+    small = [one for one in cards.findChildren(QLabel) if one.wordWrap()]
+    assert len(small) == 4
+    for one in small:
+        room = QRect(0, 0, one.width(), 1000)
+        wrap = Qt.TextFlag.TextWordWrap
+        needed = one.fontMetrics().boundingRect(room, wrap, one.text())
+        assert needed.height() <= 2 * one.fontMetrics().lineSpacing(), one.text()
+        assert needed.width() <= one.width(), one.text()
+    cards.close()
+
+
+def test_bars_are_named_as_the_lanes_are(lab) -> None:
+    bars = TwinBars(lab.window.theme)
+    bars.show_bars(fit(STEPS, seen()).bars)
+    texts = [one.text() for one in bars.findChildren(QLabel)]
+    assert "V<sub>C1</sub>" in texts and "Spikes" in texts
+    assert "V_C1" in bars.accessibleName()
+    bars.close()
