@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -232,18 +233,21 @@ r = "6 mm"
 """
 
 
-def calibrate(lab) -> None:
-    """Start a short calibration on a bench whose teslameter a person reads."""
+@pytest.fixture
+def calibrating(lab) -> Iterator:
+    """A short calibration in progress on a bench whose teslameter a person reads."""
     (lab.folder / "by-hand.toml").write_text(METER)
     short = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
     request = Request("calibrate_field", short, str(lab.folder / "by-hand.toml"))
     lab.session.start(request, "Calibration")
     lab.until(lambda: lab.window.errand.isVisible() or lab.session.fault)
+    yield lab
+    lab.session.source, lab.session.expectation = None, None  # the plan is shown again
 
 
-def test_a_person_reads_the_field_for_a_calibration(lab) -> None:
+def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
+    lab = calibrating
     session, card = lab.session, lab.window.errand
-    calibrate(lab)
     asked: list[float] = []
     while session.state is State.RUNNING:
         errand = session.errand
@@ -264,9 +268,11 @@ def test_a_person_reads_the_field_for_a_calibration(lab) -> None:
     assert card.isHidden() and session.coil_view().verified_off
 
 
-def test_what_is_no_field_is_not_sent_and_what_is_doubted_is_asked_again(lab) -> None:
+def test_what_is_no_field_is_not_sent_and_what_is_doubted_asked_again(
+    calibrating,
+) -> None:
+    lab = calibrating
     session, card = lab.session, lab.window.errand
-    calibrate(lab)
     card.entry.setText("10.8 A")
     assert not card.done.isEnabled() and "A" in card.understood.text()
     QTest.keyClick(card.entry, Qt.Key.Key_Return)
