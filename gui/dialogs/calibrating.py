@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
 from gui.dialogs.bench_text import Choice
@@ -22,7 +22,7 @@ MAGNET = (
     ("B2_per_ampere", "Field of the coil"),
 )
 
-TALL, LOW = 200, 118
+TALL, LOW = 200, 140
 """Height of the loop while it grows and beside its findings, pixels."""
 
 
@@ -138,7 +138,7 @@ class Calibrating(QWidget):
         whole.addLayout(run)
         whole.addWidget(self.loop)
         whole.addWidget(self.findings)
-        whole.addWidget(self.use)
+        whole.addWidget(self.use, 0, Qt.AlignmentFlag.AlignLeft)
         whole.addWidget(line())
         whole.addLayout(check)
         whole.addStretch(1)

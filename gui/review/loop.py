@@ -17,37 +17,64 @@ from gui.look.tokens import Tokens
 
 
 class LoopPlot(QWidget):
-    """Both branches of B2(I), in mT against mA."""
+    """Both branches of B2(I), and what they differ from a straight line.
+
+    The loop is a few percent of the field: only the difference shows its shape.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         self._loop: FloatArray = np.empty((0, 2))
         self.setMinimumHeight(190)
-        self.setMaximumHeight(300)
-        self.setAccessibleName("Field against current")
+        self.setMaximumHeight(380)
+        self.setAccessibleName("Field against current, and its loop")
         theme.changed.connect(self.update)
 
     def show_loop(self, loop: FloatArray) -> None:
         """Show readings, shape (n, 2): A and T."""
-        self._loop = loop * 1e3
+        self._loop = loop
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw axes, the loop and its newest point."""
+        """Draw the field and, beside or below it, the loop."""
+        current, field = self._loop[:, 0], self._loop[:, 1]
+        if current.size < 2 or np.ptp(current) == 0:
+            return
         painter = QPainter(self)
-        tokens = self._theme.tokens
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(sized(11))
-        if self._loop.shape[0] < 2:
-            return
-        current, field = self._loop[:, 0], self._loop[:, 1]
+        whole = QRectF(self.rect())
+        one, other = QRectF(whole), QRectF(whole)
+        if whole.width() > 2 * whole.height():
+            one.setRight(whole.width() / 2 - 8)
+            other.setLeft(whole.width() / 2 + 8)
+        else:
+            one.setBottom(whole.height() / 2 - 4)
+            other.setTop(whole.height() / 2 + 4)
+        self._draw(painter, one, field * 1e3, "field / mT", 0.1)
+        if current.size > 2:
+            straight = np.polyval(np.polyfit(current, field, 1), current)
+            rest = (field - straight) * 1e6
+            self._draw(painter, other, rest, "less a straight line / µT", 1.0)
+
+    def _draw(
+        self,
+        painter: QPainter,
+        place: QRectF,
+        field: FloatArray,
+        name: str,
+        least: float,
+    ) -> None:
+        """One plot against the current, with its newest point."""
+        tokens, current = self._theme.tokens, self._loop[:, 0] * 1e3
         left, right = nice_range(float(current.min()), float(current.max()), 10.0)
-        low, high = nice_range(float(field.min()), float(field.max()), 0.1)
+        low, high = nice_range(float(field.min()), float(field.max()), least)
         frame = Frame(
-            48, self.width() - 12, 24, self.height() - 36, left, right, low, high
-        )
-        axes(painter, frame, tokens, "coil current / mA", "field / mT")
+            int(place.left()) + 48, int(place.right()) - 12, int(place.top()) + 24,
+            int(place.bottom()) - 36, left, right, low, high,
+        )  # fmt: skip
+        axes(painter, frame, tokens, "coil current / mA", name)
         x, y = frame.x(current), frame.y(field)
         paint.polyline(painter, x, y, paint.pen(tokens.force))
         painter.setPen(Qt.PenStyle.NoPen)
@@ -66,7 +93,7 @@ def axes(
         painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
         painter.setPen(QColor(tokens.muted))
         painter.drawText(
-            QRectF(0, y - 8, frame.left - 6, 16),
+            QRectF(frame.left - 48, y - 8, 42, 16),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
             number(value, places),
         )
@@ -85,4 +112,8 @@ def axes(
         Qt.AlignmentFlag.AlignHCenter,
         x_name,
     )
-    painter.drawText(QRectF(0, 2, 160, 16), Qt.AlignmentFlag.AlignLeft, y_name)
+    painter.drawText(
+        QRectF(frame.left - 48, frame.top - 22, 200, 16),
+        Qt.AlignmentFlag.AlignLeft,
+        y_name,
+    )

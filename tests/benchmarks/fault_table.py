@@ -11,19 +11,16 @@ is stored. The exit code is 1 where one did not.
 from __future__ import annotations
 
 import argparse
-import os
-import platform
 import random
-import subprocess
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 from fault_rows import SCOPE, SERIAL, Cause, Injection, Row, coil_end  # beside it
+from provenance import provenance
 from usb_fault_rows import ROWS as USB  # beside it
 from usb_fault_rows import session
 
@@ -185,17 +182,10 @@ def _line(title: str, found: Counter[str]) -> str:
 
 
 def _head(times: int) -> list[str]:
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     return [
         "# Faults injected and survived",
         "",
-        f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
-        f"{os.cpu_count()} cores. Made by `tests/benchmarks/fault_table.py --times "
+        f"{provenance()}. Made by `tests/benchmarks/fault_table.py --times "
         f"{times}`: every cause of every row, at seeded random places of a whole run "
         "of the real drivers on the simulated bench (USB: of a session with the "
         "scope).",

@@ -13,16 +13,15 @@ import argparse
 import os
 import random
 import signal
-import subprocess
 import tempfile
 import time
 from collections import Counter
-from datetime import date
 from pathlib import Path
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+from provenance import provenance
 
 from tactile_lab.acquisition.detection import Detection
 from tactile_lab.acquisition.spikes import detect, detector_of
@@ -151,17 +150,11 @@ def main() -> None:
             end, lost = judge(path, acknowledged, made)
             ends[end] += 1
             losses[lost] += 1
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     text = "\n".join(
         [
             "# Killed while recording",
             "",
-            f"Commit {commit}, {date.today()}. {options.kills} writers of four "
+            f"{provenance()}. {options.kills} writers of four "
             f"channels killed with SIGKILL at random instants within {LONGEST} s (seed "
             f"{options.seed}), recording blocks of {BLOCK} samples without pause. Made "
             "by `tests/benchmarks/kill_store.py`. The page cache survives a kill: this "

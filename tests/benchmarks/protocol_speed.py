@@ -5,14 +5,12 @@ Run alone: ``.venv/bin/python tests/benchmarks/protocol_speed.py [scene ...]
 """
 
 import argparse
-import platform
-import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
-from os import cpu_count
 from pathlib import Path
+
+from provenance import provenance
 
 from tactile_lab.acquisition.execution import Execution
 from tactile_lab.plugins import scene_names
@@ -63,14 +61,9 @@ def main() -> None:
         if speed < GOAL:
             slow.append(name)
     if options.out is not None:
-        commit = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"],
-            capture_output=True, text=True, check=True,
-        ).stdout.strip()  # fmt: skip
         options.out.write_text(
             "# Speed of the protocols\n\n"
-            f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
-            f"{cpu_count()} cores. Made by `tests/benchmarks/protocol_speed.py`: each "
+            f"{provenance()}. Made by `tests/benchmarks/protocol_speed.py`: each "
             "scene that ships, whole, on the simulated bench, every sample stored. "
             "`streamed`: without planned pauses, in s and in times real time. CPU "
             "includes plan and report.\n\n" + HEAD + "\n".join(rows) + "\n",

@@ -13,18 +13,17 @@ from __future__ import annotations
 import argparse
 import ctypes
 import os
-import platform
 import shutil
 import statistics
 import subprocess
 import tempfile
 import time
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from provenance import provenance
 
 from drivers.picoscope import PicoScope
 from sim_backend.picoscope import Make
@@ -234,17 +233,10 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=5.0)
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     lines = [
         "# Samples through the PicoScope driver",
         "",
-        f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}. Made by "
+        f"{provenance()}, load {os.getloadavg()[0]:.1f}. Made by "
         f"`tests/benchmarks/scope_stream.py --seconds {chosen.seconds:g}`: the driver "
         "on its emulated library, through the C callback; the place of every block's "
         "samples is checked.",

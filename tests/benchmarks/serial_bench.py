@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 import random
 import signal
 import statistics
@@ -18,8 +17,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
 from pathlib import Path
+
+from provenance import provenance
 
 from drivers.coil_source import CoilSource
 from drivers.dialect import coil_dialect
@@ -136,17 +136,10 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=2.0)
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     lines = [
         "# Serial instruments in figures",
         "",
-        f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}. Made by "
+        f"{provenance()}, load {os.getloadavg()[0]:.1f}. Made by "
         f"`tests/benchmarks/serial_bench.py --kills {chosen.kills}`.",
         "",
         "| owner's end | wire | kills | median to off, ms | worst, ms |",

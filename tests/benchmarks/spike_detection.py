@@ -9,15 +9,13 @@ samples long. Figures are samples per second of process time, best of five.
 from __future__ import annotations
 
 import argparse
-import platform
-import subprocess
 import time
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from provenance import provenance
 from scipy.signal import find_peaks
 
 from tactile_lab.acquisition.detection import Detection
@@ -95,16 +93,10 @@ def main() -> None:
 
 def head(title: str, millions: int) -> list[str]:
     """Title, what was measured where, and the table's head."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     return [
         f"# {title}",
         "",
-        f"Commit {commit}, {date.today()}, Python {platform.python_version()}, numpy "
+        f"{provenance()}, numpy "
         f"{np.__version__}, one core. {millions} million samples, blocks of {BLOCK}. "
         "Made by `tests/benchmarks/spike_detection.py`; in each row all find the same.",
         "",

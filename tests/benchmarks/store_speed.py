@@ -10,18 +10,16 @@ zoomed into.
 from __future__ import annotations
 
 import argparse
-import platform
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 
 import h5py
 import hdf5plugin
 import numpy as np
 from numpy.typing import NDArray
+from provenance import provenance
 
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.store.folder import DATA, RunFolder
@@ -183,17 +181,11 @@ def main() -> None:
     except ImportError:
         print("zarr is not installed: no row for it")
     table = [f"| {name} | {measure(way, samples)} |" for name, way in ways.items()]
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     text = "\n".join(
         [
             "# Speed of the store",
             "",
-            f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
+            f"{provenance()}, "
             f"h5py {h5py.__version__}. Made by `tests/benchmarks/store_speed.py`: "
             f"{samples / 1e6:.0f} million samples of four channels, blocks of {SIZE} "
             "per channel, best of 3, page cache included. Ratio is against int16.",

@@ -16,16 +16,15 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 import resource
 import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
 from pathlib import Path
 
 import numpy as np
+from provenance import provenance
 
 from drivers.picoscope import PicoScope
 from sim_backend.picoscope import Make
@@ -158,18 +157,11 @@ def main() -> None:
         print(rows[-1], flush=True)
     whole = [r for r, row in zip(options.rates, rows, strict=True) if is_whole(row)]
     most = f"{max(whole):g} MS/s on each of 4 channels" if whole else "none of these"
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     text = "\n".join(
         [
             "# Sustained streaming to disk",
             "",
-            f"Commit {commit}, {date.today()}, Python {platform.python_version()}, "
-            f"{os.cpu_count()} cores. Made by `tests/benchmarks/sustained.py`: the "
+            f"{provenance()}. Made by `tests/benchmarks/sustained.py`: the "
             "real PicoScope driver on its emulated library, paced by the clock, "
             "detection on V_K, live picture, recorder. The emulator takes part of the "
             "load. Lost samples and spikes are those of the run's certificate.",

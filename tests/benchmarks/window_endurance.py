@@ -50,6 +50,7 @@ def endurance(seconds: float, folder: Path) -> None:
     request = Request(str(folder / "hour.toml"), (), "sim")
     session.start(request, "hour")
     begun, first = time.monotonic(), ()
+    print("| run, s | wall, s | window, MB | engine, MB |\n|---|---|---|---|")
     for part in (0.05, 0.25, 0.5, 0.75, 1.0):
         bench.until(
             lambda part=part: (
@@ -61,13 +62,15 @@ def endurance(seconds: float, folder: Path) -> None:
         now = memory(), memory(session.link.pid or "self")
         first = first or now
         print(
-            f"{part * seconds:7.0f} s of the run, {time.monotonic() - begun:5.0f} s of "
-            f"mine   window {now[0]:5.0f} MB ({now[0] - first[0]:+.0f})   "
-            f"engine {now[1]:5.0f} MB ({now[1] - first[1]:+.0f})"
+            f"| {part * seconds:.0f} | {time.monotonic() - begun:.0f} | "
+            f"{now[0]:.0f} ({now[0] - first[0]:+.0f}) | "
+            f"{now[1]:.0f} ({now[1] - first[1]:+.0f}) |"
         )
     bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
     fault = "" if session.fault is None else session.fault.title
-    print(f"{session.state.value} {fault} · {session.source.spikes.size} spikes")
+    bench.say(
+        f"Then {session.state.value} {fault}, {session.source.spikes.size} spikes."
+    )
     bench.window.close()
     session.close()
 
@@ -78,6 +81,7 @@ def faults(folder: Path) -> None:
     session, window = bench.session, bench.window
     begin(window, None, "sim")
     bench.until(lambda: session.state is State.READY and session.expectation, 120)
+    endings = []
     for name, fault in SLOW.items():
         window.setup.start()
         bench.until(lambda: (c := session.coil_view()) and c.output, 60)
@@ -91,10 +95,12 @@ def faults(folder: Path) -> None:
         bench.until(lambda: not session.busy, 60)
         said = "" if session.fault is None else f" · {session.fault.title}"
         bench.report(name)
-        print(f"    {session.state.value}{said} · {window.header.stop.words.spoken}")
+        words = f"{session.state.value}{said} · {window.header.stop.words.spoken}"
+        endings.append(f"{name}: {words}")
         session.acknowledge()
         session.connect_bench("sim")
         bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
+    bench.say(f"In the end: {'; '.join(endings)}.")
     window.close()
     session.close()
 

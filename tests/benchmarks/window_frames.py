@@ -7,6 +7,8 @@ and an hour-long record at 1 MS/s scrolled and zoomed. A frame is the poll plus 
 painting it causes, in the window's own thread; "processor" is its own time, which
 other programs on the machine do not change. Gaps are those of a 10 ms heartbeat; "of
 its own" leaves out the time in which Linux gave the processor to somebody else.
+
+`window_figures.py` puts this and its neighbours into one page.
 """
 
 import os
@@ -37,6 +39,10 @@ from tactile_lab.bench import Block, Channel, Stream
 
 OFF = CoilState(False, None, None, None)
 SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
+HEAD = (
+    "| stretch | frames | median, ms | p99, ms | processor, ms | its p99 "
+    "| longest gap, ms | of its own |\n|---|---|---|---|---|---|---|---|"
+)
 
 
 class Bench:
@@ -56,6 +62,7 @@ class Bench:
         self.used: list[float] = []
         self.gaps: list[float] = []
         self.own: list[float] = []
+        self._reported = False
         self._last, self._waited = time.perf_counter(), _waited()
         self._beat = QTimer()
         self._beat.timeout.connect(self._note)
@@ -97,16 +104,23 @@ class Bench:
         self._last, self._waited = time.perf_counter(), _waited()
 
     def report(self, name: str) -> None:
+        if not self._reported:
+            print(HEAD)
+        self._reported = True
         cost = 1e3 * np.array(self.frames or [np.nan])
         used = 1e3 * np.array(self.used or [np.nan])
         gap = 1e3 * max(self.gaps, default=float("nan"))
         own = 1e3 * max(self.own, default=float("nan"))
         print(
-            f"{name:34s} frames {cost.size:5d}  median {np.median(cost):6.2f} ms  "
-            f"p99 {np.percentile(cost, 99):6.2f} ms  "
-            f"processor {np.median(used):5.2f}, p99 {np.percentile(used, 99):5.2f} ms  "
-            f"longest gap {gap:6.1f} ms, of its own {own:6.1f} ms"
+            f"| {name} | {cost.size} | {np.median(cost):.1f} | "
+            f"{np.percentile(cost, 99):.1f} | {np.median(used):.1f} | "
+            f"{np.percentile(used, 99):.1f} | {gap:.0f} | {own:.0f} |"
         )
+
+    def say(self, text: str) -> None:
+        """A sentence between the tables."""
+        print(f"\n{text}\n")
+        self._reported = False
 
 
 def emulated(
@@ -160,6 +174,13 @@ def _waited() -> float:
         return 0.0
 
 
+def lived() -> float:
+    """Time since this process was started, s."""
+    ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
+    up = float(Path("/proc/uptime").read_text().split()[0])
+    return up - ticks / os.sysconf("SC_CLK_TCK")
+
+
 def memory(pid: int | str = "self") -> float:
     """Resident memory of a process, MB."""
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():
@@ -169,13 +190,12 @@ def memory(pid: int | str = "self") -> float:
 
 
 def main(seconds: float) -> None:
-    begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as out:
         bench = Bench(Path(out))
         session, window = bench.session, bench.window
         begin(window, None, "sim")
         bench.app.processEvents()
-        print(f"start to a usable window           {time.perf_counter() - begun:.2f} s")
+        bench.say(f"A usable window {lived():.2f} s after the start of Python.")
         bench.until(lambda: session.state is State.READY and session.expectation, 120)
         bench.report("connect and plan")
         bench.measure("idle", seconds)
@@ -197,7 +217,7 @@ def main(seconds: float) -> None:
         session.source = source = LiveSource(None, 0.2)
         before = memory()
         hour(source)
-        print(f"memory of an hour at 4 x 1 MS/s    {memory() - before:.0f} MB")
+        bench.say(f"An hour at 4 x 1 MS/s takes {memory() - before:.0f} MB.")
         window.centre.stack.show_source(source)
         window.centre.view.set_now(3600.0, 3600.0)
         window.centre.view.show_all()

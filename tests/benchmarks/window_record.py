@@ -6,8 +6,7 @@ The run is a real one of the simulated bench: pulses at 4 x 1 MS/s until there a
 many samples, stored as every run is. Opening is timed from the click to the lanes; then
 the wheel zooms about one spike from the whole run to 100 us and back, one notch a
 frame, and the view is dragged through the run at several widths. Frames and gaps are
-those of `window_frames.py`; "sharp" is the time from the last notch until the samples
-of that view are read and drawn.
+those of `window_frames.py`.
 """
 
 import argparse
@@ -39,27 +38,25 @@ NARROW = 1e-4
 """Narrowest view, s."""
 
 
-def record(millions: float, out: Path) -> Path:
-    """Make the run; its folder."""
+def record(millions: float, out: Path) -> tuple[Path, str]:
+    """Make the run; its folder, and what it holds."""
     pulses = max(1, round(millions * 1e6 / SAMPLED / PULSE))
     levels = ", ".join(f'"{90 + 10 * (n % 8)} mN"' for n in range(pulses))
     request = Request("demo", (f"protocol.levels=[{levels}]",), "sim")
     done = Execution(request.load(), out, realtime=False).run()
-    print(f"recorded {SAMPLED * done.duration:,.0f} samples, {done.spikes} spikes")
-    return done.folder
+    samples = SAMPLED * done.duration
+    return done.folder, f"A run of {samples:,.0f} samples with {done.spikes} spikes"
 
 
-def opened(bench: Bench, folder: Path) -> RunSource:
+def opened(bench: Bench, folder: Path, what: str) -> RunSource:
     """Open the run from the browser and wait for the lanes."""
     opening = bench.window.opening
     bench.clear()
     before, begun = memory(), time.perf_counter()
     opening.open_run(folder)
     bench.until(lambda: isinstance(opening.run, RunSource), 60)
-    print(
-        f"opened after {time.perf_counter() - begun:.2f} s, "
-        f"{memory() - before:.0f} MB more"
-    )
+    took = time.perf_counter() - begun
+    bench.say(f"{what}: in the lanes after {took:.2f} s, {memory() - before:.0f} MB.")
     bench.report("opening")
     assert isinstance(opening.run, RunSource)
     return opening.run
@@ -104,7 +101,8 @@ def sharp(bench: Bench, pictures: Path | None) -> None:
     """The time until the samples of the narrowest view are there."""
     begun = time.perf_counter()
     bench.until(lambda: all(t.name != "zoom" for t in threading.enumerate()), 30)
-    print(f"sharp after {1e3 * (time.perf_counter() - begun):.0f} ms")
+    took = 1e3 * (time.perf_counter() - begun)
+    bench.say(f"The samples of the narrowest view are there after {took:.0f} ms more.")
     shoot(bench, pictures, "narrow")
 
 
@@ -121,13 +119,13 @@ def main() -> None:
     parser.add_argument("--pictures", type=Path)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as out:
-        folder = record(options.millions, Path(out))
+        folder, what = record(options.millions, Path(out))
         bench = Bench(Path(out))
         session = bench.session
         begin(bench.window, None, "sim")
         bench.until(lambda: session.state is State.READY and session.expectation, 120)
         bench.measure("idle", 3.0)
-        source = opened(bench, folder)
+        source = opened(bench, folder, what)
         zoomed(bench, source, options.pictures)
         bench.window.close()
         session.close()
