@@ -56,7 +56,7 @@ class LoopPlot(QWidget):
         if current.size > 2:
             straight = np.polyval(np.polyfit(current, field, 1), current)
             rest = (field - straight) * 1e6
-            self._draw(painter, other, rest, "less a straight line / µT", 1.0)
+            self._draw(painter, other, rest, "field less a straight line / µT", 1.0)
 
     def _draw(
         self,
@@ -113,7 +113,7 @@ def axes(
         x_name,
     )
     painter.drawText(
-        QRectF(frame.left - 48, frame.top - 22, 200, 16),
+        QRectF(frame.left - 48, frame.top - 22, 240, 16),
         Qt.AlignmentFlag.AlignLeft,
         y_name,
     )
