@@ -74,7 +74,7 @@ class LoopPlot(QWidget):
             int(place.left()) + 48, int(place.right()) - 12, int(place.top()) + 24,
             int(place.bottom()) - 36, left, right, low, high,
         )  # fmt: skip
-        axes(painter, frame, tokens, "coil current / mA", name)
+        axes(painter, frame, tokens, "coil current / mA", name, place.left())
         x, y = frame.x(current), frame.y(field)
         paint.polyline(painter, x, y, paint.pen(tokens.force))
         painter.setPen(Qt.PenStyle.NoPen)
@@ -83,9 +83,14 @@ class LoopPlot(QWidget):
 
 
 def axes(
-    painter: QPainter, frame: Frame, tokens: Tokens, x_name: str, y_name: str
+    painter: QPainter,
+    frame: Frame,
+    tokens: Tokens,
+    x_name: str,
+    y_name: str,
+    edge: float = 0.0,
 ) -> None:
-    """Grid, numbers and names of a plot of one quantity against another."""
+    """Grid, numbers and names of a plot whose numbers begin at `edge`, px."""
     places = decimals(step_of(frame.high - frame.low, 5))
     for value in ticks(frame.low, frame.high, 5):
         y = round(frame.y1(value)) + 0.5
@@ -93,7 +98,7 @@ def axes(
         painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
         painter.setPen(QColor(tokens.muted))
         painter.drawText(
-            QRectF(frame.left - 48, y - 8, 42, 16),
+            QRectF(edge, y - 8, frame.left - 6 - edge, 16),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
             number(value, places),
         )
@@ -113,7 +118,7 @@ def axes(
         x_name,
     )
     painter.drawText(
-        QRectF(frame.left - 48, frame.top - 22, 240, 16),
+        QRectF(edge, frame.top - 22, 240, 16),
         Qt.AlignmentFlag.AlignLeft,
         y_name,
     )
