@@ -114,11 +114,21 @@ def line_between(
         return Drawn.nothing()
     first, last = np.searchsorted(time, [start, end])
     first, last = max(0, first - 1), min(time.size, last + 1)
-    t, v = time[first:last], value[first:last]
-    if t.size <= 4 * count:
-        return Drawn.line(t, v)
-    edges = np.arange(0, t.size, -(-t.size // count))
-    low, high = np.minimum.reduceat(v, edges), np.maximum.reduceat(v, edges)
-    gap = np.zeros(edges.size, np.bool_)
+    fresh = np.zeros(last - first, np.bool_)
+    return thinned(time[first:last], value[first:last], fresh, count)
+
+
+def thinned(
+    time: FloatArray, value: FloatArray, gap: NDArray[np.bool_], count: int
+) -> Drawn:
+    """A line through points, broken at gaps; above 4 `count` points, by columns."""
+    if time.size == 0:
+        return Drawn.nothing()
     gap[0] = True
-    return Drawn(t[edges], low, high, (low + high) / 2, gap)
+    if time.size <= 4 * count:
+        return Drawn(time, value, value, value, gap)
+    edges = np.arange(0, time.size, -(-time.size // count))
+    if np.count_nonzero(gap) > 1:
+        edges = np.union1d(edges, np.flatnonzero(gap))
+    low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
+    return Drawn(time[edges], low, high, (low + high) / 2, gap[edges])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gui.lanes.decimate import Drawn, FloatArray, line_between
+from gui.lanes.decimate import Drawn, FloatArray, thinned
 
 SILENCE = 3.0
-"""Times the interval before from which on a pause between spikes is a silence."""
+"""Times the intervals beside it from which on a pause between spikes is a silence."""
 
 LEAST_SILENCE = 0.5
 """Shortest silence, s."""
@@ -27,36 +28,62 @@ def averaged(drawn: Drawn) -> Drawn:
     return Drawn(drawn.time, drawn.mean, drawn.mean, drawn.mean, drawn.gap)
 
 
-def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
-    """Instantaneous rate at each spike around [start, end] s; 0 at the first, Hz.
+def begins(spikes: FloatArray) -> NDArray[np.bool_]:
+    """Which spikes begin a stretch of firing: the first, and those after a silence.
 
-    After a silence a new line begins. More than 4 `count` spikes become about `count`
-    columns.
+    The pause before such a spike is no interval of a train and gives no rate. A pause
+    is a silence where it is longer than `LEAST_SILENCE` and than `SILENCE` times the
+    shorter of the intervals beside it: slow but regular firing is none.
+    """
+    first = np.ones(spikes.size, np.bool_)
+    if spikes.size > 1:
+        between = np.diff(spikes)
+        beside = np.full(between.size + 2, np.inf)
+        beside[1:-1] = between
+        usual = np.minimum(beside[:-2], beside[2:])
+        usual[np.isinf(usual)] = 0.0
+        first[1:] = between > np.maximum(SILENCE * usual, LEAST_SILENCE)
+    return first
+
+
+def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
+    """Instantaneous rate, Hz, at each spike around [start, end] s: 1/ISI.
+
+    The spike that begins a stretch of firing has no point; the next begins a new line.
+    More than 4 `count` points become about `count` columns.
     """
     first, last = np.searchsorted(spikes, [start, end])
-    first, last = max(0, first - 3), min(spikes.size, last + 1)
-    times = spikes[first:last]
+    # one more on either side to join to, and what tells whether it begins a stretch
+    low, high = max(0, first - 3), min(spikes.size, last + 3)
+    times = spikes[low:high]
     if times.size < 2:
         return Drawn.nothing()
-    rate = np.zeros(times.size)
-    rate[1:] = 1 / np.maximum(np.diff(times), 1e-9)
-    if first > 0:
-        times, rate = times[1:], rate[1:]
-    if times.size > 4 * count:
-        return line_between(times, rate, start, end, count)
-    gap = np.zeros(times.size, np.bool_)
-    gap[0] = True
-    between = np.diff(times)
-    gap[2:] = between[1:] > np.maximum(SILENCE * between[:-1], LEAST_SILENCE)
-    return Drawn(times, rate, rate, rate, gap)
+    begun = begins(times)[1:]
+    rate = 1 / np.maximum(np.diff(times), 1e-9)
+    fresh = np.append(True, begun[:-1])
+    wanted = ~begun
+    wanted[: max(0, first - 2 - low)] = False
+    wanted[last - low :] = False
+    return thinned(times[1:][wanted], rate[wanted], fresh[wanted], count)
 
 
-def rate_at(spikes: FloatArray, time: float) -> float:
-    """1/ISI of the last two spikes at or before `time` s; 0 before the second, Hz."""
-    last = int(np.searchsorted(spikes, time, side="right"))
-    return (
-        1 / max(float(spikes[last - 1] - spikes[last - 2]), 1e-9) if last > 1 else 0.0
-    )
+def rate_at(spikes: FloatArray, time: float) -> float | None:
+    """The rate at `time` s as an observer tells it, Hz.
+
+    One over the last interval, for as long as the train may still go on; 0 where it is
+    silent: before the first spike, or `LEAST_SILENCE` and `SILENCE` intervals after
+    the last. None from the first spike of a stretch on: there is no interval yet.
+    """
+    seen = int(np.searchsorted(spikes, time, side="right"))
+    if seen == 0:
+        return 0.0
+    near = spikes[max(0, seen - 3) : seen + 1]
+    at = min(seen, 3) - 1
+    begun = bool(begins(near)[at])
+    interval = 0.0 if begun else max(float(near[at] - near[at - 1]), 1e-9)
+    if time - near[at] > max(SILENCE * interval, LEAST_SILENCE):
+        return 0.0
+    return None if begun else 1 / interval
 
 
 def difference(measured: Drawn, model: Drawn) -> Drawn:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gui.lanes.decimate import Drawn, FloatArray, line_between
+from gui.lanes.phase import Phase
 from tactile_lab.waveform import Waveform
 
 
@@ -74,6 +75,11 @@ class Aligned:
             self._known += 1
 
     @property
+    def moves(self) -> int:
+        """How many trials have started so far."""
+        return self._known
+
+    @property
     def length(self) -> float:
         """Expected length, s."""
         return self.preview.length + float(self._offsets[-1])
@@ -92,12 +98,26 @@ class Aligned:
         self._cache[name] = (self._known, moved)
         return moved
 
-    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """What the model has for a signal."""
+    def twin(
+        self,
+        signal: str,
+        start: float,
+        end: float,
+        count: int,
+        phase: Phase,
+        since: float,
+    ) -> Drawn:
+        """What the model has in [start, end] s, moved by `phase`, `since` a time on."""
         if signal not in self.preview.traces:
             return Drawn.nothing()
         time, value = self.preview.traces[signal]
-        return line_between(self.times(signal, time), value, start, end, count)
+        time = self.times(signal, time)
+        # a preview has up to 4e5 points: move only those that may come into view
+        first, last = np.searchsorted(time, [start - phase.most, end + phase.most])
+        near = slice(max(0, first - 1), last + 1)
+        time, value = phase.moved(time[near]), value[near]
+        seam = int(np.searchsorted(time, since))
+        return line_between(time[seam:], value[seam:], start, end, count)
 
     @property
     def spikes(self) -> FloatArray:

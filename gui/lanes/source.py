@@ -9,8 +9,12 @@ import numpy as np
 from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.expected import Aligned, Hold, Preview, settled
 from gui.lanes.history import SlowTrack, Track
+from gui.lanes.phase import Phase, phase
 from gui.lanes.twinned import TwinTracks, joined
 from tactile_lab.acquisition.live import Bins
+
+OSCILLATING = frozenset({"V_C2", "V_K"})
+"""Signals that go with the spikes; the others go with the force."""
 
 
 class Source(Protocol):
@@ -73,6 +77,9 @@ class LiveSource:
         self.tracks = TwinTracks()
         self.running = True
         self.holds: list[Hold] = []
+        self._phase = Phase.none()
+        self._carried: tuple[object, ...] = ()
+        self._twin_spikes = np.empty(0)
         self._gain = newtons_per_ampere
         self._loop: list[tuple[float, float, float]] = []
         self._new = False
@@ -101,10 +108,25 @@ class LiveSource:
 
     @property
     def twin_spikes(self) -> FloatArray:
-        """The twin's so far, then the plan's."""
-        planned = np.empty(0) if self.aligned is None else self.aligned.spikes
-        known = self.tracks.end
-        return np.concatenate([self.tracks.spikes, planned[planned > known]])
+        """The twin's so far, then the plan's, carried on from the twin's last."""
+        self._carry_on()
+        return self._twin_spikes
+
+    def _carry_on(self) -> Phase:
+        """Move the planned oscillation to where the twin's has come, if that is new."""
+        aligned, tracks = self.aligned, self.tracks
+        if aligned is None:
+            self._twin_spikes = tracks.spikes
+            return self._phase
+        as_of = (tracks, tracks.end, aligned.moves)
+        if as_of != self._carried:
+            known, planned = tracks.spikes, aligned.spikes
+            if known.size:
+                self._phase = phase(planned, float(known[-1]))
+            ahead = self._phase.moved(planned)
+            self._twin_spikes = np.concatenate([known, ahead[ahead > tracks.end]])
+            self._carried = as_of
+        return self._phase
 
     def add_bins(self, bins: dict[str, Bins]) -> None:
         """The newest samples by signal."""
@@ -169,8 +191,9 @@ class LiveSource:
         found = self.tracks.between(signal, start, end, count)
         if self.aligned is None or end <= self.tracks.end:
             return found
-        ahead = max(start, self.tracks.end)
-        return joined(found, self.aligned.twin(signal, ahead, end, count))
+        how = self._carry_on() if signal in OSCILLATING else Phase.none()
+        ahead = self.aligned.twin(signal, start, end, count, how, self.tracks.end)
+        return joined(found, ahead)
 
     def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
         """The planned force."""

@@ -82,20 +82,74 @@ def test_history_is_bounded_and_keeps_a_single_spike() -> None:
     assert newest.time.size == 5000 or newest.time.size == 5001
 
 
-def test_rate_is_one_over_the_last_interval() -> None:
+def test_rate_is_one_over_the_last_interval_from_the_second_spike_on() -> None:
     drawn = rate_of(np.array([1.0, 1.5, 1.75]), 0.0, 3.0, 100)
-    assert drawn.mean.tolist() == [0.0, 2.0, 4.0]
+    assert drawn.time.tolist() == [1.5, 1.75]
+    assert drawn.mean.tolist() == [2.0, 4.0]
 
 
-def test_rate_at_a_time_is_that_of_the_last_two_spikes() -> None:
-    spikes = np.array([1.0, 1.5, 1.75])
-    rates = [rate_at(spikes, time) for time in (0.5, 1.2, 1.5, 1.7, 1.75, 99.0)]
-    assert rates == [0.0, 0.0, 2.0, 2.0, 4.0, 4.0]
+def test_rate_has_no_point_for_the_spike_after_a_silence() -> None:
+    spikes = np.array([1.0, 1.5, 2.0, 6.0, 9.0, 9.5, 9.8])
+    drawn = rate_of(spikes, 0.0, 10.0, 100)
+    assert drawn.time.tolist() == [1.5, 2.0, 9.5, 9.8], "a spike alone has none either"
+    assert np.flatnonzero(drawn.gap).tolist() == [0, 2]
 
 
-def test_rate_is_not_joined_across_a_silence() -> None:
-    drawn = rate_of(np.array([1.0, 1.5, 2.0, 9.0, 9.5]), 0.0, 10.0, 100)
-    assert np.flatnonzero(drawn.gap).tolist() == [0, 3]
+def test_slow_but_regular_firing_has_a_rate() -> None:
+    assert np.allclose(rate_of(np.arange(0.0, 60, 5), 0, 60, 100).mean, 0.2)
+
+
+trains = st.lists(
+    st.tuples(st.integers(1, 9), st.floats(0.05, 0.3), st.floats(1.5, 6.0)),
+    min_size=1,
+    max_size=5,
+).map(
+    lambda parts: np.cumsum(
+        np.concatenate([[rest, *[gap] * more] for more, gap, rest in parts])
+    )
+)
+"""Stretches of at least two spikes, parted by silences."""
+
+
+@given(trains, st.floats(0, 30), st.floats(0.01, 30))
+def test_rate_in_view_does_not_depend_on_the_view(
+    spikes: np.ndarray, start: float, width: float
+) -> None:
+    whole = rate_of(spikes, -1.0, 1e3, 1000)
+    part = rate_of(spikes, start, start + width, 1000)
+    inside = (whole.time >= start) & (whole.time <= start + width)
+    assert set(whole.time[inside]) <= set(part.time) <= set(whole.time)
+    assert set(part.mean) <= set(whole.mean)
+    assert part.time[1:][part.gap[1:]].size == 0 or set(
+        part.time[part.gap][1:]
+    ) <= set(whole.time[whole.gap])
+
+
+@given(trains, st.integers(20, 200))
+def test_many_rates_in_few_columns_stay_broken_at_silences(
+    spikes: np.ndarray, times: int
+) -> None:
+    span = spikes[-1] + 5.0
+    many = np.concatenate([spikes + k * span for k in range(times)])
+    fine, coarse = rate_of(many, 0, 1e9, many.size), rate_of(many, 0, 1e9, 5)
+    assert set(fine.time[fine.gap]) == set(coarse.time[coarse.gap])
+    assert coarse.extent == fine.extent
+
+
+def test_rate_at_a_time_is_that_of_the_last_interval_and_0_in_silence() -> None:
+    spikes = np.array([1.0, 1.5, 1.75, 9.0, 9.1])
+    rates = [rate_at(spikes, t) for t in (0.5, 1.2, 1.5, 1.7, 1.75, 2.4, 2.6, 8.9)]
+    assert rates == [0.0, None, 2.0, 2.0, 4.0, 4.0, 0.0, 0.0]
+    assert rate_at(spikes, 9.05) is None, "4.5 s of silence are no interval"
+    assert rate_at(spikes[:4], 9.05) is None, "nor while nobody knows what follows"
+    assert rate_at(spikes[:4], 9.6) == 0.0, "a spike alone"
+    assert rate_at(np.empty(0), 3.0) == 0.0
+
+
+@given(trains)
+def test_rate_on_the_card_is_that_of_the_line(spikes: np.ndarray) -> None:
+    drawn = rate_of(spikes, 0.0, 1e3, 1000)
+    assert [rate_at(spikes, t) for t in drawn.time] == drawn.mean.tolist()
 
 
 def test_model_moves_to_where_each_trial_really_started() -> None:
