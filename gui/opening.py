@@ -201,8 +201,14 @@ class Opening(QObject):
             self._panels.centre.stack.show_values()
 
     def close_run(self) -> None:
-        """Go back from a run on disk to the plan."""
+        """Go back from a run on disk to the session's last run, or to the plan."""
         self.leave_run()
+        source, centre = self._panels.session.source, self._panels.centre
+        if source is not None and centre.stack.source is not source:
+            self.show_lanes()
+            centre.stack.show_source(source)
+            centre.view.set_now(source.reach, source.length)
+            centre.view.show_all()
         self._panels.setup.plan_now()
 
     def show_lanes(self) -> None:

@@ -11,9 +11,10 @@ from PySide6.QtGui import QColor, QFont, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog
 
+from gui.lanes.card import CARD
 from gui.lanes.derive import rate_of
 from gui.lanes.lane import Kind
-from gui.lanes.row import CARD, LaneRow
+from gui.lanes.row import LaneRow
 from gui.lanes.stack import LaneStack
 from gui.look.fonts import sized
 from gui.look.tokens import LIGHT, Tokens

@@ -50,6 +50,7 @@ class Comparison:
 
     running = False
     model = None
+    followed = 0.0
 
     def __init__(self, members: list[Member]) -> None:
         self.members = members
@@ -169,12 +170,14 @@ def paint_lane(
     place: Place,
     source: Comparison,
     tokens: Tokens,
-) -> tuple[float, float]:
-    """Draw one lane of a comparison; the value range it used."""
+) -> tuple[tuple[float, float], list[Drawn]]:
+    """Draw one lane of a comparison; the value range it used, and each run's trace."""
     count = max(50, int(frame.right - frame.left))
     stacked = source.stacked and lane.signal in STACKED
     drawn = [source.of(m, lane, frame.start, frame.end, count) for m in source.members]
     extents = [d.extent for d in drawn if d.extent is not None]
+    if lane.kind in (Kind.FORCE, Kind.RATE):
+        extents.append((0.0, 0.0))
     low, high = nice_range(
         min((e[0] for e in extents), default=0.0),
         max((e[1] for e in extents), default=1.0),
@@ -211,4 +214,4 @@ def paint_lane(
         plain = found if lane.signal == "V_K" else averaged(found)
         paint.trace(painter, own, plain, line)
     painter.restore()
-    return low, high
+    return (low, high), drawn

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+HOLDS = 0.05
+"""How long the last point of a trace is good for at least, s."""
+
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
@@ -51,6 +54,23 @@ class Drawn:
         if self.empty:
             return None
         return float(self.low.min()), float(self.high.max())
+
+    def at(self, time: float) -> float | None:
+        """The mean at a time, s; None outside the points and in a gap.
+
+        The last point holds as long as a column is wide, at least `HOLDS`.
+        """
+        after = int(np.searchsorted(self.time, time, side="right"))
+        if after == 0:
+            return None
+        last = after == self.time.size
+        if last or self.gap[after]:
+            before = max(after - 2, 0)
+            width = 1.5 * float(self.time[after - 1] - self.time[before])
+            if time - self.time[after - 1] > (max(width, HOLDS) if last else width):
+                return None
+            return float(self.mean[after - 1])
+        return float(np.interp(time, self.time, self.mean))
 
 
 def columns(rows: FloatArray, count: int, width: float) -> Drawn:
@@ -104,6 +124,14 @@ def zigzag(drawn: Drawn) -> tuple[FloatArray, FloatArray]:
         y[0::2] = np.where(falling, drawn.high, drawn.low)
         y[1::2] = np.where(falling, drawn.low, drawn.high)
     return x, y
+
+
+def stepped(
+    time: FloatArray, value: FloatArray, until: float
+) -> tuple[FloatArray, FloatArray]:
+    """The corners of a line on which each value holds until the next, to `until` s."""
+    end = np.append(time[1:], max(until, float(time[-1]))) if time.size else time
+    return np.column_stack([time, end]).ravel(), np.repeat(value, 2)
 
 
 def line_between(

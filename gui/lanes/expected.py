@@ -133,7 +133,7 @@ class Aligned:
 class Nothing:
     """A source without data: the lanes of the empty state."""
 
-    reach = 0.0
+    reach = followed = 0.0
     length = 5.0
     running = False
 
@@ -158,7 +158,7 @@ class Nothing:
 class PlanSource:
     """No data yet: the plan and what the model expects of it."""
 
-    reach = 0.0
+    reach = followed = 0.0
     running = True
 
     def __init__(self, preview: Preview) -> None:

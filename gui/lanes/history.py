@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, columns, line_between
+from gui.lanes.decimate import Drawn, FloatArray, columns, line_between, stepped
 from tactile_lab.acquisition.live import Bins
 
 FINE = 1 << 17
@@ -161,9 +161,12 @@ class SlowTrack:
     def between(
         self, start: float, end: float, count: int, hold: float | None = None
     ) -> Drawn:
-        """The readings around [start, end] s; the last one holds until `hold` s."""
+        """A line through the readings around [start, end] s.
+
+        With `hold`, each reading holds until the next and the last until `hold` s.
+        """
         first = np.searchsorted(self._rows[0, : self._count], start)
-        rows = self._rows[:, max(0, int(first) - 1) : self._count]
-        if hold is not None and rows.size and hold > rows[0, -1]:
-            rows = np.concatenate([rows, [[hold], [rows[1, -1]]]], axis=1)
-        return line_between(rows[0], rows[1], start, end, count)
+        time, value = self._rows[:, max(0, int(first) - 1) : self._count]
+        if hold is not None:
+            time, value = stepped(time, value, hold)
+        return line_between(time, value, start, end, count)

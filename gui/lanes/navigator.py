@@ -20,11 +20,11 @@ from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
 from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.card import CARD
 from gui.lanes.derive import rate_of
 from gui.lanes.expected import Nothing
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.paint import Frame
-from gui.lanes.row import CARD
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized

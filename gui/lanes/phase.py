@@ -62,7 +62,9 @@ def phase(planned: FloatArray, last: float) -> Phase:
     index = np.concatenate([np.arange(planned.size), np.flatnonzero(first)])
     nearest = int(np.argmin(np.abs(places - last)))
     by = last - float(places[nearest])
-    if abs(by) > own[index[nearest]] / 2:
+    to_next = np.append(np.where(first[1:], own[:-1], np.diff(planned)), own[-1])
+    beside = to_next if by > 0 and nearest < planned.size else own
+    if abs(by) > beside[index[nearest]] / 2:
         return Phase.none()
     # trains that follow closely move along: no spike may overtake another
     pauses = np.append(first[1:], True)

@@ -12,10 +12,11 @@ from gui.lanes import paint
 from gui.lanes.axis import nice_range, number
 from gui.lanes.compare import Comparison, paint_lane
 from gui.lanes.decimate import Drawn
-from gui.lanes.derive import averaged, difference, rate_of, scaled
+from gui.lanes.derive import averaged
 from gui.lanes.ground import AXIS, GUTTER, TIME_AXIS, Place, ground, row_names, rows_of
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.paint import Frame
+from gui.lanes.readings import Painted, right_edge, traces, values_at
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
@@ -47,7 +48,11 @@ class LanePainter:
         self.manual: tuple[float, float] | None = None
         self.bottom = False
         self.top = False
-        self.last: float | None = None
+        self.painted = Painted()
+
+    def forget(self) -> None:
+        """Choose a new range."""
+        self.range, self.manual = (0.0, 1.0), None
 
     def paint(
         self, painter: QPainter, size: QSize, source: Source, tokens: Tokens
@@ -61,7 +66,10 @@ class LanePainter:
             self._compare(painter, size, QSize(right, bottom), source, tokens)
             return
         count = max(50, int(right - AXIS))
-        measured, twin = self._data(source, view.start, view.end, count)
+        measured, twin = traces(
+            self.lane, source, view.start, view.end, count, model=self.options.twin
+        )
+        self.painted = Painted(view.start, view.end, (measured,))
         room = min(NAMES / max(bottom - 5 - NAMES, NAMES), 1.0) if self.top else 0.0
         self._fit(measured, twin, source, room)
         low, high = self.range
@@ -76,7 +84,7 @@ class LanePainter:
         self._traces(painter, frame, source, measured, twin, tokens)
         painter.restore()
         self._cursors(painter, frame, tokens, size)
-        self._tag(painter, frame, tokens)
+        self._tag(painter, frame, source, tokens)
 
     def _compare(
         self,
@@ -92,29 +100,9 @@ class LanePainter:
         painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         place = Place(self.top, self.bottom, True)
-        self.range = paint_lane(painter, frame, self.lane, place, source, tokens)
-        self.last = None
+        self.range, runs = paint_lane(painter, frame, self.lane, place, source, tokens)
+        self.painted = Painted(view.start, view.end, tuple(runs))
         self._cursors(painter, frame, tokens, size)
-
-    def _data(
-        self, source: Source, start: float, end: float, count: int
-    ) -> tuple[Drawn, Drawn]:
-        lane, none = self.lane, Drawn.nothing()
-        if lane.kind is Kind.RASTER:
-            return none, none
-        if lane.kind is Kind.RATE:
-            twin = none
-            if self.options.twin:
-                twin = rate_of(source.twin_spikes, start, end, count)
-            return rate_of(source.spikes, start, end, count), twin
-        measured = source.trace(lane.signal, start, end, count)
-        if lane.kind is Kind.RESIDUAL:
-            model = source.twin(lane.signal, start, end, 4 * count)
-            return scaled(difference(measured, model), lane.scale), none
-        twin = none
-        if self.options.twin and lane.kind is not Kind.FORCE:
-            twin = scaled(source.twin(lane.signal, start, end, count), lane.scale)
-        return scaled(measured, lane.scale), twin
 
     def _fit(self, measured: Drawn, twin: Drawn, source: Source, room: float) -> None:
         """Choose the value range: round, and steady while the data allows it.
@@ -189,9 +177,6 @@ class LanePainter:
             at = round(frame.x1(source.reach)) + 0.5
             painter.setPen(paint.pen(tokens.border_strong))
             painter.drawLine(QPointF(at, 0), QPointF(at, frame.bottom + 3))
-        self.last = None
-        if not measured.empty and kind is not Kind.RASTER:
-            self.last = float(measured.mean[-1])
 
     def _plan(
         self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
@@ -253,12 +238,18 @@ class LanePainter:
                 painter.setFont(sized(11, QFont.Weight.Bold))
                 painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
 
-    def _tag(self, painter: QPainter, frame: Frame, tokens: Tokens) -> None:
-        """The newest value, beside where it is."""
-        if self.last is None or self.lane.kind is Kind.RESIDUAL:
+    def _tag(
+        self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
+    ) -> None:
+        """The value at the right edge of the data in view, beside where it is."""
+        if self.lane.kind in (Kind.RESIDUAL, Kind.RASTER):
             return
-        y = min(max(frame.y1(self.last), frame.top + 8), frame.bottom - 8)
-        text = number(self.last, min(self.lane.places, 2))
+        edge = right_edge(source, frame.end)
+        value = values_at(self.lane, source, edge, self.painted)[0]
+        if value is None or edge < frame.start:
+            return
+        y = min(max(frame.y1(value), frame.top + 8), frame.bottom - 8)
+        text = number(value, min(self.lane.places, 2))
         box = QRectF(frame.right + 4, y - 9, GUTTER - 9, 18)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
         painter.setPen(Qt.PenStyle.NoPen)

@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-import numpy as np
-from PySide6.QtCore import QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPixmap, QWheelEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QSizePolicy,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QWheelEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
 
 from gui.lanes.axis import number
+from gui.lanes.card import LaneCard
 from gui.lanes.compare import Comparison
-from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.derive import rate_at
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.plot import LanePainter, Options
+from gui.lanes.readings import (
+    count_between,
+    interval_text,
+    newest,
+    right_edge,
+    values_at,
+    view_text,
+)
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
-from gui.parts import label
-
-CARD = 164
 
 
 class LanePlot(QWidget):
     """The painted plot; drags pan, the wheel zooms, cursors are grabbed."""
 
     box_zoomed = Signal(float, float)
+    painted = Signal()
 
     def __init__(
         self, lane: Lane, view: TimeView, options: Options, theme: Theme
@@ -61,6 +58,8 @@ class LanePlot(QWidget):
             painter.setPen(Qt.GlobalColor.gray)
             a, b = self._from[0].x(), self._to.x()
             painter.drawRect(min(a, b), 1, abs(b - a), self.height() - 3)
+        painter.end()
+        self.painted.emit()
 
     def time_at(self, x: float) -> float:
         """Time under a pixel, s."""
@@ -127,154 +126,105 @@ class LanePlot(QWidget):
 class LaneRow(QFrame):
     """Card and plot side by side."""
 
-    hidden = Signal(str)
-
     def __init__(
         self, lane: Lane, view: TimeView, options: Options, theme: Theme
     ) -> None:
         super().__init__()
         self.lane = lane
+        self.card = LaneCard(lane, theme)
         self.plot = LanePlot(lane, view, options, theme)
         self._view, self._theme = view, theme
-        card = QFrame()
-        card.setProperty("role", "lanecard")
-        card.setFixedWidth(CARD)
-        self._swatch = QLabel()
-        self._swatch.setFixedSize(QSize(10, 10))
-        flat = lane.kind in (Kind.RESIDUAL, Kind.RASTER)
-        self._value = label("—", "flatvalue" if flat else "value")
-        self._unit = label(lane.unit, "muted")
-        self._at_cursors = label("", "small")
-        self._at_cursors.hide()
-        title = QHBoxLayout()
-        title.setSpacing(7)
-        title.addWidget(self._swatch)
-        title.addWidget(label(lane.title, "strong"))
-        title.addStretch(1)
-        value = QHBoxLayout()
-        value.setSpacing(5)
-        (title if flat else value).addWidget(self._value)
-        (title if flat else value).addWidget(self._unit)
-        if not flat:
-            value.addStretch(1)
-        words = QVBoxLayout(card)
-        words.setContentsMargins(12, 6, 10, 4)
-        words.setSpacing(1)
-        words.addLayout(title)
-        words.addLayout(value)
-        words.addWidget(self._at_cursors)
-        words.addStretch(1)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
-        row.addWidget(card)
+        row.addWidget(self.card)
         row.addWidget(self.plot, 1)
+        self.plot.painted.connect(self._follow_picture)
         theme.changed.connect(self.tint)
         self.tint()
 
-    def show_value(self, source: Source) -> None:
-        """Update the live value."""
-        text = self._text_of(self.value_of(source))
-        if self._value.text() != text:
-            self._value.setText(text)
-            self._value.setAccessibleName(f"{self.lane.plain} {text} {self.lane.unit}")
-        if self.lane.kind is Kind.RASTER and self._view.cursors is None:
-            words = interval_text(source.spikes, source.reach)
-            self._at_cursors.setVisible(bool(words) and self.height() >= 44)
-            if self._at_cursors.text() != words:
-                self._at_cursors.setText(words)
+    def show_numbers(self, source: Source) -> None:
+        """Update the card.
 
-    def value_of(self, source: Source) -> float | None:
-        """The newest value in shown units; None without data."""
-        lane = self.lane
+        It has the newest value while the run lasts; afterwards what is at the right
+        edge of the view, as the tag has it, and of spikes how many are in view.
+        """
+        lane, card, view = self.lane, self.card, self._view
+        edge = right_edge(source, view.end)
+        if isinstance(source, Comparison):
+            self._compare(source)
+            return
         if lane.kind is Kind.RASTER:
-            return float(source.spikes.size)
-        if lane.kind is Kind.RATE:
-            spikes = source.spikes
-            if spikes.size < 2:
-                return None if spikes.size == 0 else 0.0
-            return float(1 / max(spikes[-1] - spikes[-2], 1e-9))
-        if lane.kind is Kind.RESIDUAL:
-            return self.plot.painter.last
-        if source.reach <= 0:
-            return None
-        drawn = source.trace(lane.signal, source.reach - 0.05, source.reach, 50)
-        return None if drawn.empty else float(drawn.mean[-1]) * lane.scale
+            self._show_spikes(source, edge)
+            return
+        if source.running:
+            card.show_value(newest(lane, source))
+        else:
+            card.show_value(self._values(source, edge)[0])
+        card.show_more("" if view.cursors is None else self._at_cursors(source))
 
-    def show_cursors(self, source: Source) -> None:
-        """Values at A and B and their difference, as text."""
+    def _show_spikes(self, source: Source, edge: float) -> None:
+        spikes, view = source.spikes, self._view
+        if source.running:
+            words = interval_text(spikes, source.reach)
+            self.card.show_value(newest(self.lane, source))
+        else:
+            words = view_text(spikes, view.start, edge)
+            seen = count_between(spikes, view.start, edge)
+            self.card.show_value(float(seen), "in view")
+        if view.cursors is not None:
+            words = f"{count_between(spikes, *sorted(view.cursors))} between A and B"
+        self.card.show_more(words)
+
+    def _compare(self, source: Comparison) -> None:
+        """One line per run."""
         cursors = self._view.cursors
-        if cursors is None or self.height() < 66:
-            self._at_cursors.setVisible(self.lane.kind is Kind.RASTER)
-            return
-        tokens = self._theme.tokens
         if self.lane.kind is Kind.RASTER:
-            low, high = sorted(cursors)
-            between = int(np.diff(np.searchsorted(source.spikes, [low, high]))[0])
-            self._at_cursors.setText(f"{between} between A and B")
-            self._at_cursors.show()
-            return
-        a, b = (self.value_at(source, time) for time in cursors)
-        change = None if a is None or b is None else b - a
-        places = min(self.lane.places, 2)
-        delta = "—" if change is None else f"{'+' if change >= 0 else ''}"
-        delta = delta if change is None else delta + number(change, places)
+            low, high = sorted(cursors or (self._view.start, self._view.end))
+            counts = [
+                float(count_between(m.source.spikes + m.shift, low, high))
+                for m in source.members
+            ]
+            self.card.show_runs(counts, None, "A to B" if cursors else "in view")
+        elif cursors is None:
+            edge = right_edge(source, self._view.end)
+            self.card.show_runs(self._values(source, edge), None, "")
+        else:
+            a, b = (self._values(source, time) for time in cursors)
+            changes = [_change(one, two) for one, two in zip(a, b, strict=True)]
+            self.card.show_runs(a, changes, "at A")
+
+    def _at_cursors(self, source: Source) -> str:
+        """Values at A and B and their difference."""
+        cursors, tokens = self._view.cursors, self._theme.tokens
+        assert cursors is not None
+        a, b = (self._values(source, time)[0] for time in cursors)
+        change, places = _change(a, b), min(self.lane.places, 2)
+        delta = "—"
+        if change is not None:
+            delta = f"{'+' if change >= 0 else ''}{number(change, places)}"
         words = [
             f'<span style="color:{colour};font-weight:600">{name}</span> '
             f"{'—' if value is None else number(value, places)}"
-            for name, value, colour in (
-                ("A", a, tokens.accent),
-                ("B", b, tokens.V_C1),
-            )
+            for name, value, colour in (("A", a, tokens.accent), ("B", b, tokens.V_C1))
         ]
-        self._at_cursors.setText(f"{' &nbsp;'.join(words)} &nbsp;Δ {delta}")
-        self._at_cursors.show()
+        return f"{' &nbsp;'.join(words)} &nbsp;Δ {delta}"
 
-    def value_at(self, source: Source, time: float) -> float | None:
-        """Value at a time in shown units; None outside the data."""
-        lane = self.lane
-        if lane.kind is Kind.RATE:
-            return rate_at(source.spikes, time) if time <= source.reach else None
-        elif lane.kind is Kind.RESIDUAL:
-            one = _at(source.trace(lane.signal, time - 0.02, time + 0.02, 100), time)
-            two = _at(source.twin(lane.signal, time - 0.02, time + 0.02, 100), time)
-            return None if one is None or two is None else (one - two) * lane.scale
-        else:
-            drawn = source.trace(lane.signal, time - 0.02, time + 0.02, 100)
-        value = _at(drawn, time)
-        return None if value is None else value * lane.scale
+    def _values(self, source: Source, time: float) -> tuple[float | None, ...]:
+        return values_at(self.lane, source, time, self.plot.painter.painted)
 
-    def _text_of(self, value: float | None) -> str:
-        if value is None:
-            return "—"
-        sign = "+" if self.lane.kind is Kind.RESIDUAL and value > 0.5 else ""
-        return sign + number(value, self.lane.places)
+    def _follow_picture(self) -> None:
+        """What is at the right edge has moved with the picture."""
+        source = self.plot.source
+        if source is not None and not source.running:
+            self.show_numbers(source)
 
     def tint(self) -> None:
         """Colour the swatch as theme and source want it."""
-        kind = self.lane.kind
-        name = "residual" if kind is Kind.RESIDUAL else self.lane.signal
-        picture = QPixmap(20, 20)
-        tokens = self._theme.tokens
         # in a comparison colour means run, so the lane's own colour steps back
-        grey = isinstance(self.plot.source, Comparison)
-        picture.fill(tokens.border_strong if grey else tokens.trace(name))
-        picture.setDevicePixelRatio(2)
-        self._swatch.setPixmap(picture)
+        self.card.tint(grey=isinstance(self.plot.source, Comparison))
         self.plot.update()
 
 
-def interval_text(spikes: FloatArray, now: float) -> str:
-    """The last interval and, where it has been silent for longer, since when."""
-    if spikes.size < 2:
-        return ""
-    last = float(spikes[-1] - spikes[-2])
-    words = f"ISI {number(1e3 * last, 1)} ms"
-    silent = now - float(spikes[-1])
-    return f"{words} · silent {silent:.1f} s" if silent > 2 * last else words
-
-
-def _at(drawn: Drawn, time: float) -> float | None:
-    if drawn.empty or not drawn.time[0] <= time <= drawn.time[-1] + 0.02:
-        return None
-    return float(np.interp(time, drawn.time, drawn.mean))
+def _change(a: float | None, b: float | None) -> float | None:
+    return None if a is None or b is None else b - a

@@ -36,6 +36,11 @@ class Source(Protocol):
         ...
 
     @property
+    def followed(self) -> float:
+        """Time up to which the model is that of the force that was applied."""
+        ...
+
+    @property
     def holds(self) -> list[Hold]:
         """Named stretches, ascending."""
         ...
@@ -100,6 +105,11 @@ class LiveSource:
         """Expected length, or the reach where that is longer, s."""
         planned = self.aligned.length if self.aligned and self.running else 0.0
         return max(planned, self.reach, 1.0)
+
+    @property
+    def followed(self) -> float:
+        """Where the twin has come to; without a twin the plan has to do, s."""
+        return self.tracks.end or self.reach
 
     @property
     def spikes(self) -> FloatArray:
@@ -172,9 +182,9 @@ class LiveSource:
             self.aligned.begin(index, hold.start)
 
     def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """The measured signal; the force holds from its last set-point to now."""
+        """The measured signal; the force holds from each set-point to the next."""
         if signal in self._slow and signal not in self._tracks:
-            hold = self.reach if signal == "force" and self.running else None
+            hold = self.reach if signal == "force" else None
             return self._slow[signal].between(start, end, count, hold)
         track = self._tracks.get(signal)
         return Drawn.nothing() if track is None else track.between(start, end, count)
@@ -192,7 +202,10 @@ class LiveSource:
         if self.aligned is None or end <= self.tracks.end:
             return found
         how = self._carry_on() if signal in OSCILLATING else Phase.none()
-        ahead = self.aligned.twin(signal, start, end, count, how, self.tracks.end)
+        since = self.tracks.end
+        if since > 0 and not self.tracks.knows(signal):
+            since = max(since, self.reach)  # no plan over data without a twin beside it
+        ahead = self.aligned.twin(signal, start, end, count, how, since)
         return joined(found, ahead)
 
     def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:

@@ -11,6 +11,7 @@ from gui.lanes.expected import Nothing
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.navigator import Navigator
 from gui.lanes.plot import Options
+from gui.lanes.readings import Painted
 from gui.lanes.row import LaneRow
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
@@ -36,7 +37,7 @@ class LaneStack(QFrame):
         self._theme = theme
         self._layout = column(self, spacing=0)
         view.changed.connect(self.refresh)
-        view.cursors_changed.connect(self._cursors)
+        view.cursors_changed.connect(self.show_values)
         theme.changed.connect(self.refresh)
 
     def show_lanes(self, lanes: Sequence[Lane]) -> None:
@@ -63,8 +64,7 @@ class LaneStack(QFrame):
     def show_source(self, source: Source) -> None:
         """Show another source in the same lanes."""
         for row in self.rows:
-            row.plot.painter.range = (0.0, 1.0)
-            row.plot.painter.manual = None
+            row.plot.painter.forget()
         self.exchange_source(source)
 
     def exchange_source(self, source: Source) -> None:
@@ -73,6 +73,7 @@ class LaneStack(QFrame):
         self.navigator.source = source
         for row in self.rows:
             row.plot.source = source
+            row.plot.painter.painted = Painted()
             row.tint()
         self.refresh()
         self.show_values()
@@ -110,8 +111,7 @@ class LaneStack(QFrame):
         """Update the numbers on the cards."""
         for row in self.rows:
             if row.isVisible():
-                row.show_value(self.source)
-                row.show_cursors(self.source)
+                row.show_numbers(self.source)
 
     def row(self, key: str) -> LaneRow | None:
         """The lane of that key, if the scene has it."""
@@ -124,7 +124,3 @@ class LaneStack(QFrame):
     def is_hidden(self, key: str) -> bool:
         """Whether the user folded this lane away."""
         return key in self._hidden
-
-    def _cursors(self) -> None:
-        for row in self.rows:
-            row.show_cursors(self.source)

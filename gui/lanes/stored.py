@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, columns, line_between
+from gui.lanes.decimate import Drawn, FloatArray, columns, line_between, stepped
 from gui.lanes.expected import Hold, settled
 from gui.lanes.recorded_twin import RecordedTwin
 from gui.lanes.twinned import TwinSlice
@@ -20,6 +20,10 @@ from tactile_lab.store.signal import StoredSignal
 
 BRANCH = 16
 """Bins joined into one on the next level."""
+
+DETAILS = 4
+"""Views of a signal's samples kept: those of picture and cursors must not displace each
+other, or each would be read again for ever."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +106,7 @@ class RunSource:
         run = self._run
         self._pyramids = {name: Pyramid(run.signal(name)) for name in run.signals}
         self.length = max(run.duration, 1e-3)
-        self.reach = self.length
+        self.reach = self.followed = self.length
         self.spikes = run.spikes["time"].copy()
         self.trials = run.trials
         self.holds = [
@@ -119,7 +123,8 @@ class RunSource:
         self.simulated = run.simulated
         self._gain = float(attributes.get("newtons_per_ampere", 1.0)) or 1.0
         self._slow = _slow(run, self._gain)
-        self._details: dict[str, tuple[float, float, int, Drawn]] = {}
+        self._force = stepped(*self._slow["force"], self.length)
+        self._details: dict[str, list[tuple[float, float, int, Drawn]]] = {}
         self._wanted: dict[str, tuple[float, float, int]] = {}
         self._lock = threading.Lock()
         self._closed = False
@@ -164,20 +169,25 @@ class RunSource:
         return np.empty(0) if self.model is None else self.model.spikes
 
     def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """The stored signal; where zoomed in, samples as soon as they are read."""
+        """The stored signal; where zoomed in, samples as soon as they are read.
+
+        The force holds from each set-point to the next.
+        """
         if signal in self._slow and signal not in self._pyramids:
-            time, value = self._slow[signal]
+            time, value = self._force if signal == "force" else self._slow[signal]
             return line_between(time, value, start, end, count)
         pyramid = self._pyramids.get(signal)
         if pyramid is None:
             return Drawn.nothing()
         if pyramid.coarse(start, end, count):
-            have = self._details.get(signal)
-            if have is not None and have[:3] == (start, end, count):
-                return have[3]
+            have = self._details.get(signal, [])
+            for *view, drawn in have:
+                if view == [start, end, count]:
+                    return drawn
             self._fetch(signal, (start, end, count))
-            if have is not None and have[0] <= start and end <= have[1]:
-                return have[3]
+            for begin, until, _, drawn in reversed(have):
+                if begin <= start and end <= until:
+                    return drawn
         return pyramid.between(start, end, count)
 
     def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
@@ -234,7 +244,8 @@ class RunSource:
             found = stored.envelope(part.start, part.stop, cells=cells)
             rows = np.array([found.time, found.low, found.high, found.mean])
             drawn = columns(rows, 1 << 30, typical_step(found.time))
-            self._details[signal] = (start, end, count, drawn)
+            have = self._details.get(signal, [])
+            self._details[signal] = [*have, (start, end, count, drawn)][-DETAILS:]
             self.fetched.set()
 
 

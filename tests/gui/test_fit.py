@@ -8,7 +8,7 @@ from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QLabel
 
 from gui.lanes.decimate import Drawn
-from gui.lanes.row import interval_text
+from gui.lanes.readings import interval_text
 from gui.review.finding import Finding, finding
 from gui.review.fit import Beside, fit
 from gui.review.fit_view import FitCards, TwinBars

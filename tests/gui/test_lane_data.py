@@ -120,9 +120,9 @@ def test_rate_in_view_does_not_depend_on_the_view(
     inside = (whole.time >= start) & (whole.time <= start + width)
     assert set(whole.time[inside]) <= set(part.time) <= set(whole.time)
     assert set(part.mean) <= set(whole.mean)
-    assert part.time[1:][part.gap[1:]].size == 0 or set(
-        part.time[part.gap][1:]
-    ) <= set(whole.time[whole.gap])
+    assert part.time[1:][part.gap[1:]].size == 0 or set(part.time[part.gap][1:]) <= set(
+        whole.time[whole.gap]
+    )
 
 
 @given(trains, st.integers(20, 200))
@@ -170,6 +170,16 @@ def test_slow_track_is_bounded() -> None:
         track.add(k * 0.01, float(k))
     assert track.between(0.0, 1e9, 1000).time.size <= 4000
     assert track.last == 449_999.0
+
+
+def test_set_points_hold_until_the_next_and_to_now() -> None:
+    track = SlowTrack()
+    for time, value in ((1.0, 0.0), (1.1, 0.3), (1.2, 0.6)):
+        track.add(time, value)
+    held = track.between(0.0, 9.0, 100, hold=2.0)
+    assert [held.at(t) for t in (1.05, 1.15, 1.25, 2.0)] == [0.0, 0.3, 0.6, 0.6]
+    through = track.between(0.0, 9.0, 100)
+    assert abs(through.at(1.05) - 0.15) < 1e-9, "other readings are joined"
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))

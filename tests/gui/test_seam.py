@@ -9,6 +9,7 @@ from gui.lanes.expected import Hold, Preview
 from gui.lanes.phase import phase
 from gui.lanes.source import LiveSource
 from gui.lanes.twinned import TwinSlice
+from tactile_lab.acquisition.live import Bins
 from tactile_lab.waveform import Waveform
 
 PERIOD = 4.5
@@ -55,7 +56,9 @@ def live(planned: np.ndarray, twin: np.ndarray, end: float) -> LiveSource:
     holds = [Hold(PERIOD * k, PERIOD * (k + 1), str(k)) for k in range(3)]
     preview = Preview(force, {"V_C2": (time, value)}, planned, holds, 14.0)
     source = LiveSource(preview, 1.0)
-    source.tracks.add(TwinSlice({}, twin, end))
+    value = np.zeros(2, np.float32)
+    bins = Bins(np.array([end - 2e-3, end - 1e-3]), 1e-3, value, value, value)
+    source.tracks.add(TwinSlice({"V_C2": bins}, twin, end))
     return source
 
 
@@ -99,7 +102,7 @@ def test_rate_does_not_jump_at_the_seam(meeting) -> None:
 def test_trace_ahead_of_now_falls_where_its_spikes_are(meeting) -> None:
     planned, twin, end = meeting
     source = live(planned, twin, end)
-    drawn = source.twin("V_C2", 0.0, 13.9, 5000)
+    drawn = source.twin("V_C2", end, 13.9, 5000)
     ahead = source.twin_spikes[twin.size :]
     falls = drawn.time[1:][np.diff(drawn.mean) < -0.02]
     assert drawn.time[0] >= end and np.all(np.diff(drawn.time) >= 0)
@@ -108,9 +111,29 @@ def test_trace_ahead_of_now_falls_where_its_spikes_are(meeting) -> None:
     assert falls.size >= ahead[ahead < 13.9].size - 1
 
 
+def test_plan_lies_over_no_data_of_a_signal_without_a_twin() -> None:
+    planned = stretch(0.2, 0.1, 1.0, 2.0)
+    source = live(planned, planned[:5], 0.65)
+    source.preview.traces["V_K"] = source.preview.traces["V_C2"]
+    source.add_bins(
+        {"V_K": Bins(np.array([0.8]), 1e-3, *[np.zeros(1, np.float32)] * 3)}
+    )
+    assert source.twin("V_K", 0.0, 2.0, 5000).time[0] >= source.reach == 0.801
+    assert source.twin("V_C2", 0.66, 2.0, 5000).time[0] < 0.67
+
+
 def test_twin_in_step_with_the_plan_moves_nothing() -> None:
     planned = stretch(0.2, 0.1, 1.05, 2.0)
     assert np.allclose(phase(planned, planned[4]).moved(planned), planned)
+
+
+def test_plan_is_carried_on_at_every_phase() -> None:
+    planned = stretch(0.2, 0.1, 1.1, 2.0)
+    for last in np.linspace(planned[0], planned[-2], 500):
+        moved = phase(planned, last).moved(planned)
+        ahead = moved[moved > last + 1e-9]
+        expected = np.interp(last, planned[:-1], np.diff(planned))
+        assert 0.9 * expected < ahead[0] - last < 1.1 * expected
 
 
 def test_twin_that_lags_takes_the_train_along_and_no_later_one() -> None:

@@ -209,6 +209,30 @@ def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
     assert live.trace("V_C2", 0.2, 0.201, 1000).time.size < 10, "seen live: bins"
 
 
+def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
+    window = lab.window
+    window.opening.open_run(lab.runs(1)[0])
+    lab.until(lambda: window.opening.run is not None)
+    run, stack, view = window.opening.run, window.centre.stack, window.centre.view
+    lab.until(lambda: stack.source is run)
+    begin, _ = run.holds[-1].held
+    run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])
+    view.show_span(begin, 0.25)
+
+    def says(key: str) -> str:
+        return stack.row(key).card.text
+
+    lab.until(lambda: says("spikes") == "2")
+    assert says("force") == "120.0" and says("rate") == "10.00"
+    assert stack.row("spikes").card.more in ("", "of 4 · last ISI 100.0 ms")
+    shown = run.trace("V_C1", begin, begin + 0.25, 500)
+    assert abs(float(says("V_C1")) - shown.at(begin + 0.25)) < 0.02
+    view.show_span(0.0, run.holds[0].start)
+    lab.until(lambda: says("spikes") == "0" and says("rate") == "0.00")
+    view.show_all()
+    lab.until(lambda: says("spikes") == "4" and says("force") == "0.0")
+
+
 def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
     window = lab.window
     file = lab.folder / "dropped.toml"
@@ -341,7 +365,7 @@ def test_frames_lose_no_references(lab) -> None:
 
 
 def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
-    window = lab.window
+    window, session = lab.window, lab.session
     lab.runs(2)
     window.opening.list_runs()
     lab.until(lambda: len(window.review.runs.cards) >= 2)
@@ -357,8 +381,16 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window.centre.compare_bar.align.group.button(1).click()
     starts = [m.source.holds[0].start + m.shift for m in comparison.members]
     assert abs(starts[0] - starts[1]) < 1e-9
+    stack = window.centre.stack
+    lab.until(lambda: stack.row("V_C1").card.text.count("\n") == 2)
+    assert stack.row("spikes").card.text.startswith("Spikes in view")
+    window.centre.tools.toggle_cursors(True)
+    lab.until(lambda: "Δ" in stack.row("V_C1").card.text)
+    window.centre.tools.toggle_cursors(False)
     window.opening.close_run()
     assert not window.centre.compare_bar.isVisible()
+    assert stack.source is session.source, "back to the last run"
+    lab.until(lambda: "●" not in stack.row("V_C1").card.text)
 
 
 def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:

@@ -1,0 +1,199 @@
+"""The card beside a lane: its name and its numbers, one run's or those of several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QPixmap, QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout
+
+from gui.lanes.axis import number
+from gui.lanes.compare import MARKS
+from gui.lanes.lane import Kind, Lane
+from gui.look.theme import Theme
+from gui.parts import label
+
+CARD = 164
+"""Width, px."""
+
+MARGIN, RIGHT = 12, 6
+TITLE = 26
+"""Height of the title with the margin above it, px."""
+
+LINE = 15
+"""Height of a line of small text, px."""
+
+Values = Sequence[float | None]
+
+
+class LaneCard(QFrame):
+    """Swatch, title, value with unit, and a line of small text."""
+
+    def __init__(self, lane: Lane, theme: Theme) -> None:
+        super().__init__()
+        self.lane, self._theme = lane, theme
+        self.setProperty("role", "lanecard")
+        self.setFixedWidth(CARD)
+        self._swatch = QLabel()
+        self._swatch.setFixedSize(QSize(10, 10))
+        self._flat = lane.kind in (Kind.RESIDUAL, Kind.RASTER)
+        self._value = label("—", "flatvalue" if self._flat else "value")
+        self._unit = label(lane.unit, "muted")
+        self._more = label("", "small")
+        self._more.hide()
+        self._runs: tuple[Values, Values | None, str] | None = None
+        title = QHBoxLayout()
+        title.setSpacing(7)
+        title.addWidget(self._swatch)
+        title.addWidget(label(lane.title, "strong"))
+        self._of_runs = label("", "muted")
+        self._of_runs.hide()
+        title.addWidget(self._of_runs)
+        title.addStretch(1)
+        value = QHBoxLayout()
+        value.setSpacing(5)
+        (title if self._flat else value).addWidget(self._value)
+        (title if self._flat else value).addWidget(self._unit)
+        if not self._flat:
+            value.addStretch(1)
+        words = QVBoxLayout(self)
+        words.setContentsMargins(MARGIN, 6, RIGHT, 4)
+        words.setSpacing(1)
+        words.addLayout(title)
+        words.addLayout(value)
+        words.addWidget(self._more)
+        words.addStretch(1)
+
+    @property
+    def text(self) -> str:
+        """All that the card says below its title, as plain text."""
+        return self.toolTip() if self._runs else self._value.text()
+
+    @property
+    def more(self) -> str:
+        """The small text, "" where it is not shown."""
+        return self._more.text() if self._more.isVisibleTo(self) else ""
+
+    def show_value(self, value: float | None, unit: str | None = None) -> None:
+        """Show the number of one run in shown units; `unit` says it in other words."""
+        self._one()
+        text, unit = self._text(value), self.lane.unit if unit is None else unit
+        if self._value.text() != text:
+            self._value.setText(text)
+            self._value.setAccessibleName(f"{self.lane.plain} {text} {unit}")
+        if self._unit.text() != unit:
+            self._unit.setText(unit)
+
+    def show_more(self, words: str) -> None:
+        """Show small text below, where there is room."""
+        self._one()
+        least = 44 if self._flat else 66
+        if self._more.text() != words:
+            self._more.setText(words)
+        self._more.setVisible(bool(words) and self.height() >= least)
+
+    def show_runs(self, values: Values, changes: Values | None, where: str) -> None:
+        """Show a line per run: its marker, its value and its change, in shown units.
+
+        Args:
+            values: of each run.
+            changes: from cursor A to B; None without cursors.
+            where: what place the values are of, such as "at A"; "" for the right edge.
+        """
+        asked = (tuple(values), None if changes is None else tuple(changes), where)
+        if asked == self._runs:
+            return
+        self._runs = asked
+        texts = [
+            f"{m} {' '.join(t)}" for m, t in zip(MARKS, self._lines(), strict=False)
+        ]
+        first = f"{self.lane.plain}, {self.lane.unit}".rstrip(", ")
+        self.setToolTip("\n".join([f"{first} {where or 'at the right'}", *texts]))
+        for one in (self._value, self._unit):
+            one.hide()
+        self._of_runs.show()
+        self._lay_out_runs()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Say as much as there is room for."""
+        super().resizeEvent(event)
+        if self._runs is not None:
+            self._lay_out_runs()
+
+    def tint(self, *, grey: bool) -> None:
+        """Colour the swatch; `grey` where colour means something else."""
+        kind, tokens = self.lane.kind, self._theme.tokens
+        name = "residual" if kind is Kind.RESIDUAL else self.lane.signal
+        picture = QPixmap(20, 20)
+        picture.fill(tokens.border_strong if grey else tokens.trace(name))
+        picture.setDevicePixelRatio(2)
+        self._swatch.setPixmap(picture)
+        if self._runs is not None:
+            self._lay_out_runs()
+
+    def _one(self) -> None:
+        """Back to the number of one run."""
+        if self._runs is not None:
+            self._runs = None
+            self.setToolTip("")
+            self._more.setText("")
+            self._of_runs.hide()
+            for one in (self._value, self._unit):
+                one.show()
+
+    def _lines(self, places: int | None = None) -> list[tuple[str, ...]]:
+        """Value and change of each run."""
+        assert self._runs is not None
+        values, changes, _ = self._runs
+        texts = [self._text(value, places) for value in values]
+        if changes is None:
+            return [(text,) for text in texts]
+        signed = [f"Δ {self._signed(change, places)}" for change in changes]
+        return list(zip(texts, signed, strict=True))
+
+    def _lay_out_runs(self) -> None:
+        """A row per run; where the lane is low one for all, the changes alone.
+
+        With as many decimals as there is room for.
+        """
+        assert self._runs is not None
+        values, changes, where = self._runs
+        tall = self.height() >= TITLE + LINE * len(values)
+        told = tall or changes is None
+        unit = f"{self.lane.unit} {where}" if told else f"Δ {self.lane.unit}"
+        self._of_runs.setText(unit.strip())
+        self._more.setVisible(self.height() >= TITLE + LINE - 3)
+        for places in range(self.lane.places, -1, -1):
+            lines = self._lines(places)
+            if not tall:
+                lines = [(line[-1].removeprefix("Δ "),) for line in lines]
+            self._more.setText(self._table(lines, tall))
+            if self._more.sizeHint().width() <= CARD - MARGIN - RIGHT:
+                break
+
+    def _table(self, lines: list[tuple[str, ...]], tall: bool) -> str:
+        tokens = self._theme.tokens
+        near, apart = (4, 8) if tall else (2, 5)
+        cells = [
+            f'<td style="color:{colour};padding-right:{near}px">{mark}</td>'
+            f'<td align="right" style="color:{tokens.text};font-weight:600;'
+            f'padding-right:{apart}px">{line[0]}</td>'
+            + "".join(f'<td align="right">{text}</td>' for text in line[1:])
+            for mark, colour, line in zip(MARKS, tokens.runs, lines, strict=False)
+        ]
+        rows = "</tr><tr>".join(cells) if tall else "".join(cells)
+        return f'<table cellspacing="0" cellpadding="0"><tr>{rows}</tr></table>'
+
+    def _text(self, value: float | None, places: int | None = None) -> str:
+        if value is None:
+            return "—"
+        if self.lane.kind is Kind.RESIDUAL and value > 0.5:
+            return self._signed(value, places)
+        return number(value, self.lane.places if places is None else places)
+
+    def _signed(self, value: float | None, places: int | None = None) -> str:
+        if value is None:
+            return "—"
+        text = number(value, self.lane.places if places is None else places)
+        return f"+{text}" if value > 0 and text.strip("0.") else text

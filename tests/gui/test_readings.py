@@ -1,0 +1,76 @@
+"""Numbers beside the lanes."""
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from gui.lanes.card import LINE, TITLE, LaneCard
+from gui.lanes.decimate import HOLDS, Drawn
+from gui.lanes.lane import Lane, lanes_for
+from gui.lanes.readings import count_between, interval_text, view_text
+from gui.look.theme import Theme
+
+LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "spikes"})}
+
+
+def test_value_of_a_trace_is_between_its_points_and_nothing_in_a_gap() -> None:
+    value = np.array([0.0, 1.0, 2.0, 9.0, 9.0])
+    gap = np.array([True, False, False, True, False])
+    drawn = Drawn(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), value, value, value, gap)
+    assert [drawn.at(t) for t in (-0.01, 0.05, 0.2, 0.21)] == [None, 0.5, 2.0, 2.0]
+    assert drawn.at(2.0) is None and drawn.at(5.05) == 9.0
+    assert drawn.at(5.1 + HOLDS) == 9.0 and drawn.at(5.4) is None
+    assert Drawn.nothing().at(0.0) is None
+
+
+def test_spikes_of_a_stored_run_are_those_in_view() -> None:
+    spikes = np.array([1.0, 1.1, 5.0, 5.2, 5.3])
+    assert count_between(spikes, 1.05, 5.2) == 3
+    assert view_text(spikes, 4.9, 5.25) == "of 5 · last ISI 200.0 ms"
+    assert view_text(spikes, 4.9, 5.1) == "of 5", "one spike has no interval"
+    assert view_text(spikes, 0.0, 5.1) == "of 5", "nor has one after a silence"
+    assert view_text(spikes, 5.1, 5.25) == "of 5", "the interval began out of view"
+
+
+def test_first_spike_after_a_silence_tells_the_silence() -> None:
+    spikes = np.array([1.0, 1.1, 5.6])
+    assert interval_text(spikes, 5.7) == "after 4.5 s of silence"
+    assert interval_text(spikes, 8.0) == "silent 2.4 s"
+
+
+@pytest.fixture
+def theme(app: QApplication) -> Theme:
+    made = Theme("light")
+    made.apply()
+    return made
+
+
+def card(lane: Lane, theme: Theme, height: int) -> LaneCard:
+    made = LaneCard(lane, theme)
+    made.resize(made.width(), height)
+    return made
+
+
+@pytest.mark.parametrize("height", [34, 48, TITLE + 3 * LINE, 120])
+@pytest.mark.parametrize("cursors", [False, True])
+def test_card_tells_each_run_at_any_height(theme, height: int, cursors: bool) -> None:
+    one = card(LANES["V_C1"], theme, height)
+    changes = [0.25, -0.5, None] if cursors else None
+    one.show_runs([3.721, -12.345, None], changes, "at A" if cursors else "")
+    assert "3.721" in one.text and "−12.345" in one.text and "▲ —" in one.text
+    if height >= TITLE + LINE:
+        assert "●" in one.more and "■" in one.more and "▲" in one.more
+    if cursors:
+        assert "Δ +0.250" in one.text and "Δ −0.500" in one.text
+    assert one.sizeHint().width() <= one.width()
+    one.show_value(1.5)
+    assert one.text == "1.500" and not one.more, "back to one run"
+
+
+def test_low_card_gives_up_decimals_not_runs(theme) -> None:
+    high, low = (card(LANES["V_C1"], theme, height) for height in (120, 48))
+    for one in (high, low):
+        one.show_runs([-123.456, -23.456, -33.456], None, "")
+    assert "−123.456" in high.more
+    assert "−123.456" not in low.more and "−123" in low.more
+    assert low.text == high.text, "the tool tip has them all"
