@@ -131,7 +131,7 @@ def test_the_table_has_one_row_per_trial(demo):
     spikes = [int(row[1]) for row in shown.rows]
     assert spikes == sorted(spikes)
     assert "10 are needed" in shown.rows[1][-1]
-    assert "a hold of 2 s is shorter" in shown.rows[3][-1]
+    assert "exceeds the hold of 2 s" in shown.rows[3][-1]
 
 
 def test_the_table_stands_in_columns(demo):
