@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
+from gui.agreeing import Agreeing
 from gui.choosing import choose_run, choose_scene
 from gui.comparing import load_comparison
 from gui.lanes.compare import Comparison
@@ -47,6 +48,7 @@ class Opening(QObject):
         self.run: RunSource | Comparison | None = None
         self.ending = ""
         self.gathering = Gathering(panels.review.results, self)
+        Agreeing(panels.session, self.gathering)
         self._model: object = None
         self._records = Records(panels.session, self)
         self._records.loaded.connect(self._show_run)
@@ -222,6 +224,7 @@ class Opening(QObject):
     def leave_run(self) -> None:
         """Let go of the run from disk on screen."""
         self._records.forget()
+        self.gathering.forget()
         if self.run is not None:
             self.run.close()
             self.run = self._records.shown = None

@@ -65,7 +65,8 @@ class Chip(QWidget):
             if where.text() != text:
                 where.setText(text)
         self._detail.setVisible(bool(view.detail) and not self._compact)
-        self.setToolTip(f"{view.name}: {view.detail}" if view.detail else view.name)
+        told = " · ".join(text for text in (view.detail, view.value) if text)
+        self.setToolTip(f"{view.name}: {told}")
         self.setAccessibleName(f"{view.name}, {view.detail}, {view.value}")
         bad = view.lamp is Lamp.BAD
         if bad is not self._bad:

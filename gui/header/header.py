@@ -84,7 +84,7 @@ class Header(QFrame):
         for chip in self._chips:
             chip.set_compact(compact, narrow)
         self._buttons[0].setVisible(not narrow)
-        self._title.setMinimumWidth(120 if narrow else 190)
+        self._title.setMinimumWidth(150 if narrow else 190)
         self.badge.setText("SIM" if compact else "SIMULATED BENCH")
 
     def render_snapshot(self, snapshot: Snapshot) -> None:

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from gui.lanes.decimate import Drawn, FloatArray, thinned
 
+BAND = 0.05
+"""Residual, V, up to which the model is in step with the run."""
+
 SILENCE = 3.0
 """Times the intervals beside it from which on a pause between spikes is a silence."""
 

@@ -12,7 +12,7 @@ from gui.lanes import paint
 from gui.lanes.axis import nice_range, number
 from gui.lanes.compare import Comparison, paint_lane
 from gui.lanes.decimate import Drawn
-from gui.lanes.derive import averaged
+from gui.lanes.derive import BAND, averaged
 from gui.lanes.ground import AXIS, GUTTER, TIME_AXIS, Place, ground, row_names, rows_of
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.paint import Frame
@@ -34,7 +34,7 @@ class Options:
     """What to draw besides the measured trace."""
 
     twin: bool = True
-    band: float = 0.05
+    band: float = BAND
 
 
 class LanePainter:

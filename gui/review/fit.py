@@ -16,6 +16,7 @@ from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.derive import difference
 from gui.lanes.source import Source
 from gui.review.finding import Finding, finding
+from gui.session.agreement import Agreement
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match
@@ -76,11 +77,19 @@ class Beside:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Cards, bars, and the model's steps as (force N, peak rate Hz)."""
+    """What the steps say together, and how far the run is from the model.
+
+    Attributes:
+        cards: fitted numbers.
+        bars: one per signal.
+        model: the model's steps as (force N, peak rate Hz).
+        agreement: of V_C1; None where it was not measured or not modelled.
+    """
 
     cards: tuple[Card, ...]
     bars: tuple[Bar, ...]
     model: tuple[tuple[float, float], ...]
+    agreement: Agreement | None
 
 
 def beside(source: Source) -> Beside:
@@ -113,7 +122,16 @@ def fit(findings: Sequence[Finding], seen: Beside) -> Fit:
             _fall(steps, model),
         )
     points = tuple((f.level or 0.0, f.peak_rate or 0.0) for f in model)
-    return Fit(cards, (*_voltages(seen), *_spikes(seen)), points)
+    apart = {
+        signal: found
+        for signal, (measured, model_) in seen.voltages.items()
+        if (found := _agreement(measured, model_)) is not None
+    }
+    bars = [
+        Bar(signal, signal, min(found.error / FULL, 1.0), found.text)
+        for signal, found in apart.items()
+    ]
+    return Fit(cards, (*bars, *_spikes(seen)), points, apart.get("V_C1"))
 
 
 def _has_model(seen: Beside) -> bool:
@@ -198,17 +216,13 @@ def _fall(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
     return Card("Fall in the hold", value, text, beside)
 
 
-def _voltages(seen: Beside) -> list[Bar]:
-    """Root mean square of measured less model, over the range that was measured."""
-    made = []
-    for signal, (measured, model) in seen.voltages.items():
-        rest = difference(measured, model)
-        extent = measured.extent
-        if rest.empty or extent is None or extent[1] <= extent[0]:
-            continue
-        off = float(np.sqrt(np.mean(rest.mean**2))) / (extent[1] - extent[0])
-        made.append(Bar(signal, signal, min(off / FULL, 1.0), f"{100 * off:.1f} %"))
-    return made
+def _agreement(measured: Drawn, model: Drawn) -> Agreement | None:
+    """How well the model follows one voltage, over the range that was measured."""
+    rest, extent = difference(measured, model), measured.extent
+    if rest.empty or extent is None or extent[1] <= extent[0]:
+        return None
+    rms = float(np.sqrt(np.mean(rest.mean**2)))
+    return Agreement(rms / (extent[1] - extent[0]), rms)
 
 
 def _spikes(seen: Beside) -> list[Bar]:

@@ -28,11 +28,15 @@ class Fitting(QObject):
     def ask(self, findings: Sequence[Finding], source: Source | None) -> None:
         """Fit `findings`, and compare `source` with the model beside it."""
         self._serial += 1
-        if source is None or not findings or isinstance(source, Comparison):
+        if source is None or isinstance(source, Comparison):
             self.fitted.emit(None)
             return
         serial, steps, seen = self._serial, list(findings), beside(source)
         start(lambda: self._done.emit(serial, fit(steps, seen)), "fit")
+
+    def forget(self) -> None:
+        """A fit that is on its way no longer counts."""
+        self._serial += 1
 
     def _take(self, serial: int, found: Fit) -> None:
         if serial == self._serial:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QUrl
+from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 
 from gui.lanes.source import LiveSource, Source
 from gui.review.conclusion import conclusion_of
 from gui.review.finding import Finding, facts_of, loss_text, of_outcome, of_run
+from gui.review.fit import Fit
 from gui.review.fitting import Fitting
 from gui.review.results import ResultsView
 from tactile_lab.acquisition.events import RunState
@@ -30,6 +31,9 @@ class Gathering(QObject):
         folder: of the run on screen; None before it is on disk.
     """
 
+    agreed = Signal(object)
+    """How well the model follows now: an `Agreement`, or None if nobody knows."""
+
     def __init__(self, view: ResultsView, parent: QObject) -> None:
         super().__init__(parent)
         self.findings: list[Finding] = []
@@ -39,7 +43,7 @@ class Gathering(QObject):
         self._elsewhere = False
         self._total = 0
         self._fitting = Fitting(self)
-        self._fitting.fitted.connect(view.show_fit)
+        self._fitting.fitted.connect(self._show_fit)
 
     def begin(self, steps: int, *, fires: bool) -> None:
         """A run of so many steps begins; `fires`: its spikes are looked for."""
@@ -99,8 +103,17 @@ class Gathering(QObject):
             self._conclude(source.path)
 
     def compare_with_model(self, source: Source) -> None:
-        """The model beside a run from disk has been computed."""
+        """The run, or the model beside it, has come further."""
         self._fit(source)
+
+    def forget(self) -> None:
+        """The run is no longer on screen."""
+        self._fitting.forget()
+        self.agreed.emit(None)
+
+    def _show_fit(self, found: Fit | None) -> None:
+        self._view.show_fit(found)
+        self.agreed.emit(None if found is None else found.agreement)
 
     def _fit(self, source: Source | None) -> None:
         """Fit; with the probes elsewhere for a while there is nothing to compare."""

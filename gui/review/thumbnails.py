@@ -12,6 +12,7 @@ import numpy as np
 from PySide6.QtCore import QObject, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPolygonF
 from PySide6.QtWidgets import QWidget
+from shiboken6 import isValid
 
 from gui.lanes.decimate import FloatArray
 from gui.look.theme import Theme
@@ -98,6 +99,8 @@ class Thumbnails(QObject):
                 self._kept[folder] = thumbnail_of(folder)
             except (TactileLabError, OSError, KeyError, ValueError):
                 self._kept[folder] = None  # its card says what is wrong with it
+            if not isValid(self):  # the window has gone meanwhile
+                return
             self.made.emit(folder)
             time.sleep(PAUSE)
 

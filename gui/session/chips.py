@@ -18,6 +18,7 @@ from tactile_lab.quantity import show
 
 if TYPE_CHECKING:
     from gui.session.core import Core
+    from gui.session.expectation import Expectation
 
 NAMES = {"coil": "Coil source", "scope": "Oscilloscope", "meter": "Teslameter"}
 
@@ -34,8 +35,7 @@ def instruments(session: Core, coil: CoilView | None) -> tuple[InstrumentView, .
         elif role == "meter":
             views.append(_meter(session))
     if session.plan_on_screen is not None and session.plan_on_screen.preview.traces:
-        lamp = Lamp.ACTIVE if session.state is State.RUNNING else Lamp.GOOD
-        views.append(InstrumentView("Model", lamp, "preview in lanes", _twin(session)))
+        views.append(_model(session, session.plan_on_screen))
     return tuple(views)
 
 
@@ -114,8 +114,14 @@ def _short(identity: str) -> str:
     return " ".join(identity.split(",")[:2])
 
 
-def _twin(session: Core) -> str:
-    estimate = session.plan_on_screen
-    if estimate is None:
-        return "idle"
-    return f"{estimate.preview.spikes.size} spikes"
+def _model(session: Core, plan: Expectation) -> InstrumentView:
+    """What the model expects; beside a run, how well it follows."""
+    lamp = Lamp.ACTIVE if session.state is State.RUNNING else Lamp.GOOD
+    seen = session.agreement
+    if seen is None:
+        expected = f"{plan.preview.spikes.size} spikes expected"
+        return InstrumentView("Model", lamp, "preview in lanes", expected)
+    if not seen.in_step:
+        lamp = Lamp.WARNING
+    words = "in step" if seen.in_step else "beside the run"
+    return InstrumentView("Model", lamp, words, f"NRMSE {seen.text}")

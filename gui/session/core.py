@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import LiveSource
+from gui.session.agreement import Agreement
 from gui.session.coil import CoilWatch
 from gui.session.commands import MakePlan
 from gui.session.link import HandAfar, Link, RunAfar
@@ -64,6 +65,8 @@ class Core(QObject):
         expectation: plan of what the form asks for; None until it is computed.
         running: plan of the run in progress or the last one; None without one.
         running_request, running_title: what that was asked to do, and its name.
+        probes: what the probes touch in this trial: the circuit, or something else.
+        agreement: how well the model follows the run on screen; None if nobody knows.
         queue_held: whether the queue waits to be resumed, as it does after a STOP.
         bench_overrides: ``bench.key=value`` texts that change the connected bench.
     """
@@ -95,6 +98,7 @@ class Core(QObject):
         self.source: LiveSource | None = None
         self.outcomes: list[Outcome] = []
         self.trial: tuple[int, str] | None = None
+        self.probes = "circuit"
         self.queue: list[Queued] = []
         self.manual: HandAfar | None = None
         self.reading_field = False
@@ -116,6 +120,7 @@ class Core(QObject):
         self.running: Expectation | None = None
         self.running_request: Request | None = None
         self.running_title = ""
+        self.agreement: Agreement | None = None
         self.queue_held = False
         self._serial = 0
         self._queue_serial = 0
@@ -149,7 +154,7 @@ class Core(QObject):
         self.elapsed, self.expected = 0.0, None
         self.run_name = title
         self.running, self.running_request = expectation, request
-        self.running_title = title
+        self.running_title, self.agreement = title, None
         self._run = self.link.run(
             request, self.out, self.inbox, self.notes, report=self.reports
         )

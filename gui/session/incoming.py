@@ -139,7 +139,7 @@ class Incoming(Core):
 
     def _trial_started(self, told: events.TrialStarted) -> None:
         trial = told.trial
-        self.trial = (told.index, trial.label)
+        self.trial, self.probes = (told.index, trial.label), trial.probes
         held = None
         if trial.hold is not None:
             held = told.start + trial.hold[0], told.start + trial.hold[1]

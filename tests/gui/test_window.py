@@ -9,6 +9,7 @@ from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPushButton, QToolButton
 
+from gui.lanes.expected import PlanSource
 from gui.session.session import Queued
 from gui.state import State, Truth
 from sim_backend import serial_wires
@@ -33,6 +34,9 @@ def red_share(button: QAbstractButton) -> float:
 
 def test_ready_offers_run_and_shows_the_plan(lab) -> None:
     window = lab.window
+    lab.session.source = None  # a run that another test left on screen
+    window.setup.plan_now()
+    lab.until(lambda: isinstance(window.centre.stack.source, PlanSource))
     assert window.setup.run.isEnabled()
     assert window.header.stop.truth is Truth.OFF
     assert window.header.badge.isVisible()
