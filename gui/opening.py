@@ -22,6 +22,7 @@ from gui.session.threads import start
 from gui.showing import lanes_shown
 from gui.state import State
 from tactile_lab.errors import TactileLabError
+from tactile_lab.store.folder import DATA
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
@@ -185,7 +186,8 @@ class Opening(QObject):
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
         self.gathering.end(done, source)
-        self._records.exchange(done.folder)
+        if (done.folder / DATA).exists():  # not where it ended before the first sample
+            self._records.exchange(done.folder)
         self.list_runs()
 
     def reported(self, folder: Path) -> None:

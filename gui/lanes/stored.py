@@ -26,6 +26,10 @@ DETAILS = 4
 other, or each would be read again for ever."""
 
 
+FINEST = 1 << 17
+"""Most bins of a signal held in memory."""
+
+
 @dataclass(frozen=True, eq=False)
 class Level:
     """Bins of equal length: rows are time, least, largest, mean."""
@@ -35,10 +39,10 @@ class Level:
 
 
 class Pyramid:
-    """One stored signal at every resolution; the finest is its bins of samples."""
+    """One stored signal at several resolutions; what is finer is fetched."""
 
     def __init__(self, signal: StoredSignal) -> None:
-        whole = signal.envelope(cells=max(1, -(-len(signal) // BIN)))
+        whole = signal.envelope(cells=min(max(1, -(-len(signal) // BIN)), FINEST))
         rows = np.array([whole.time, whole.low, whole.high, whole.mean])
         self.levels = [Level(rows, typical_step(whole.time))]
         while self.levels[-1].rows.shape[1] > 4096:

@@ -165,7 +165,7 @@ class StoredSignal:
             return self._cells(start, per, 1, stop, (codes, codes, codes))
         per = -(-per // size)
         first, last = start // size, -(-stop // size)
-        bins = self._all_bins()[first:last]
+        bins = self._bins_between(first, last)
         columns = (bins["low"], bins["high"], bins["sum"])
         return self._cells(first, per, size, self._length, columns)
 
@@ -193,16 +193,24 @@ class StoredSignal:
         least, most = np.minimum(one, other), np.maximum(one, other)
         return Envelope(self.axis.time_of(starts), least, most, mean)
 
-    def _all_bins(self) -> NDArray[Any]:
-        """The pyramid, read once; what a crash kept out of it comes from samples."""
-        wanted = -(-self._length // BIN)
-        if self._bins is None or len(self._bins) < wanted:
-            bins = self._pyramid[:wanted]
-            # the last stored bin may have been short when it was written
-            have = min(max(len(bins) - 1, 0), self._length // BIN)
-            rest = pyramid_of(self.codes[have * BIN :])
-            self._bins = np.concatenate([bins[:have], rest])
-        return self._bins
+    def _bins_between(self, first: int, last: int) -> NDArray[Any]:
+        """Entries of the pyramid. A small part is read, the whole is read and kept."""
+        count = -(-self._length // BIN)
+        if self._bins is not None and len(self._bins) >= count:
+            return self._bins[first:last]
+        if last - first < count // 4:
+            return self._read_bins(first, last)
+        self._bins = self._read_bins(0, count)
+        return self._bins[first:last]
+
+    def _read_bins(self, first: int, last: int) -> NDArray[Any]:
+        """What a crash kept out of the stored pyramid comes from the samples."""
+        # the last stored bin may have been short when it was written
+        have = min(max(len(self._pyramid) - 1, 0), self._length // BIN)
+        middle = min(max(first, have), last)
+        stored = self._pyramid[first:middle]
+        rest = pyramid_of(self.codes[middle * BIN : last * BIN])
+        return np.concatenate([stored, rest])
 
 
 class Codes:

@@ -1,6 +1,7 @@
 """The window on the simulated bench, driven as a person would."""
 
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -235,6 +236,17 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     lab.until(lambda: says("spikes") == "0" and says("rate") == "0.00")
     view.show_all()
     lab.until(lambda: says("spikes") == "4" and says("force") == "0.0")
+
+
+def test_a_run_stopped_before_its_first_sample_is_no_new_problem(lab) -> None:
+    window, session = lab.window, lab.session
+    window.setup.start()
+    session.stop("at once")
+    lab.until(lambda: not session.busy and session.state is not State.ABORTING)
+    lab.until(lambda: not any(t.name == "open run" for t in threading.enumerate()))
+    lab.app.processEvents()
+    assert not window.centre.notice.isVisible(), window.centre.notice.text()
+    session.acknowledge()
 
 
 def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:

@@ -250,6 +250,24 @@ def test_envelope_shows_every_spike_at_any_zoom(bench, recorder, folder):
         assert np.all(whole.high[spikes - 1] > 3.0)
 
 
+@pytest.mark.parametrize("kept_out", [0, 3, 60])
+def test_a_part_of_the_pyramid_is_that_of_the_whole(bench, recorder, folder, kept_out):
+    """Also where a crash kept the last entries out of it."""
+    bench.play(recorder, bench.codes(60_000), 5000)
+    recorder.close("complete", 60_000)
+    with h5py.File(folder.path / "data.h5", "r+") as file:
+        pyramid = file["pyramid/V_K"]
+        pyramid.resize((len(pyramid) - kept_out,))
+    with Run.load(folder.path) as run:
+        whole = run.signal("V_K")
+        whole.envelope(cells=50)
+        for start, stop in ((0, 5120), (30_000, 40_000), (50_000, 60_000)):
+            one = run.signal("V_K").envelope(start, stop, cells=8)
+            other = whole.envelope(start, stop, cells=8)
+            for name in ("time", "low", "high", "mean"):
+                np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
 def test_xarray_has_units_and_time(bench, recorder, folder):
     pytest.importorskip("xarray")
     bench.play(recorder, bench.codes(3000), 100)
