@@ -138,6 +138,12 @@ def options(
     )
 
 
+def _mistakes(simulated: Simulated) -> tuple[SerialFault, ...]:
+    """What the scene has go wrong with the current source."""
+    when = simulated.coil_unplugged
+    return () if when is None else (SerialFault(kind="unplug", after=when, times=None),)
+
+
 def open_bench(
     scene: Scene,
     *,
@@ -171,7 +177,8 @@ def open_bench(
         row = coil_dialect(spec.coil.dialect)
         wire = row.serial.model_copy(update={"baud": spec.coil.baud or row.serial.baud})
         source = coil_far_end(plant, row, clock)
-        far_end = plug_in(source, wire, clock, "coil", coil_faults)
+        faults = (*coil_faults, *_mistakes(scene.simulated))
+        far_end = plug_in(source, wire, clock, "coil", faults)
         coil = CoilSource(
             row, far_end.url, spec.coil.limits, clock, baud=spec.coil.baud
         )

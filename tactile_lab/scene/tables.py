@@ -16,7 +16,15 @@ from pydantic import (
 )
 
 from tactile_lab.plugins import nearest
-from tactile_lab.quantity import Current, Pause, SampleRate, Unit, Voltage, parse
+from tactile_lab.quantity import (
+    Current,
+    Duration,
+    Pause,
+    SampleRate,
+    Unit,
+    Voltage,
+    parse,
+)
 from tactile_lab.signals import SIGNALS
 
 Noise = Annotated[float, Unit("V", least=0.0)]
@@ -180,6 +188,8 @@ class Simulated(Table):
         open_probes: mistake: signals whose probe is connected to nothing.
         attenuation: mistake: factor a probe divides by beyond the channel's scale.
         inverted_coil: mistake: the coil's leads are exchanged.
+        coil_unplugged: mistake: the current source's plug is pulled so long after the
+            bench is opened, s; never if left out.
     """
 
     seed: int = Field(default=1, ge=0, le=2**63 - 1)
@@ -198,6 +208,7 @@ class Simulated(Table):
     open_probes: tuple[str, ...] = ()
     attenuation: dict[str, float] = Field(default={})
     inverted_coil: bool = False
+    coil_unplugged: Duration | None = None
 
     default_noise: ClassVar[dict[str, float]] = {
         "V_C1": 5e-3,

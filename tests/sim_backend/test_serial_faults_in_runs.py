@@ -137,3 +137,13 @@ def test_a_compliance_that_is_not_taken_energises_nothing(tmp_path: Path) -> Non
     assert done.ending.exit_code == 3
     assert "-222" in (done.ending.reason or "")
     assert done.ending.off is not None and done.ending.off.verified
+
+
+def test_a_scene_has_the_plug_pulled_to_practise_on(tmp_path: Path) -> None:
+    scene = load("demo", (*OVERRIDES, 'simulated.coil_unplugged="1 s"'))
+    done = Execution(scene, tmp_path).run()
+    assert done.ending.exit_code == 4, "nobody knows what the coil does"
+    assert done.ending.off.verified is False
+    assert 0.5 < done.duration < 1.5
+    kept = load(done.folder / "scene.toml").simulated
+    assert kept.coil_unplugged == 1.0
