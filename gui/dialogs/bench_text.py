@@ -55,8 +55,9 @@ def start_choice() -> Choice:
 
 
 def show_bench(choice: Choice, spec: BenchSpec) -> None:
-    """Let `choice` start from a bench; a simulated one chooses no port."""
-    choice.name = spec.name
+    """Let `choice` start from a bench; a simulated one gives no name and no port."""
+    if not spec.simulated:
+        choice.name = spec.name
     _take_over(choice, spec.table.model_dump(by_alias=True, exclude_none=True))
 
 
@@ -94,7 +95,7 @@ def bench_text(choice: Choice) -> str:
             "dialect": choice.meter_dialect,
             "port": choice.meter_port,
         }
-    data["magnet"] = {key: value for key, value in choice.magnet.items() if value != ""}
+    data["magnet"] = {k: _typed(v) for k, v in choice.magnet.items() if v != ""}
     return to_toml(data)
 
 
@@ -149,11 +150,18 @@ def _take_over(choice: Choice, data: dict[str, Any]) -> None:
 
 def _short(text: str, symbol: str) -> str:
     """The same quantity with the prefix that makes it shortest."""
-    return exact(parse(text, symbol), symbol).replace("−", "-") if text else ""
+    return exact(parse(text, symbol), symbol).replace("Ohm", "Ω") if text else ""
+
+
+def _typed(text: Any) -> Any:
+    """A text as people type it into a file: with what a keyboard has."""
+    if not isinstance(text, str):
+        return text
+    return text.replace("−", "-").replace("Ω", "Ohm")
 
 
 def _channel(choice: Choice, row: tuple[str, str, str, str, str]) -> dict[str, Any]:
-    where, signal, full, offset, shunt = row
+    where, signal, full, offset, shunt = map(_typed, row)
     known = choice.base.get("scope", {}).get("channels", ())
     base = next((dict(one) for one in known if one["signal"] == signal), {})
     made = {**base, "signal": signal, "input": where, "range": full}

@@ -66,7 +66,7 @@ class Connect(Overlay):
         self._shown: BenchSpec | None = None
         self._running = ""
         self._ended = {WIRING: "", FIELD: ""}
-        self.instruments = Instruments(self._choice)
+        self.instruments = Instruments(self._choice, theme)
         self.wiring = Wiring(self._choice, theme)
         self.calibration = Calibrating(self._choice, theme)
         self.name = QLineEdit(self._choice.name)

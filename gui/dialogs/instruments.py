@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
+from gui.dialogs.attached import Attached
 from gui.dialogs.bench_text import BY_PERSON, Choice
-from gui.parts import column, label, line, push
+from gui.look.theme import Theme
+from gui.parts import column, label, line, push, set_role
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import attached, try_out_device
+from tactile_lab.quantity import show
 
 SCOPES = (("ps3000a", "PicoScope 3000"), ("usbtmc", "USBTMC (SCPI)"), ("", "none"))
 
@@ -29,11 +33,12 @@ class Instruments(QWidget):
     """Ports and devices with what answered; a row for each role."""
 
     found = Signal(object)
-    tested = Signal(str, str)
+    tested = Signal(str, bool, str)
 
-    def __init__(self, choice: Choice) -> None:
+    def __init__(self, choice: Choice, theme: Theme) -> None:
         super().__init__()
         self._choice = choice
+        self._looked = False
         self.scan = push("Look for instruments")
         self._what = label(
             "Ports are asked only for their name (*IDN?); nothing is set or switched "
@@ -41,7 +46,7 @@ class Instruments(QWidget):
             "muted",
             wrap=True,
         )
-        self.listing = label("", "", wrap=True)
+        self.attached = Attached(theme)
         self.coil_port, self.coil_row = self._ports("Coil source port"), QComboBox()
         self.meter_port, self.meter_row = self._ports("Teslameter port"), QComboBox()
         self.coil_row.addItems(rows_of("coil"))
@@ -54,19 +59,18 @@ class Instruments(QWidget):
         self.library = QLineEdit()
         self.library.setPlaceholderText("vendor library, if not in the usual places")
         self.test_coil, self.test_meter = push("Test"), push("Test")
+        self.answers = {"coil": label("", wrap=True), "meter": label("", wrap=True)}
         self._lay_out()
         self.meter_row.currentTextChanged.connect(self._allow)
         self.show_choice()
         self.scan.clicked.connect(self.look)
         self.found.connect(self._show_found)
-        self.tested.connect(
-            lambda role, text: self.listing.setText(f"<b>{role}</b>: {text}")
-        )
+        self.tested.connect(self._show_test)
         self.test_coil.clicked.connect(
-            lambda: self._test("coil source", self.coil_port, self.coil_row)
+            lambda: self._test("coil", self.coil_port, self.coil_row)
         )
         self.test_meter.clicked.connect(
-            lambda: self._test("teslameter", self.meter_port, self.meter_row)
+            lambda: self._test("meter", self.meter_port, self.meter_row)
         )
 
     def show_choice(self) -> None:
@@ -99,8 +103,9 @@ class Instruments(QWidget):
 
     def look(self) -> None:
         """Look for ports and devices, away from the window's thread."""
+        self._looked = self.scan.hasFocus()
         self.scan.setEnabled(False)
-        self.listing.setText("Looking …")
+        self.attached.say("Looking …")
 
         def work() -> None:
             try:
@@ -112,28 +117,22 @@ class Instruments(QWidget):
 
     def _show_found(self, found: list[dict[str, Any]] | str) -> None:
         self.scan.setEnabled(True)
+        if self._looked:  # Qt moved the focus on when the button was locked
+            self.scan.setFocus()
         if isinstance(found, str):
-            self.listing.setText(found)
+            self.attached.say(found)
             return
-        lines = []
+        self.attached.show_found(found)
         for one in found:
-            name = one["identity"] or one["problem"] or "did not answer"
-            fits = ", ".join(one["fits"])
-            lines.append(
-                f"<b>{one['address']}</b> · {one['title']}<br>{name}"
-                + (f" → <b>{fits}</b>" if fits else "")
-            )
             self._suggest(one)
-        self.listing.setText(
-            "<br>".join(lines)
-            or "No serial port and no known USB device is attached. "
-            "Ports can be written by hand, such as socket://192.168.0.7:5025."
-        )
 
     def _suggest(self, one: dict[str, Any]) -> None:
+        """Offer the port, and choose it where a role has none that it fits."""
         for port in (self.coil_port, self.meter_port):
             if one["kind"] == "serial" and port.findText(one["address"]) < 0:
+                chosen = port.currentText()
                 port.addItem(one["address"])
+                port.setCurrentText(chosen)  # Qt chooses the first item there is
         for fit in one["fits"]:
             if self.coil_row.findText(fit) >= 0 and not self.coil_port.currentText():
                 self.coil_port.setCurrentText(one["address"])
@@ -147,23 +146,25 @@ class Instruments(QWidget):
                 self.scope.setCurrentIndex(self.scope.findData(fit))
                 self.serial.setText(one["identity"] or "")
 
-    def _show_test(self, role: str, text: str) -> None:
-        self.listing.setText(f"<b>{role}</b>: {text}")
+    def _show_test(self, role: str, good: bool, text: str) -> None:
+        answer = self.answers[role]
+        set_role(answer, "muted" if good else "error")
+        answer.setText(text)
+        answer.show()
 
     def _test(self, role: str, port: QComboBox, row: QComboBox) -> None:
         address, dialect = port.currentText().strip(), row.currentText()
         if not address:
-            self.tested.emit(role, "choose or write a port first.")
+            self._show_test(role, False, "Choose or write a port first.")
             return
-        self.listing.setText(f"Asking the {role} at {address} …")
+        self._show_test(role, True, f"Asking at {address} …")
 
         def work() -> None:
             try:
                 settings = try_out_device(address, dialect)
-                words = ", ".join(f"{key} {value}" for key, value in settings.items())
-                self.tested.emit(role, f"answers. {words}")
+                self.tested.emit(role, True, f"✓ {told(settings)}")
             except (TactileLabError, OSError) as error:
-                self.tested.emit(role, str(error))
+                self.tested.emit(role, False, str(error))
 
         start(work, f"test {role}")
 
@@ -189,24 +190,43 @@ class Instruments(QWidget):
         top.addWidget(self._what, 1)
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
+        coil, meter = self.answers["coil"], self.answers["meter"]
         for row, (title, widgets) in enumerate(
             (
                 ("Coil source", (self.coil_port, self.coil_row, self.test_coil)),
+                ("", (coil,)),
                 ("Teslameter", (self.meter_port, self.meter_row, self.test_meter)),
+                ("", (meter,)),
                 ("Oscilloscope", (self.scope, self.serial)),
                 ("", (self.library,)),
             )
         ):
-            grid.addWidget(label(title, "strong"), row, 0)
+            if title:
+                grid.addWidget(label(title, "strong"), row, 0)
             for where, widget in enumerate(widgets):
                 last = where == len(widgets) - 1
                 span = 4 - len(widgets) if last else 1
                 grid.addWidget(widget, row, 1 + where, 1, max(span, 1))
+        coil.hide()
+        meter.hide()
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)
         whole = column(self, spacing=12)
         whole.addLayout(top)
-        whole.addWidget(self.listing)
+        whole.addWidget(self.attached)
         whole.addWidget(line())
         whole.addLayout(grid)
         whole.addStretch(1)
+
+
+def told(settings: Mapping[str, str]) -> str:
+    """Settings that an instrument told, as a sentence: "output off, set-point 0 A"."""
+    words = [settings.get("identity", "It answers").replace(",", ", ")]
+    for key, value in settings.items():
+        if key in ("identity", "dialect", "port"):
+            continue
+        name, _, unit = key.rpartition("_")
+        if name and unit in ("A", "V", "s", "T"):
+            key, value = name, show(float(value), unit, 3)
+        words.append(f"{key.replace('_', ' ')} {value}")
+    return " · ".join(words)

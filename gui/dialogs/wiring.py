@@ -64,7 +64,8 @@ class Wiring(QWidget):
             for where, text in enumerate(cells):
                 self.table.setItem(row, where, QTableWidgetItem(text))
         rows = max(self.table.rowCount(), 2)
-        self.table.setFixedHeight(ROW * rows + 32)
+        header = self.table.horizontalHeader().sizeHint().height()
+        self.table.setFixedHeight(ROW * rows + header + 6)
 
     def take(self) -> None:
         """Put the table into the choice."""

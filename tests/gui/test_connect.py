@@ -1,6 +1,7 @@
 """The connect dialog: discovery through the real look-up, a bench file that loads."""
 
 import json
+import os
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +25,7 @@ from gui.session.link import RunAfar
 from gui.session.messages import Errand
 from gui.session.request import Request
 from gui.state import Fault, State
+from sim_backend.serve import ServedBench
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
@@ -45,6 +47,16 @@ def test_bench_file_reads_back_as_chosen(tmp_path: Path) -> None:
         "coil_current",
     ]
     assert spec.scope.channels[3].scale == 10.0
+
+
+def test_true_minus_on_screen_and_keyboards_minus_in_the_file() -> None:
+    choice = start_choice()
+    choice.coil_port = "/dev/ttyUSB0"
+    assert choice.channels[0][3] == "−2.5 V"
+    text = bench_text(choice)
+    assert 'offset = "-2.5 V"' in text and text.isascii()
+    choice.channels[0] = (*choice.channels[0][:3], "-2.5 V", "")
+    assert bench_text(choice) == text
 
 
 def test_unused_instruments_are_left_out() -> None:
@@ -77,10 +89,48 @@ def test_look_does_not_block_and_tells_what_it_found(lab) -> None:
     dialog.instruments.scan.click()
     assert not dialog.instruments.scan.isEnabled()
     lab.until(lambda: dialog.instruments.scan.isEnabled())
-    assert dialog.instruments.listing.text() != "Looking …"
+    assert dialog.instruments.attached.told.text() != "Looking …"
     dialog.calibration.force.click()
     assert not dialog.isVisible()
     assert window.setup.kind_name == "force_check"
+
+
+def test_what_is_found_is_suggested_where_it_fits(lab) -> None:
+    page = Instruments(start_choice(), lab.window.theme)
+    nothing = {"kind": "serial", "title": "port", "identity": None, "fits": ()}
+    found = [
+        {**nothing, "address": "COM1", "problem": "nothing answered"},
+        {**nothing, "address": "COM3", "identity": "LSCI,MODEL455", "problem": None,
+         "fits": ("lakeshore-455",)},
+        {**nothing, "address": "COM4", "identity": "KEITHLEY 2420", "problem": None,
+         "fits": ("keithley-2420",)},
+    ]  # fmt: skip
+    page.found.emit(found)
+    chosen = page.take()
+    assert (chosen.coil_port, chosen.coil_dialect) == ("COM4", "keithley-2420")
+    assert (chosen.meter_port, chosen.meter_dialect) == ("COM3", "lakeshore-455")
+    assert "nothing answered" in page.attached.texts
+    page.deleteLater()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a pseudo-terminal")
+def test_instrument_is_tried_out_and_says_so_below_its_row(lab) -> None:
+    served = ServedBench(coil="pty")
+    served.start()
+    page = Instruments(start_choice(), lab.window.theme)
+    page.test_coil.click()
+    assert "port" in page.answers["coil"].text(), "nothing to ask"
+    page.coil_port.setCurrentText(served.addresses["coil"])
+    page.test_coil.click()
+    lab.until(lambda: page.answers["coil"].text().startswith("✓"))
+    assert "KEPCO" in page.answers["coil"].text()
+    assert "output off" in page.answers["coil"].text()
+    page.meter_port.setCurrentText("/dev/not-there")
+    page.test_meter.click()
+    lab.until(lambda: page.answers["meter"].property("role") == "error")
+    assert "not-there" in page.answers["meter"].text()
+    served.close()
+    page.deleteLater()
 
 
 def concluded(folder: Path, protocol: str, **more: object) -> Path:
@@ -195,7 +245,7 @@ def test_dialog_keeps_what_it_does_not_show(tmp_path: Path) -> None:
 
 def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> None:
     choice = start_choice()
-    page = Instruments(choice)
+    page = Instruments(choice, lab.window.theme)
     assert page.meter_port.isEnabled()
     page.meter_row.setCurrentText(BY_PERSON)
     assert not page.meter_port.isEnabled() and not page.test_meter.isEnabled()
@@ -203,7 +253,7 @@ def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> 
     assert spec.field_meter is not None and spec.field_meter.driver == "manual"
     again = start_choice()
     show_bench(again, spec)
-    assert Instruments(again).meter_row.currentText() == BY_PERSON
+    assert Instruments(again, lab.window.theme).meter_row.currentText() == BY_PERSON
     page.deleteLater()
 
 
