@@ -305,6 +305,7 @@ def test_cursors_are_readable_as_text(lab) -> None:
 
 def test_width_buttons_mark_what_is_seen(lab) -> None:
     view, tools = lab.window.centre.view, lab.window.centre.tools
+    view.set_now(20.0, 20.0)
     tools.widths.group.button(0).click()
     assert view.width == 1.0 and tools.widths.chosen == 0
     view.zoom(1.5)
