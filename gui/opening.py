@@ -67,7 +67,12 @@ class Opening(QObject):
         bar = panels.centre.compare_bar
         bar.changed.connect(panels.centre.stack.refresh)
         view = panels.centre.view
-        view.changed.connect(lambda: bar.look_at(view.start + view.width / 2))
+        view.changed.connect(
+            lambda: bar.look_at(
+                view.start + view.width / 2, (view.cursors or [None])[0]
+            )
+        )
+        bar.agreed.connect(lambda time: view.move_cursor(0, time))
         bar.closed.connect(self.close_run)
         panels.review.results.report_asked.connect(self.gathering.open_report)
         panels.review.export.clicked.connect(

@@ -6,7 +6,8 @@ ones and the rate lie over each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,15 +17,25 @@ from PySide6.QtGui import QPainter
 from gui.lanes import paint
 from gui.lanes.axis import nice_range
 from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.derive import averaged, rate_of, scaled
+from gui.lanes.derive import averaged, less, rate_of, scaled
 from gui.lanes.expected import Hold
 from gui.lanes.ground import Place, ground, row_names, rows_of
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.paint import Frame
+from gui.lanes.view import TimeView
 from gui.look.tokens import Tokens
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
+
+
+class Layout(Enum):
+    """How compared runs share a lane."""
+
+    STACK = "stack oscillating channels, lay slow ones over each other"
+    OVERLAY = "lay all over each other"
+    DIFFERENCE = "slow channels less those of the reference, the others stacked"
+
 
 STACKED = frozenset({"V_C2", "V_K", "spikes"})
 MARKS = ("●", "■", "▲")
@@ -45,7 +56,7 @@ class Comparison:
 
     Attributes:
         members: two or three runs, the reference first.
-        stacked: stack oscillating channels, else lay all over each other.
+        layout: how they share a lane.
     """
 
     running = False
@@ -54,7 +65,7 @@ class Comparison:
 
     def __init__(self, members: list[Member]) -> None:
         self.members = members
-        self.stacked = True
+        self.layout = Layout.STACK
 
     @property
     def first(self) -> RunSource:
@@ -91,17 +102,44 @@ class Comparison:
         """What every one of the runs stored."""
         return set.intersection(*(set(m.source.signals) for m in self.members))
 
-    def align(self, how: str, cursor: float = 0.0) -> None:
-        """Shift runs to agree at their "start" or at the "step" under `cursor`."""
+    def align(self, how: str, at: float = 0.0) -> float:
+        """Shift the runs; the reference stays.
+
+        Args:
+            how: "start"; "step": the reference's step at `at` and the same of others;
+                "cursor": what is nearest to `at` as the runs lie now, a spike or the
+                beginning of a step, whichever it is in the reference.
+            at: s.
+
+        Returns:
+            Where they agree, s.
+        """
+        if how == "cursor":
+            return self._align_nearest(at)
+        index = _index(self.first, at)
+        agreed = _start(self.first, index) if how == "step" else 0.0
+        self.members = [
+            replace(
+                member,
+                shift=agreed - _start(member.source, index) if how == "step" else 0.0,
+            )
+            for member in self.members
+        ]
+        return agreed
+
+    def _align_nearest(self, at: float) -> float:
+        events = (self.first.spikes, _starts(self.first))
+        near = [_nearest(times, at) for times in events]
+        agreed = min(near, key=lambda time: abs(time - at))
+        spike = agreed == near[0]
         moved = []
         for member in self.members:
-            shift = 0.0
-            if how == "step":
-                shift = _near(self.first, cursor, None) - _near(
-                    member.source, cursor, _index(self.first, cursor)
-                )
-            moved.append(Member(member.name, member.source, shift))
+            times = member.source.spikes if spike else _starts(member.source)
+            found = _nearest(times, at - member.shift)
+            shift = agreed - found if np.isfinite(found) else member.shift
+            moved.append(replace(member, shift=shift))
         self.members = moved
+        return agreed
 
     def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
         """Of the reference."""
@@ -134,10 +172,37 @@ class Comparison:
         for member in self.members:
             member.source.close()
 
-    def of(
+    def stacks(self, lane: Lane) -> bool:
+        """Whether the runs lie above each other in a lane."""
+        return self.layout is not Layout.OVERLAY and lane.signal in STACKED
+
+    def subtracts(self, lane: Lane) -> bool:
+        """Whether the reference is taken from the runs in a lane.
+
+        Not from the rate: that of a run is not defined at another run's spikes.
+        """
+        slow = lane.signal not in STACKED and lane.kind is not Kind.RATE
+        return self.layout is Layout.DIFFERENCE and slow
+
+    def drawn(self, lane: Lane, start: float, end: float, count: int) -> list[Drawn]:
+        """Each run's trace of a lane, in shown units and on the common time."""
+        found = [self._of(member, lane, start, end, count) for member in self.members]
+        if self.subtracts(lane):
+            grid = np.linspace(start, end, count)
+            return [less(one, found[0], grid) for one in found]
+        return found
+
+    def right_edge(self, view: TimeView) -> float:
+        """Where runs are read on the right: all at once, where all are seen to go on.
+
+        Runs of the same length end a little apart, when shifted.
+        """
+        ends = [m.source.reach + m.shift for m in self.members]
+        return min([view.end, *(e for e in ends if e > view.end - 0.1 * view.width)])
+
+    def _of(
         self, member: Member, lane: Lane, start: float, end: float, count: int
     ) -> Drawn:
-        """One run's trace of a lane, in shown units and on the common time."""
         a, b = start - member.shift, end - member.shift
         if lane.kind is Kind.RATE:
             found = rate_of(member.source.spikes, a, b, count)
@@ -145,22 +210,27 @@ class Comparison:
             found = member.source.trace(lane.signal, a, b, count)
         found = scaled(found, lane.scale)
         if member.shift and not found.empty:
-            time = found.time + member.shift
-            found = Drawn(time, found.low, found.high, found.mean, found.gap)
+            return replace(found, time=found.time + member.shift)
         return found
 
 
+def _starts(source: RunSource) -> FloatArray:
+    return np.array([hold.start for hold in source.holds])
+
+
 def _index(source: RunSource, time: float) -> int:
-    starts = np.array([hold.start for hold in source.holds] or [0.0])
-    return max(0, int(np.searchsorted(starts, time, side="right")) - 1)
+    return max(0, int(np.searchsorted(_starts(source), time, side="right")) - 1)
 
 
-def _near(source: RunSource, time: float, index: int | None) -> float:
-    holds = source.holds
-    if not holds:
-        return 0.0
-    at = _index(source, time) if index is None else index
-    return holds[min(at, len(holds) - 1)].start
+def _start(source: RunSource, index: int) -> float:
+    """Start of a step, or of the last if there are fewer, s."""
+    starts = _starts(source)
+    return float(starts[min(index, starts.size - 1)]) if starts.size else 0.0
+
+
+def _nearest(times: FloatArray, at: float) -> float:
+    """Of `times`, s, the one nearest to `at`; infinite without any."""
+    return float(times[np.argmin(np.abs(times - at))]) if times.size else float("inf")
 
 
 def paint_lane(
@@ -173,15 +243,16 @@ def paint_lane(
 ) -> tuple[tuple[float, float], list[Drawn]]:
     """Draw one lane of a comparison; the value range it used, and each run's trace."""
     count = max(50, int(frame.right - frame.left))
-    stacked = source.stacked and lane.signal in STACKED
-    drawn = [source.of(m, lane, frame.start, frame.end, count) for m in source.members]
+    stacked = source.stacks(lane)
+    drawn = source.drawn(lane, frame.start, frame.end, count)
+    least = 0.1 * lane.least if source.subtracts(lane) else lane.least
     extents = [d.extent for d in drawn if d.extent is not None]
     if lane.kind in (Kind.FORCE, Kind.RATE):
         extents.append((0.0, 0.0))
     low, high = nice_range(
         min((e[0] for e in extents), default=0.0),
         max((e[1] for e in extents), default=1.0),
-        lane.least,
+        least,
     )
     raster = lane.kind is Kind.RASTER
     whole = Frame(

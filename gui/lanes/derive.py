@@ -109,3 +109,23 @@ def difference(measured: Drawn, model: Drawn) -> Drawn:
     expected = np.divide(over, width, out=plain, where=width > 0)
     rest = measured.mean[inside] - expected
     return Drawn(time, rest, rest, rest, measured.gap[inside])
+
+
+def less(one: Drawn, other: Drawn, grid: FloatArray) -> Drawn:
+    """One trace less another at the times in `grid` at which both have data."""
+    value = _on(one, grid) - _on(other, grid)
+    known = np.isfinite(value)
+    gap = np.diff(known, prepend=False)[known]
+    return Drawn(grid[known], value[known], value[known], value[known], gap)
+
+
+def _on(drawn: Drawn, grid: FloatArray) -> FloatArray:
+    """Means at the times in `grid`; nan outside the trace and in its gaps."""
+    if drawn.empty:
+        return np.full(grid.size, np.nan)
+    after = np.searchsorted(drawn.time, grid, side="right")
+    missing = (after == 0) | ((after == drawn.time.size) & (grid > drawn.time[-1]))
+    missing |= drawn.gap[np.minimum(after, drawn.time.size - 1)] & (
+        grid < drawn.time[-1]
+    )
+    return np.where(missing, np.nan, np.interp(grid, drawn.time, drawn.mean))

@@ -244,7 +244,7 @@ class LanePainter:
         """The value at the right edge of the data in view, beside where it is."""
         if self.lane.kind in (Kind.RESIDUAL, Kind.RASTER):
             return
-        edge = right_edge(source, frame.end)
+        edge = right_edge(source, self.view)
         value = values_at(self.lane, source, edge, self.painted)[0]
         if value is None or edge < frame.start:
             return

@@ -20,6 +20,7 @@ from gui.lanes.derive import (
 )
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.source import Source
+from gui.lanes.view import TimeView
 
 NEAR = 0.02
 """Around a time out of view this much is read, s."""
@@ -40,9 +41,11 @@ def newest(lane: Lane, source: Source) -> float | None:
     return None if drawn.empty else float(drawn.mean[-1])
 
 
-def right_edge(source: Source, end: float) -> float:
+def right_edge(source: Source, view: TimeView) -> float:
     """The time that is read on the right: the view's end, or where the data end, s."""
-    return min(end, source.reach)
+    if isinstance(source, Comparison):
+        return source.right_edge(view)
+    return min(view.end, source.reach)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,20 +94,16 @@ def values_at(
     """
     inside = painted.start <= time <= painted.end and bool(painted.runs)
     before, after = time - NEAR, time + NEAR
-    if not isinstance(source, Comparison):
-        drawn = (
-            painted.runs[0]
-            if inside
-            else traces(lane, source, before, after, 100, model=False)[0]
+    if isinstance(source, Comparison):
+        drawn = painted.runs if inside else source.drawn(lane, before, after, 100)
+        return tuple(
+            _value(lane, member.source, time, time - member.shift, one)
+            for member, one in zip(source.members, drawn, strict=True)
         )
-        return (_value(lane, source, time, time, drawn),)
-    found = []
-    for at, member in enumerate(source.members):
-        drawn = (
-            painted.runs[at] if inside else source.of(member, lane, before, after, 100)
-        )
-        found.append(_value(lane, member.source, time, time - member.shift, drawn))
-    return tuple(found)
+    one = painted.runs[0] if inside else None
+    if one is None:
+        one = traces(lane, source, before, after, 100, model=False)[0]
+    return (_value(lane, source, time, time, one),)
 
 
 def _value(

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
 
 from gui.lanes.axis import number
 from gui.lanes.card import LaneCard
-from gui.lanes.compare import Comparison
+from gui.lanes.compare import MARKS, Comparison
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.plot import LanePainter, Options
@@ -150,7 +150,7 @@ class LaneRow(QFrame):
         edge of the view, as the tag has it, and of spikes how many are in view.
         """
         lane, card, view = self.lane, self.card, self._view
-        edge = right_edge(source, view.end)
+        edge = right_edge(source, view)
         if isinstance(source, Comparison):
             self._compare(source)
             return
@@ -179,6 +179,7 @@ class LaneRow(QFrame):
     def _compare(self, source: Comparison) -> None:
         """One line per run."""
         cursors = self._view.cursors
+        less = f"less {MARKS[0]}" if source.subtracts(self.lane) else ""
         if self.lane.kind is Kind.RASTER:
             low, high = sorted(cursors or (self._view.start, self._view.end))
             counts = [
@@ -187,12 +188,12 @@ class LaneRow(QFrame):
             ]
             self.card.show_runs(counts, None, "A to B" if cursors else "in view")
         elif cursors is None:
-            edge = right_edge(source, self._view.end)
-            self.card.show_runs(self._values(source, edge), None, "")
+            edge = right_edge(source, self._view)
+            self.card.show_runs(self._values(source, edge), None, less)
         else:
             a, b = (self._values(source, time) for time in cursors)
             changes = [_change(one, two) for one, two in zip(a, b, strict=True)]
-            self.card.show_runs(a, changes, "at A")
+            self.card.show_runs(a, changes, f"{less} at A".strip())
 
     def _at_cursors(self, source: Source) -> str:
         """Values at A and B and their difference."""

@@ -403,7 +403,14 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert stack.row("spikes").card.text.startswith("Spikes in view")
     window.centre.tools.toggle_cursors(True)
     lab.until(lambda: "Δ" in stack.row("V_C1").card.text)
+    at_cursor = window.centre.compare_bar.align.group.button(2)
+    window.centre.view.place_cursors(starts[0] + 0.02, 1.0)
+    at_cursor.click()
+    assert window.centre.view.cursors[0] == comparison.members[0].source.holds[0].start
     window.centre.tools.toggle_cursors(False)
+    assert not at_cursor.isEnabled(), "there is no cursor to align at"
+    window.centre.compare_bar.layout_.group.button(2).click()
+    lab.until(lambda: "less ●" in stack.row("V_C1").card.text)
     window.opening.close_run()
     assert not window.centre.compare_bar.isVisible()
     assert stack.source is session.source, "back to the last run"
