@@ -245,16 +245,23 @@ class Elided(QLabel):
 
     def __init__(self, text: str, role: str = "") -> None:
         super().__init__()
-        self.whole = text
         if role:
             self.setProperty("role", role)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.set_whole(text)
+
+    def set_whole(self, text: str) -> None:
+        """Show `text`, as far as it fits."""
+        self.whole = text
         self.setAccessibleName(text)
-        self.setText(text)
+        self._shorten()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Shorten anew."""
         super().resizeEvent(event)
+        self._shorten()
+
+    def _shorten(self) -> None:
         room, way = self.contentsRect().width(), Qt.TextElideMode.ElideRight
         self.setText(self.fontMetrics().elidedText(self.whole, way, room))
 

@@ -19,12 +19,14 @@ from gui.banner import Banner
 from gui.centre import Centre
 from gui.dialogs.closing import Closing
 from gui.dialogs.errand import ErrandCard
+from gui.dialogs.overlay import Overlay
 from gui.frames import Frames
 from gui.header.header import Header
 from gui.look.theme import Theme
 from gui.opening import Opening
 from gui.panels import Panels
 from gui.parts import column
+from gui.reading import move_on
 from gui.review.panel import ReviewPanel
 from gui.session.session import Session
 from gui.setup.panel import SetupPanel
@@ -79,7 +81,7 @@ class Window(QMainWindow):
 
     def render_state(self) -> None:
         """Render everything from the session's snapshot."""
-        snapshot = self.session.snapshot()
+        snapshot, focus = self.session.snapshot(), QApplication.focusWidget()
         self.header.render_snapshot(snapshot)
         self.banner.show_fault(snapshot.fault)
         self.setup.render_snapshot(snapshot)
@@ -93,8 +95,8 @@ class Window(QMainWindow):
         tools = self.centre.tools
         watching = self.session.monitor.alive
         tools.monitor.setEnabled(watching or snapshot.state is State.READY)
-        if QApplication.focusWidget() in self.header.minor_buttons:
-            # Qt moves the focus there when what had it is locked
+        if focus is not None and not (focus.isEnabled() and focus.isVisible()):
+            # what had it is locked or gone: Space shall not press what comes next
             self.page.setFocus()
         self._close_when_off()
 
@@ -189,6 +191,12 @@ class Window(QMainWindow):
                 side.setVisible(width >= limit)
         if width < NARROW and self.setup.isVisible():  # whatever was unfolded by hand
             self.review.setVisible(False)
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Tab goes as one reads; below an open card it reaches the header only."""
+        cards = [one for one in self.findChildren(Overlay) if one.isVisible()]
+        roots = [self.header, cards[-1]] if cards else [self.page]
+        return move_on(roots, forward=forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take the single-key shortcuts."""

@@ -69,11 +69,6 @@ class Header(QFrame):
         return [chip for chip in self._chips if not chip.isHidden()]
 
     @property
-    def minor_buttons(self) -> list[IconButton]:
-        """Picture, menu, help."""
-        return self._buttons
-
-    @property
     def menu_button(self) -> IconButton:
         """The button below which the menu opens."""
         return self._buttons[1]

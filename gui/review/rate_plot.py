@@ -58,7 +58,8 @@ class RatePlot(QWidget):
             text = (
                 "No step has fired."
                 if self._points
-                else "The rate of each step appears here."
+                else "No steps yet. Rate, onset, slope and adaptation\n"
+                "are told here, step by step, as a run goes on."
             )
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
             return

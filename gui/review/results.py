@@ -86,6 +86,7 @@ class ResultsView(QWidget):
         middle.addWidget(self._facts)
         middle.addWidget(self.report)
         stack(self, (head, page), page, spacing=9)
+        self._arrange()
 
     @property
     def mark(self) -> str:
@@ -103,6 +104,7 @@ class ResultsView(QWidget):
         ]
         self.plot.show_points(points)
         self._fill(findings)
+        self._arrange()
         self._mark.setVisible(bool(findings) or running)
         steps = f"{len(findings)} step{'' if len(findings) == 1 else 's'}"
         if running:
@@ -143,8 +145,8 @@ class ResultsView(QWidget):
     def _arrange(self) -> None:
         rates = self._fires and not self._loops
         self.loop.setVisible(self._loops)
-        for part in (self.plot, self.table):
-            part.setVisible(rates)
+        self.plot.setVisible(rates)
+        self.table.setVisible(rates and self.plot.has_points)
         if not rates:
             self.cards.hide()
         self._title.setText(

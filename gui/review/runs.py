@@ -10,19 +10,22 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFrame,
     QHBoxLayout,
+    QLabel,
     QLineEdit,
-    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
+from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import (
+    Elided,
     Segments,
     column,
     empty,
     label,
     push,
+    row,
     scrolling,
     set_role,
     stack,
@@ -55,39 +58,48 @@ class RunCard(QFrame):
         self.setProperty("role", "card")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setAccessibleName(f"{entry.title}, {entry.status}, {entry.started}")
         self.setToolTip(
-            f"{entry.title}\n{entry.folder.name}\nEnter or double click opens it"
+            f"{entry.title}\n{entry.folder.name}\nEnter or double click opens it, "
+            "Space ticks it"
         )
         self.tick = QCheckBox()
         self.tick.setAccessibleName(f"Compare {entry.folder.name}")
+        self.tick.setToolTip("Tick two or three runs to compare them")
         self.tick.toggled.connect(self.ticked)
         word, role = PILLS.get(entry.status, (entry.status, "pill"))
         first = QHBoxLayout()
-        title = label(entry.title, "strong")
-        title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        first.addWidget(title, 1)
-        first.addWidget(label(word, role))
+        first.addWidget(Elided(entry.title, "strong"), 1)
+        first.addWidget(label(word, role), 0, Qt.AlignmentFlag.AlignVCenter)
         kind = "sim" if entry.simulated else "bench"
         when = f"{entry.started} · {minutes(entry.duration)} · {kind}"
+        self._eye = QLabel()
+        self._eye.setToolTip("On screen")
+        theme.changed.connect(self._tint)
+        self._theme = theme
+        self._tint()
+        second = row()
+        second.addWidget(Elided(when, "muted"), 1)
+        second.addWidget(self._eye)
         words = QVBoxLayout()
         words.setSpacing(2)
         words.addLayout(first)
-        words.addWidget(label(when, "muted"))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(8, 7, 10, 7)
-        row.setSpacing(10)
-        row.addWidget(self.thumbnail)
-        row.addLayout(words, 1)
-        row.addWidget(self.tick)
+        words.addLayout(second)
+        whole = QHBoxLayout(self)
+        whole.setContentsMargins(8, 7, 10, 7)
+        whole.setSpacing(10)
+        whole.addWidget(self.thumbnail)
+        whole.addLayout(words, 1)
+        whole.addWidget(self.tick)
 
-    def mark(self, current: bool) -> None:
-        """Show whether this run is the one on screen."""
-        self.setStyleSheet(
-            'QFrame[role="card"] { border: 2px solid palette(highlight); }'
-            if current
-            else ""
-        )
+    def mark(self, *, chosen: bool, shown: bool) -> None:
+        """Show whether it is the chosen one, and whether it is on screen."""
+        set_role(self, "card-chosen" if chosen else "card")
+        self._eye.setVisible(shown)
+        said = f"{self.entry.title}, {self.entry.status}, {self.entry.started}"
+        self.setAccessibleName(f"{said}, on screen" if shown else said)
+
+    def _tint(self) -> None:
+        self._eye.setPixmap(pixmap("eye", self._theme.tokens.muted, 16))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Choose the run."""
@@ -165,8 +177,7 @@ class RunsView(QWidget):
     def show_current(self, folder: Path | None) -> None:
         """Mark the run on screen."""
         self._current = folder
-        for card in self.cards:
-            card.mark(card.entry.folder == folder)
+        self._choose(next((e for e in self._entries if e.folder == folder), None))
 
     def ticked(self) -> list[Entry]:
         """Runs ticked for comparison."""
@@ -194,13 +205,21 @@ class RunsView(QWidget):
             self._rows.addWidget(card)
         self._ask_thumbnails()
         if not fitting:
-            text = "No run fits." if self._entries else "No runs yet."
-            self._rows.addWidget(label(text, "muted"))
+            text = (
+                "No run fits search and filter."
+                if self._entries
+                else "No runs yet.\nThey are listed here from their first second on."
+            )
+            none = label(text, "muted", wrap=True)
+            none.setAlignment(Qt.AlignmentFlag.AlignCenter)
+            none.setContentsMargins(0, 40, 0, 0)
+            self._rows.addWidget(none)
         self._rows.addStretch(1)
         many = len(fitting)
         self._count.setText(f"{many} run{'' if many == 1 else 's'}")
-        self.show_current(self._current)
-        self._buttons()
+        listed = fitting[:SHOWN]
+        on_screen = next((e for e in listed if e.folder == self._current), None)
+        self._choose(self._chosen if self._chosen in listed else on_screen)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Pictures are made for those who look."""
@@ -217,18 +236,23 @@ class RunsView(QWidget):
             if card.entry.folder == folder:
                 card.thumbnail.show_thumbnail(self.thumbnails.of(folder))
 
-    def _choose(self, entry: Entry) -> None:
+    def _choose(self, entry: Entry | None) -> None:
         self._chosen = entry
         for card in self.cards:
-            set_role(card, "card")
-            card.mark(card.entry.folder == entry.folder)
+            shown = card.entry.folder == self._current
+            card.mark(chosen=card.entry == entry, shown=shown)
         self._buttons()
 
     def _buttons(self) -> None:
-        self.open.setEnabled(self._chosen is not None)
-        self.rerun.setEnabled(self._chosen is not None)
+        for button, words in (
+            (self.open, "Show it in the lanes (Enter)"),
+            (self.rerun, "Put its settings into the form, or into the queue"),
+        ):
+            button.setEnabled(self._chosen is not None)
+            button.setToolTip(words if self._chosen else "Choose a run first")
         many = len(self.ticked())
         self.compare.setEnabled(many in (2, 3))
         self.compare.setText(
-            f"Compare {many} runs" if many >= 2 else "Compare: tick 2 or 3"
+            f"Compare {many} runs" if many in (2, 3) else "Compare: tick 2 or 3"
         )
+        self.compare.setToolTip("Tick two or three runs to compare them")

@@ -121,7 +121,11 @@ class Field(QFrame):
         editor.setAccessibleName(parameter.title)
         editor.setAccessibleDescription(self._tip())
         editor.setToolTip(self._tip())
-        row.addWidget(editor, 1)
+        if self._check is None:
+            row.addWidget(editor, 1)
+        else:
+            row.addWidget(editor)
+            row.addStretch(1)
         if parameter.kind is Kind.FILE:
             row.addWidget(self._browse())
         whole = QVBoxLayout(self)

@@ -80,6 +80,7 @@ class PresetButton(IconButton):
     def menu_of_presets(self) -> QMenu:
         """A menu with the presets, a name for a new one, and to delete."""
         menu, shown, found = QMenu(self), self.shown(), self._presets()
+        menu.aboutToHide.connect(menu.deleteLater)
         for name, file in found.items():
             action = menu.addAction(name, partial(self.use, file))
             action.setCheckable(True)

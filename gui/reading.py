@@ -1,0 +1,66 @@
+"""The order in which Tab goes through the window: as one reads it.
+
+Qt goes by when a widget was made; forms, cards and rows are made anew all the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cmp_to_key
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QScrollArea, QWidget
+
+
+def in_reading_order(root: QWidget) -> list[QWidget]:
+    """What can take the keyboard inside `root`: row by row, each from left to right."""
+    inside = [
+        child
+        for child in root.children()
+        if isinstance(child, QWidget) and child.isVisible() and not child.isWindow()
+    ]
+    found = []
+    for child in sorted(inside, key=cmp_to_key(_compared)):
+        if _takes_keyboard(child):
+            found.append(child)
+        found += in_reading_order(child)
+    return found
+
+
+def move_on(roots: Iterable[QWidget], *, forward: bool) -> bool:
+    """Give the keyboard to the next widget in `roots`, or the one before it."""
+    order = [widget for root in roots for widget in in_reading_order(root)]
+    if not order:
+        return False
+    now = QApplication.focusWidget()
+    if now in order:
+        following = order[(order.index(now) + (1 if forward else -1)) % len(order)]
+    else:
+        following = order[0 if forward else -1]
+    tab, back = Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason
+    following.setFocus(tab if forward else back)
+    _reveal(following)
+    return True
+
+
+def _takes_keyboard(widget: QWidget) -> bool:
+    by_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
+    return by_tab and widget.isEnabled() and widget.focusProxy() is None
+
+
+def _compared(one: QWidget, other: QWidget) -> int:
+    """Below zero where `one` is read before `other`."""
+    a, b = one.geometry(), other.geometry()
+    shared = min(a.bottom(), b.bottom()) - max(a.top(), b.top())
+    if shared > min(a.height(), b.height()) / 2:  # they stand in one row
+        return a.left() - b.left()
+    return a.top() - b.top()
+
+
+def _reveal(widget: QWidget) -> None:
+    """Scroll to a widget."""
+    area = widget.parentWidget()
+    while area is not None:
+        if isinstance(area, QScrollArea):
+            area.ensureWidgetVisible(widget, 0, 8)
+        area = area.parentWidget()
