@@ -57,9 +57,14 @@ def told(applied: AppliedCurrent) -> tuple[str, ...]:
 
 
 def force_of(scene: Scene, current: NDArray[np.float64], end: float) -> Waveform:
-    """Force the applied current gives: each set-point holds until the next."""
+    """Force the applied current gives: each set-point holds until the next.
+
+    Before the first one the coil carries nothing: a run begins with the coil off.
+    """
     if len(current) == 0:
         return Waveform.constant(0.0)
+    if current[0, 0] > 0:  # the first may come late, and be no small one
+        current = np.concatenate([[[0.0, 0.0]], current])
     time, amperes = current[:, 0], current[:, 1]
     steps = np.repeat(time, 2)[1:]
     held = np.repeat(amperes, 2)[:-1]
