@@ -1,89 +1,41 @@
 """Pictures of the window in each state: ``python -m gui.screenshots [FOLDER]``.
 
 Drives the window on the simulated bench as a person would; offscreen unless a platform
-is given. Runs take real time, so this needs about two minutes.
+is given. Runs take real time, so this needs about three minutes.
 """
 
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 import tempfile
-import time
-from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 
-os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 
-from PySide6.QtGui import QPixmap
-from PySide6.QtWidgets import QApplication, QWidget
-
-from gui.app import application, begin
 from gui.dialogs.connect import Connect
-from gui.dialogs.overlay import Overlay
-from gui.look.theme import Theme
-from gui.session.session import Session
+from gui.staging import SIZE, Stage, instruments_attached
 from gui.state import State
-from gui.window import Window
 
-SIZE = (1720, 1080)
-
-
-class Stage:
-    """A window and the means to wait for it."""
-
-    def __init__(self, folder: Path, out: Path, bench: str | None) -> None:
-        self.app: QApplication = application([])
-        self.theme = Theme("light")
-        self.theme.apply()
-        # in this process, where a plug can be pulled
-        self.session = Session(out, separate=False)
-        self.window = Window(self.session, self.theme)
-        self.window.resize(*SIZE)
-        self.window.show()
-        self.folder = folder
-        self.taken: dict[str, QPixmap] = {}
-        begin(self.window, None, bench)
-
-    def until(self, done: Callable[[], bool], longest: float = 60.0) -> None:
-        """Let the window live until `done()`."""
-        end = time.monotonic() + longest
-        while not done() and time.monotonic() < end:
-            self.app.processEvents()
-            time.sleep(0.004)
-
-    def live(self, seconds: float) -> None:
-        """Let the window live for so long."""
-        end = time.monotonic() + seconds
-        self.until(lambda: time.monotonic() > end, seconds + 1)
-
-    def shoot(
-        self, name: str, theme: str = "light", widget: QWidget | None = None
-    ) -> None:
-        """Save a picture."""
-        if self.theme.choice != theme:
-            self.theme.choose(theme)
-        self.live(0.15)
-        self.taken[name] = (widget or self.window).grab()
-        if not self.session.busy:  # compressing would starve a run in progress
-            self.save()
-
-    def save(self) -> None:
-        """Write the pictures taken since the last time."""
-        for name, picture in self.taken.items():
-            file = self.folder / f"{name}.png"
-            picture.save(str(file))
-            print(file, flush=True)
-        self.taken.clear()
-
-    def ready(self) -> None:
-        """Wait for bench and plan."""
-        session = self.session
-        self.until(
-            lambda: session.state is State.READY and session.expectation is not None
-        )
-        self.live(0.4)
+READ_BY_A_PERSON = """
+name = "read by a person"
+simulated = true
+[coil]
+baud = 19200
+[field_meter]
+driver = "manual"
+[scope]
+driver = "ps3000a"
+[[scope.channels]]
+signal = "coil_current"
+input = "D"
+range = "200 mV"
+shunt = "0.1 Ohm"
+[magnet]
+r = "6 mm"
+"""
 
 
 def main(folder: Path) -> None:
@@ -92,16 +44,25 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     # the log names the runs folder: a relative one says nothing of this computer
     with tempfile.TemporaryDirectory() as home, contextlib.chdir(home):
-        stage = Stage(folder, Path("runs"), None)
+        stage = Stage(folder, None)
         stage.until(lambda: stage.session.expectation is not None)
         stage.shoot("window_first_start")
         stage.session.connect_bench("sim")
-        stage.ready()
+        stage.planned()
         stage.shoot("window_ready")
-        _run(stage)
-        _after(stage)
-        stage.save()
-        stage.window.close()
+        for scene in (
+            _run,
+            _after,
+            _manual,
+            _dialogs,
+            _wiring,
+            _compare,
+            _monitor,
+            _unplugged,
+        ):
+            scene(stage)
+        stage.close()
+        _read_by_a_person(folder)
 
 
 def _run(stage: Stage) -> None:
@@ -114,62 +75,54 @@ def _run(stage: Stage) -> None:
     stage.shoot("window_close_light")
     window.closing.keep.click()
     stage.theme.choose("dark")
-    stage.until(lambda: session.source is None or session.source.reach > 15.4)
+    stage.until(lambda: session.source is not None and session.source.reach > 15.4)
     stage.shoot("window_running_dark", "dark")
     stage.theme.choose("light")
     session.unqueue(0)
-    stage.until(lambda: not session.busy, 30)
-    session.acknowledge()
-    if not window.opening.ending.startswith("complete"):
-        _complete(stage)
-    stage.live(1.0)
-
-
-def _complete(stage: Stage) -> None:
-    """A whole run; taking pictures starves the simulated bench, so try again."""
-    session = stage.session
-    for _ in range(4):
-        stage.window.setup.start()
-        stage.until(lambda: session.state is State.RUNNING, 5)
-        stage.until(lambda: not session.busy, 40)
-        stage.live(0.3)
-        session.acknowledge()
-        if stage.window.opening.ending.startswith("complete"):
-            return
+    stage.ended()
 
 
 def _after(stage: Stage) -> None:
-    window, session = stage.window, stage.session
+    window = stage.window
     window.page.setFocus()
     window.centre.view.show_all()
     window.centre.tools.widths.choose(3)
     window.centre.tools.toggle_cursors(True)
-    stage.until(window.review.results.report.isVisible, 30)
+    stage.until(window.review.results.report.isVisible)
     stage.shoot("window_complete")
     window.review.show_tab(1)
     window.opening.list_runs()
-    stage.live(0.5)
-    cards = window.review.runs.cards
-    if cards:
-        window.opening.open_run(cards[0].entry.folder)
-        stage.until(lambda: window.opening.run is not None and
-                    window.opening.run.model is not None)  # fmt: skip
-        window.centre.view.show_span(9.2, 0.6)
-        stage.live(0.4)
-        stage.shoot("window_old_run")
-        window.opening.close_run()
+    stage.until(lambda: window.review.runs.cards)
+    window.opening.open_run(window.review.runs.cards[0].entry.folder)
+    stage.live(1.0)
+    stage.until(lambda: getattr(window.opening.run, "model", None) is not None)
+    window.centre.view.show_span(9.2, 0.6)
+    stage.live(0.4)
+    stage.shoot("window_old_run")
+    window.opening.close_run()
+
+
+def _manual(stage: Stage) -> None:
+    """The coil at 250 mA, typed and set as a person does."""
+    window, session = stage.window, stage.session
+    panel = window.review.manual
     window.review.show_tab(2)
-    session.begin_manual()
-    stage.until(lambda: session.manual is not None, 60)
-    stage.live(1.5)
-    window.review.manual.set_asked.emit(0.25)
-    stage.live(2.0)
-    session.read_field()
-    stage.until(lambda: not session.reading_field, 20)
-    stage.live(0.3)
+    panel.begin.click()
+    stage.until(lambda: session.manual is not None and session.manual.coil is not None)
+    panel.current.selectAll()
+    QTest.keyClicks(panel.current, "250 mA")
+    panel.set.click()
+    stage.until(lambda: panel.now == "250 mA")
+    panel.read.click()
+    stage.until(lambda: not session.reading_field)
+    stage.live(0.5)
     stage.shoot("window_manual")
-    session.stop("picture taken")
+    window.header.stop.click()
     stage.until(lambda: session.manual is None)
+
+
+def _dialogs(stage: Stage) -> None:
+    window = stage.window
     window.resize(1180, 720)
     stage.live(0.2)
     stage.shoot("window_small_dark", "dark")
@@ -177,51 +130,47 @@ def _after(stage: Stage) -> None:
     stage.theme.choose("light")
     window.actions_.show_help()
     stage.shoot("window_help")
-    _close_overlays(window)
-    window.actions_.connect_dialog()
-    stage.shoot("window_connect")
-    _close_overlays(window)
-    _wiring(stage)
-    _compare(stage)
-    _monitor(stage)
-    _unplugged(stage)
+    stage.close_overlays()
+    with instruments_attached():
+        page = _connect(stage).instruments
+        page.scan.click()
+        stage.until(page.scan.isEnabled)
+        page.test_coil.click()
+        page.test_meter.click()
+        stage.until(
+            lambda: all(x.text().startswith("✓") for x in page.answers.values())
+        )
+        stage.shoot("window_connect")
+    stage.close_overlays()
 
 
-def _close_overlays(window: Window) -> None:
-    for overlay in window.findChildren(Overlay):
-        overlay.hide()
+def _connect(stage: Stage) -> Connect:
+    stage.window.actions_.connect_dialog()
+    dialog = stage.window.findChild(Connect)
+    assert isinstance(dialog, Connect)
+    return dialog
 
 
 def _wiring(stage: Stage) -> None:
     """The wiring check from its page, with its verdicts."""
-    window, session = stage.window, stage.session
-    window.actions_.connect_dialog()
-    dialog = window.findChild(Connect)
-    assert isinstance(dialog, Connect)
+    dialog = _connect(stage)
     dialog.show_page(1)
     dialog.wiring.check.click()
-    stage.until(lambda: session.state is State.RUNNING, 10)
-    stage.until(lambda: not session.busy, 40)
-    stage.until(lambda: bool(dialog.wiring.verdicts), 30)
+    stage.until(lambda: stage.session.state is State.RUNNING)
+    stage.ended()
+    stage.until(lambda: dialog.wiring.verdicts)
     stage.shoot("window_wiring")
-    _close_overlays(window)
-    session.acknowledge()
-    window.opening.open_scene(None)
-    session.expectation = None
-    window.setup.plan_now()
-    stage.until(lambda: session.expectation is not None)
+    stage.close_overlays()
+    stage.window.opening.open_scene(None)
 
 
 def _compare(stage: Stage) -> None:
     """Two shorter runs beside the first."""
-    window, session = stage.window, stage.session
+    window = stage.window
     for levels in ("80, 120, 160, 180 mN", "90, 130, 170, 200 mN"):
+        window.opening.close_run()
         window.setup.form.field("levels").set_text(levels)
-        session.expectation = None
-        window.setup.plan_now()
-        stage.until(lambda: session.expectation is not None)
-        stage.live(0.2)
-        _complete(stage)
+        stage.run()
     window.setup.form.reset()
     window.opening.list_runs()
     stage.live(0.6)
@@ -244,11 +193,7 @@ def _monitor(stage: Stage) -> None:
     window, session = stage.window, stage.session
     window.review.show_tab(1)
     session.watch(True)
-    stage.until(
-        lambda: (
-            session.monitor.source is not None and session.monitor.source.reach > 6.0
-        )
-    )
+    stage.until(lambda: (seen := session.monitor.source) and seen.reach > 6.0)
     stage.shoot("window_monitor")
     session.watch(False)
     stage.until(lambda: not session.monitor.alive)
@@ -256,23 +201,35 @@ def _monitor(stage: Stage) -> None:
 
 def _unplugged(stage: Stage) -> None:
     """Pull the coil's plug in a run: the fault, and a coil nobody knows about."""
-    from sim_backend import serial_wires
-    from sim_backend.faults import SerialFault
-
-    window, session = stage.window, stage.session
-    session.expectation = None
-    window.setup.plan_now()
-    stage.until(lambda: session.expectation is not None)
-    stage.live(0.3)
-    window.setup.start()
-    stage.until(lambda: session.source is not None and session.source.reach > 6.5)
-    wires = serial_wires.__dict__["_far_ends"]
-    coil = [far for name, far in wires.items() if "coil" in name][-1]
-    coil.faults.add(SerialFault(kind="unplug", times=None))
-    stage.until(lambda: session.state is State.FAULT)
+    demo = (resources.files("protocols") / "scenes" / "demo.toml").read_text()
+    Path("demo.toml").write_text(f'{demo}\n[simulated]\ncoil_unplugged = "7 s"\n')
+    stage.window.opening.open_scene("demo.toml")
+    stage.planned()
+    stage.window.setup.start()
+    stage.until(lambda: stage.session.state is State.FAULT)
     stage.live(0.3)
     stage.shoot("window_fault_dark", "dark")
     stage.shoot("window_fault_light")
+
+
+def _read_by_a_person(folder: Path) -> None:
+    """The run asks for the field; as fast as it computes, for it takes a minute."""
+    Path("bench.toml").write_text(READ_BY_A_PERSON)
+    stage = Stage(folder, "bench.toml", "calibrate_field", realtime=False)
+    session, card = stage.session, stage.window.errand
+    stage.until(lambda: session.state is State.READY)
+    stage.planned()
+    stage.window.setup.start()
+    for field in ("10.83", "9.75", "8.66"):
+        stage.until(card.isVisible)
+        QTest.keyClicks(card.entry, field)
+        if field != "8.66":
+            QTest.keyClick(card.entry, Qt.Key.Key_Return)
+            stage.until(lambda: session.errand is not None)
+    stage.shoot("window_field")
+    card.stop.click()
+    stage.until(lambda: not session.busy)
+    stage.close()
 
 
 if __name__ == "__main__":

@@ -117,6 +117,11 @@ class ManualView(QWidget):
         words = "not read" if field is None else show(round(field, 6), "T", 4)
         self._field.setText("reading …" if reading else words)
 
+    @property
+    def now(self) -> str:
+        """The current as it was read back last."""
+        return self._now.text()
+
     def follow(self, asked: float) -> None:
         """Show what was asked of the coil, A, unless somebody is about to ask anew."""
         edited = self.current.isModified() or self.current.hasFocus()

@@ -1,0 +1,163 @@
+"""A window to be pictured, and what is attached to the computer it is pictured on."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PySide6.QtWidgets import QApplication
+from serial.tools.list_ports_common import ListPortInfo
+
+from drivers.usb_presence import PICO, Present
+from gui.app import application, begin
+from gui.dialogs.overlay import Overlay
+from gui.look.theme import Theme
+from gui.session.session import Session
+from gui.state import State
+from gui.window import Window
+
+SIZE = (1720, 1080)
+
+ADAPTERS = (
+    ("coil", "USB-Serial Controller", 0x067B, 0x2303),
+    ("teslameter", "CP2102 USB to UART Bridge", 0x10C4, 0xEA60),
+)
+SCOPE = Present(
+    vendor=PICO,
+    product=0x1012,
+    bus=2,
+    address=5,
+    speed=4,
+    title="PicoScope 3404D",
+    serial="SIM04/0001",
+    usbtmc=False,
+    readable=True,
+)
+
+
+class Stage:
+    """A window on a bench and the means to wait for it.
+
+    Args:
+        folder: for the pictures.
+        bench: as for `gui.app.begin`.
+        scene: the same.
+        realtime: pace the simulated bench by the wall clock.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        bench: str | None,
+        scene: str | None = None,
+        *,
+        realtime: bool = True,
+    ) -> None:
+        self.app: QApplication = application([])
+        self.theme = Theme("light")
+        self.theme.apply()
+        self.session = Session(Path("runs"), realtime=realtime)
+        self.window = Window(self.session, self.theme)
+        self.window.resize(*SIZE)
+        self.window.show()
+        self.folder = folder
+        begin(self.window, scene, bench)
+
+    def until(self, done: Callable[[], object], longest: float = 90.0) -> None:
+        """Let the window live until `done()`.
+
+        Raises:
+            SystemExit: it never was; the last lines of the log say why.
+        """
+        end = time.monotonic() + longest
+        while not done():
+            if time.monotonic() > end:
+                raise SystemExit("\n".join(x.text for x in self.session.lines[-8:]))
+            self.app.processEvents()
+            time.sleep(0.004)
+
+    def live(self, seconds: float) -> None:
+        """Let the window live for so long."""
+        end = time.monotonic() + seconds
+        self.until(lambda: time.monotonic() > end, seconds + 60)
+
+    def shoot(self, name: str, theme: str = "light") -> None:
+        """Save a picture."""
+        if self.theme.choice != theme:
+            self.theme.choose(theme)
+        self.live(0.15)
+        file = self.folder / f"{name}.png"
+        self.window.grab().save(str(file))
+        print(file, flush=True)
+
+    def planned(self) -> None:
+        """Wait for bench and plan."""
+        session = self.session
+        session.expectation = None
+        self.window.setup.plan_now()
+        self.until(lambda: session.expectation and session.state is State.READY)
+        self.live(0.4)
+
+    def run(self) -> None:
+        """A whole run of what the form shows, to its report."""
+        session = self.session
+        self.planned()
+        self.window.setup.start()
+        self.until(lambda: session.state is State.RUNNING)
+        self.ended()
+
+    def ended(self) -> None:
+        """Wait for the end of the run in progress, which must be complete."""
+        self.until(lambda: not self.session.busy)
+        self.live(0.5)
+        if not self.window.opening.ending.startswith("complete"):
+            raise SystemExit(f"The run was not completed: {self.session.fault}")
+
+    def close_overlays(self) -> None:
+        """Close every card above the window."""
+        for overlay in self.window.findChildren(Overlay):
+            overlay.hide()
+
+    def close(self) -> None:
+        """Close the window and end its engine."""
+        self.window.close()
+        self.session.close()
+
+
+@contextmanager
+def instruments_attached() -> Iterator[None]:
+    """A source and a teslameter at serial ports, and a scope at the USB, for a while.
+
+    Both are served on pseudo-terminals, which no computer lists as its ports.
+    """
+    serving = subprocess.Popen(
+        [sys.executable, "-m", "tactile_lab", "serve-bench", "--json"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert serving.stdout is not None
+    served = json.loads(serving.stdout.readline())
+    ports = []
+    for name, title, vendor, product in ADAPTERS:
+        port = ListPortInfo(served[name])
+        port.description, port.vid, port.pid = title, vendor, product
+        ports.append(port)
+    try:
+        with (
+            patch("serial.tools.list_ports.comports", return_value=ports),
+            patch("drivers.attached.present", return_value=(SCOPE,)),
+        ):
+            yield
+    finally:
+        serving.terminate()
+        serving.wait()
+        serving.stdout.close()
