@@ -128,7 +128,8 @@ class CoilThread(InstrumentThread):
             self.failure = self.failure or failure
 
     def _called(self) -> bool:
-        return self._leaving or self._stop.requested or self._energise
+        due = self._waveform is not None and self.clock.now() >= self._next
+        return due or self._leaving or self._stop.requested or self._energise
 
     def _wake(self) -> float:
         pulse = self.clock.now() + 0.1
