@@ -10,12 +10,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtWidgets import QApplication
-from serial.tools.list_ports_common import ListPortInfo
 
 from drivers.usb_presence import PICO, Present
 from gui.app import application, begin
@@ -27,10 +27,17 @@ from gui.window import Window
 
 SIZE = (1720, 1080)
 
-ADAPTERS = (
-    ("coil", "USB-Serial Controller", 0x067B, 0x2303),
-    ("teslameter", "CP2102 USB to UART Bridge", 0x10C4, 0xEA60),
-)
+
+class Port(NamedTuple):
+    """A serial port as the system lists it."""
+
+    device: str
+    description: str
+    vid: int
+    pid: int
+    serial_number: str = ""
+
+
 SCOPE = Present(
     vendor=PICO,
     product=0x1012,
@@ -146,11 +153,10 @@ def instruments_attached() -> Iterator[None]:
     )
     assert serving.stdout is not None
     served = json.loads(serving.stdout.readline())
-    ports = []
-    for name, title, vendor, product in ADAPTERS:
-        port = ListPortInfo(served[name])
-        port.description, port.vid, port.pid = title, vendor, product
-        ports.append(port)
+    ports = [
+        Port(served["coil"], "USB-Serial Controller", 0x067B, 0x2303),
+        Port(served["teslameter"], "CP2102 USB to UART Bridge", 0x10C4, 0xEA60),
+    ]
     try:
         with (
             patch("serial.tools.list_ports.comports", return_value=ports),
