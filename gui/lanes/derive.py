@@ -97,7 +97,7 @@ def difference(measured: Drawn, model: Drawn) -> Drawn:
     """
     if measured.empty or model.time.size < 2:
         return Drawn.nothing()
-    inside = measured.time <= model.time[-1]
+    inside = (measured.time >= model.time[0]) & (measured.time <= model.time[-1])
     time = measured.time[inside]
     step = np.diff(measured.time, append=np.inf)
     typical = float(np.median(step[:-1])) if step.size > 1 else 0.0

@@ -25,6 +25,9 @@ from gui.look.tokens import Tokens
 DOTS = 160
 """Most rate markers drawn; more would be a smear and slow."""
 
+APART = 5
+"""Pixels from which on samples are marked one by one."""
+
 NAMES = 14
 """Height at the top lane's top that is left free for the names of holds, px."""
 
@@ -167,16 +170,24 @@ class LanePainter:
         else:
             paint.trace(painter, frame, twin, paint.pen(tokens.twin))
             paint.trace(painter, frame, measured, paint.pen(colour))
-        if kind is Kind.RATE:
-            inside = (measured.time >= frame.start) & (measured.time <= frame.end)
-            if 0 < np.count_nonzero(inside) <= DOTS:
-                x, y = measured.time[inside], measured.low[inside]
-                paint.dots(painter, frame.x(x), frame.y(y), colour)
+        if kind in (Kind.RATE, Kind.TRACE):
+            self._dots(painter, frame, measured, colour)
         if source.running and frame.start <= source.reach <= frame.end:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
             at = round(frame.x1(source.reach)) + 0.5
             painter.setPen(paint.pen(tokens.border_strong))
             painter.drawLine(QPointF(at, 0), QPointF(at, frame.bottom + 3))
+
+    def _dots(
+        self, painter: QPainter, frame: Frame, measured: Drawn, colour: str
+    ) -> None:
+        """Mark rates, and samples where they lie apart: between them nobody looked."""
+        inside = (measured.time >= frame.start) & (measured.time <= frame.end)
+        inside &= measured.low == measured.high
+        x, y = frame.x(measured.time[inside]), frame.y(measured.mean[inside])
+        rates = self.lane.kind is Kind.RATE and x.size <= DOTS
+        if rates or (x.size > 1 and np.diff(x).min() >= APART):
+            paint.dots(painter, x, y, colour)
 
     def _plan(
         self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens

@@ -48,3 +48,9 @@ def test_what_the_model_does_not_reach_is_left_out() -> None:
         half.gap[known],
     )
     assert difference(whole, half).time[-1] <= 5.0
+
+
+def test_what_is_before_the_model_is_left_out() -> None:
+    rest = difference(seen(0.0, 500, 3.0), seen(2.0, 500, 3.0))
+    assert rest.time[0] >= 2.0
+    assert np.abs(rest.mean[: rest.time.size // 2]).max() < 1.1
