@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QFileDialog
 
 from gui.lanes.card import CARD
 from gui.lanes.derive import rate_of
+from gui.lanes.expected import starts
 from gui.lanes.lane import Kind
 from gui.lanes.row import LaneRow
 from gui.lanes.stack import LaneStack
@@ -165,7 +166,8 @@ def table(stack: LaneStack, title: str) -> str:
             columns.append(("spikes_s", source.spikes[first:last]))
             continue
         if lane.kind is Kind.RATE:
-            drawn = rate_of(source.spikes, view.start, view.end, 1 << 20)
+            steps = starts(source.holds)
+            drawn = rate_of(source.spikes, view.start, view.end, 1 << 20, steps)
         else:
             drawn = source.trace(lane.signal, view.start, view.end, CSV_POINTS)
         unit = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}.get(

@@ -18,7 +18,7 @@ from gui.lanes import paint
 from gui.lanes.axis import nice_range
 from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.derive import averaged, less, rate_of, scaled
-from gui.lanes.expected import Hold
+from gui.lanes.expected import Hold, starts
 from gui.lanes.ground import Place, ground, row_names, rows_of
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.paint import Frame
@@ -128,13 +128,13 @@ class Comparison:
         return agreed
 
     def _align_nearest(self, at: float) -> float:
-        events = (self.first.spikes, _starts(self.first))
+        events = (self.first.spikes, starts(self.first.holds))
         near = [_nearest(times, at) for times in events]
         agreed = min(near, key=lambda time: abs(time - at))
         spike = agreed == near[0]
         moved = []
         for member in self.members:
-            times = member.source.spikes if spike else _starts(member.source)
+            times = member.source.spikes if spike else starts(member.source.holds)
             found = _nearest(times, at - member.shift)
             shift = agreed - found if np.isfinite(found) else member.shift
             moved.append(replace(member, shift=shift))
@@ -205,7 +205,8 @@ class Comparison:
     ) -> Drawn:
         a, b = start - member.shift, end - member.shift
         if lane.kind is Kind.RATE:
-            found = rate_of(member.source.spikes, a, b, count)
+            steps = starts(member.source.holds)
+            found = rate_of(member.source.spikes, a, b, count, steps)
         else:
             found = member.source.trace(lane.signal, a, b, count)
         found = scaled(found, lane.scale)
@@ -214,18 +215,14 @@ class Comparison:
         return found
 
 
-def _starts(source: RunSource) -> FloatArray:
-    return np.array([hold.start for hold in source.holds])
-
-
 def _index(source: RunSource, time: float) -> int:
-    return max(0, int(np.searchsorted(_starts(source), time, side="right")) - 1)
+    return max(0, int(np.searchsorted(starts(source.holds), time, side="right")) - 1)
 
 
 def _start(source: RunSource, index: int) -> float:
     """Start of a step, or of the last if there are fewer, s."""
-    starts = _starts(source)
-    return float(starts[min(index, starts.size - 1)]) if starts.size else 0.0
+    found = starts(source.holds)
+    return float(found[min(index, found.size - 1)]) if found.size else 0.0
 
 
 def _nearest(times: FloatArray, at: float) -> float:

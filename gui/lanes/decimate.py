@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-HOLDS = 0.05
-"""How long the last point of a trace is good for at least, s."""
+HOLDS = 0.01
+"""How long the last value of a record is good for, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,19 +58,26 @@ class Drawn:
     def at(self, time: float) -> float | None:
         """The mean at a time, s; None outside the points and in a gap.
 
-        The last point holds as long as a column is wide, at least `HOLDS`.
+        The last point before either holds for two columns; the last of all for `HOLDS`
+        at least, for a record may end so much before its run.
         """
         after = int(np.searchsorted(self.time, time, side="right"))
         if after == 0:
             return None
-        last = after == self.time.size
-        if last or self.gap[after]:
-            before = max(after - 2, 0)
-            width = 1.5 * float(self.time[after - 1] - self.time[before])
-            if time - self.time[after - 1] > (max(width, HOLDS) if last else width):
+        if after == self.time.size or self.gap[after]:
+            late = time - float(self.time[after - 1])
+            least = HOLDS if after == self.time.size else 0.0
+            if late > max(2 * self.column, least):
                 return None
             return float(self.mean[after - 1])
         return float(np.interp(time, self.time, self.mean))
+
+    @property
+    def column(self) -> float:
+        """Usual time from one point to the next, s; 0 below two points."""
+        # np.median loads masked arrays when first called, in the midst of a frame
+        steps = np.sort(np.diff(self.time))
+        return float(steps[steps.size // 2]) if steps.size else 0.0
 
 
 def columns(rows: FloatArray, count: int, width: float) -> Drawn:

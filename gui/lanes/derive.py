@@ -31,12 +31,20 @@ def averaged(drawn: Drawn) -> Drawn:
     return Drawn(drawn.time, drawn.mean, drawn.mean, drawn.mean, drawn.gap)
 
 
-def begins(spikes: FloatArray) -> NDArray[np.bool_]:
+NEVER = np.empty(0)
+
+
+def begins(spikes: FloatArray, steps: FloatArray = NEVER) -> NDArray[np.bool_]:
     """Which spikes begin a stretch of firing: the first, and those after a silence.
 
     The pause before such a spike is no interval of a train and gives no rate. A pause
-    is a silence where it is longer than `LEAST_SILENCE` and than `SILENCE` times the
-    shorter of the intervals beside it: slow but regular firing is none.
+    is a silence where it is longer than `LEAST_SILENCE` and a step of the run began
+    in it, or it is longer than `SILENCE` times the shorter of the intervals beside it.
+    So slow but regular firing is none, and neither is firing on from step to step.
+
+    Args:
+        spikes: times, ascending, s.
+        steps: when the steps of the run begin, ascending, s.
     """
     first = np.ones(spikes.size, np.bool_)
     if spikes.size > 1:
@@ -45,11 +53,19 @@ def begins(spikes: FloatArray) -> NDArray[np.bool_]:
         beside[1:-1] = between
         usual = np.minimum(beside[:-2], beside[2:])
         usual[np.isinf(usual)] = 0.0
-        first[1:] = between > np.maximum(SILENCE * usual, LEAST_SILENCE)
+        parted = np.diff(np.searchsorted(steps, spikes, side="right")) > 0
+        silent = parted | (between > SILENCE * usual)
+        first[1:] = silent & (between > LEAST_SILENCE)
     return first
 
 
-def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
+def rate_of(
+    spikes: FloatArray,
+    start: float,
+    end: float,
+    count: int,
+    steps: FloatArray = NEVER,
+) -> Drawn:
     """Instantaneous rate, Hz, at each spike around [start, end] s: 1/ISI.
 
     The spike that begins a stretch of firing has no point; the next begins a new line.
@@ -61,7 +77,7 @@ def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
     times = spikes[low:high]
     if times.size < 2:
         return Drawn.nothing()
-    begun = begins(times)[1:]
+    begun = begins(times, steps)[1:]
     rate = 1 / np.maximum(np.diff(times), 1e-9)
     fresh = np.append(True, begun[:-1])
     wanted = ~begun
@@ -70,7 +86,7 @@ def rate_of(spikes: FloatArray, start: float, end: float, count: int) -> Drawn:
     return thinned(times[1:][wanted], rate[wanted], fresh[wanted], count)
 
 
-def rate_at(spikes: FloatArray, time: float) -> float | None:
+def rate_at(spikes: FloatArray, time: float, steps: FloatArray = NEVER) -> float | None:
     """The rate at `time` s as an observer tells it, Hz.
 
     One over the last interval, for as long as the train may still go on; 0 where it is
@@ -82,7 +98,7 @@ def rate_at(spikes: FloatArray, time: float) -> float | None:
         return 0.0
     near = spikes[max(0, seen - 3) : seen + 1]
     at = min(seen, 3) - 1
-    begun = bool(begins(near)[at])
+    begun = bool(begins(near, steps)[at])
     interval = 0.0 if begun else max(float(near[at] - near[at - 1]), 1e-9)
     if time - near[at] > max(SILENCE * interval, LEAST_SILENCE):
         return 0.0
@@ -97,18 +113,24 @@ def difference(measured: Drawn, model: Drawn) -> Drawn:
     """
     if measured.empty or model.time.size < 2:
         return Drawn.nothing()
-    inside = (measured.time >= model.time[0]) & (measured.time <= model.time[-1])
+    reach = float(model.time[-1]) + model.column
+    inside = (measured.time >= model.time[0]) & (measured.time < reach)
+    column = measured.column
+    if measured.time.size > 2:
+        # the last column before a gap is cut short: nobody knows over what it is a mean
+        inside &= ~np.append(measured.gap[1:], True)
     time = measured.time[inside]
-    step = np.diff(measured.time, append=np.inf)
-    typical = float(np.median(step[:-1])) if step.size > 1 else 0.0
-    ends = np.minimum(time + np.minimum(step[inside], typical), model.time[-1])
+    step = np.diff(measured.time, append=np.inf)[inside]
+    ends = np.minimum(time + np.minimum(step, column), model.time[-1])
     area = np.concatenate([[0.0], np.cumsum(np.diff(model.time) * model.mean[:-1])])
     over = np.interp(ends, model.time, area) - np.interp(time, model.time, area)
     plain = np.interp(time, model.time, model.mean)
     width = ends - time
     expected = np.divide(over, width, out=plain, where=width > 0)
     rest = measured.mean[inside] - expected
-    return Drawn(time, rest, rest, rest, measured.gap[inside])
+    gap = measured.gap[inside]
+    gap[:1] = True
+    return Drawn(time, rest, rest, rest, gap)
 
 
 def less(one: Drawn, other: Drawn, grid: FloatArray) -> Drawn:

@@ -29,6 +29,11 @@ class Hold:
     held: tuple[float, float] | None = None
 
 
+def starts(holds: list[Hold]) -> FloatArray:
+    """When each of them starts, s."""
+    return np.array([hold.start for hold in holds])
+
+
 def settled(times: FloatArray, holds: list[Hold]) -> np.ndarray:
     """Which of `times`, ascending, lie where the force stands still."""
     inside = np.zeros(times.size, dtype=bool)
@@ -63,7 +68,7 @@ class Aligned:
 
     def __init__(self, preview: Preview) -> None:
         self.preview = preview
-        self._planned = np.array([hold.start for hold in preview.holds])
+        self._planned = starts(preview.holds)
         self._offsets = np.zeros(max(len(preview.holds), 1))
         self._known = 0
         self._cache: dict[str, tuple[int, FloatArray]] = {}

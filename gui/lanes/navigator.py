@@ -22,7 +22,7 @@ from gui.lanes import paint
 from gui.lanes.axis import decimals, number, step_of, ticks
 from gui.lanes.card import CARD
 from gui.lanes.derive import rate_of
-from gui.lanes.expected import Nothing
+from gui.lanes.expected import Nothing, starts
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.paint import Frame
 from gui.lanes.source import Source
@@ -125,8 +125,6 @@ class Navigator(QWidget):
             paint.polyline(painter, frame.x(planned), y, line)
         if measured.empty:
             return
-        colour = QColor(tokens.force)
-        colour.setAlpha(50)
         shown = type(measured)(
             measured.time,
             measured.low / peak,
@@ -134,11 +132,12 @@ class Navigator(QWidget):
             measured.mean / peak,
             measured.gap,
         )
-        paint.fill(painter, frame, shown, colour)
-        paint.trace(painter, frame, shown, paint.pen(tokens.force))
+        paint.outline(painter, frame, shown, tokens.force, tokens.sunken)
 
     def _rate(self, painter: QPainter, frame: Frame) -> None:
-        rate = rate_of(self.source.spikes, 0.0, self.source.length, 400)
+        source = self.source
+        steps = starts(source.holds)
+        rate = rate_of(source.spikes, 0.0, source.length, 400, steps)
         if rate.empty:
             return
         top = max(float(rate.high.max()), 1e-9) * 1.1

@@ -153,6 +153,22 @@ def envelope(painter: QPainter, frame: Frame, drawn: Drawn, colour: str) -> None
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
 
+def outline(
+    painter: QPainter, frame: Frame, drawn: Drawn, colour: str, ground: str
+) -> None:
+    """Fill a trace down to 0 and draw its line; a tint where columns hold many values.
+
+    A line up and down through every column would be a solid block.
+    """
+    soft = QColor(colour)
+    soft.setAlpha(38)
+    fill(painter, frame, drawn, soft)
+    if np.count_nonzero(drawn.low != drawn.high) > drawn.time.size // 2:
+        envelope(painter, frame, drawn, mixed(colour, ground, 0.45))
+    else:
+        trace(painter, frame, drawn, pen(colour))
+
+
 @lru_cache(maxsize=64)
 def mixed(colour: str, ground: str, share: float) -> str:
     """`share` of a colour over a ground, opaque."""

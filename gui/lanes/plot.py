@@ -154,10 +154,9 @@ class LanePainter:
         elif kind is Kind.RESIDUAL:
             self._tolerance(painter, frame, tokens)
         elif kind is Kind.FORCE:
-            soft = QColor(colour)
-            soft.setAlpha(34)
-            paint.fill(painter, frame, measured, soft)
+            paint.outline(painter, frame, measured, colour, tokens.plot)
             self._plan(painter, frame, source, tokens)
+            measured = Drawn.nothing()
         if self.lane.averaged:
             tint = paint.mixed(colour, tokens.plot, 0.3)
             paint.envelope(painter, frame, measured, tint)

@@ -11,6 +11,7 @@ from gui.lanes.compare import Comparison
 from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.derive import (
     LEAST_SILENCE,
+    NEVER,
     SILENCE,
     begins,
     difference,
@@ -18,12 +19,16 @@ from gui.lanes.derive import (
     rate_of,
     scaled,
 )
+from gui.lanes.expected import starts
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 
 NEAR = 0.02
-"""Around a time out of view this much is read, s."""
+"""So much is read on either side of a time, s."""
+
+FEW = 40
+"""In so many columns."""
 
 
 def newest(lane: Lane, source: Source) -> float | None:
@@ -34,7 +39,7 @@ def newest(lane: Lane, source: Source) -> float | None:
     if lane.kind is Kind.RASTER:
         return float(source.spikes.size)
     if lane.kind is Kind.RATE:
-        return rate_at(source.spikes, reach)
+        return rate_at(source.spikes, reach, starts(source.holds))
     if lane.kind is Kind.RESIDUAL:
         reach = min(reach, source.followed)
     drawn = traces(lane, source, reach - 0.05, reach, 50, model=False)[0]
@@ -61,6 +66,12 @@ class Painted:
     end: float = 0.0
     runs: tuple[Drawn, ...] = ()
 
+    def close(self, lane: Lane, time: float) -> bool:
+        """Whether the value at a time can be read from it."""
+        inside = bool(self.runs) and self.start <= time <= self.end
+        fine = all(run.column <= 2 * NEAR / FEW for run in self.runs)
+        return inside and (fine or lane.kind is Kind.RESIDUAL)
+
 
 def traces(
     lane: Lane, source: Source, start: float, end: float, count: int, *, model: bool
@@ -70,8 +81,9 @@ def traces(
     if lane.kind is Kind.RASTER:
         return none, none
     if lane.kind is Kind.RATE:
-        twin = rate_of(source.twin_spikes, start, end, count) if model else none
-        return rate_of(source.spikes, start, end, count), twin
+        steps = starts(source.holds)
+        twin = rate_of(source.twin_spikes, start, end, count, steps) if model else none
+        return rate_of(source.spikes, start, end, count, steps), twin
     if lane.kind is Kind.RESIDUAL:
         # ahead of the twin is the plan: measured less that is no error of the model
         end = max(start, min(end, source.followed))
@@ -90,19 +102,19 @@ def values_at(
 ) -> tuple[float | None, ...]:
     """Values at a time, one for each run, in shown units; None where there are none.
 
-    In view they are those of the picture, so that numbers and traces never disagree.
+    They are those of the picture, so that numbers and traces do not disagree, but where
+    a column of it is a mean over long.
     """
-    inside = painted.start <= time <= painted.end and bool(painted.runs)
-    before, after = time - NEAR, time + NEAR
+    start, end = time - NEAR, time + NEAR
+    if not painted.close(lane, time):
+        painted = Painted()
     if isinstance(source, Comparison):
-        drawn = painted.runs if inside else source.drawn(lane, before, after, 100)
+        drawn = painted.runs or source.drawn(lane, start, end, FEW)
         return tuple(
             _value(lane, member.source, time, time - member.shift, one)
             for member, one in zip(source.members, drawn, strict=True)
         )
-    one = painted.runs[0] if inside else None
-    if one is None:
-        one = traces(lane, source, before, after, 100, model=False)[0]
+    (one,) = painted.runs or traces(lane, source, start, end, FEW, model=False)[:1]
     return (_value(lane, source, time, time, one),)
 
 
@@ -113,7 +125,7 @@ def _value(
     if not 0 <= own <= source.reach:
         return None
     if lane.kind is Kind.RATE:
-        return rate_at(source.spikes, own)
+        return rate_at(source.spikes, own, starts(source.holds))
     return drawn.at(time)
 
 
@@ -123,13 +135,13 @@ def count_between(spikes: FloatArray, start: float, end: float) -> int:
     return max(0, int(np.searchsorted(spikes, end, side="right") - first))
 
 
-def interval_text(spikes: FloatArray, now: float) -> str:
+def interval_text(spikes: FloatArray, now: float, steps: FloatArray = NEVER) -> str:
     """The last interval, or the silence before the newest spike, or since it."""
     if spikes.size < 2:
         return ""
     last = float(spikes[-1] - spikes[-2])
     since = now - float(spikes[-1])
-    if begins(spikes[-3:])[-1]:
+    if begins(spikes[-3:], steps)[-1]:
         if since > LEAST_SILENCE:
             return f"silent {since:.1f} s"
         return f"after {last:.1f} s of silence"
@@ -138,13 +150,15 @@ def interval_text(spikes: FloatArray, now: float) -> str:
     return f"{words} · silent {since:.1f} s" if silent else words
 
 
-def view_text(spikes: FloatArray, start: float, end: float) -> str:
+def view_text(
+    spikes: FloatArray, start: float, end: float, steps: FloatArray = NEVER
+) -> str:
     """How many spikes the run has, and the last interval in [start, end] s."""
     words = f"of {spikes.size}"
     last = int(np.searchsorted(spikes, end, side="right")) - 1
     if last > 0 and spikes[last - 1] >= start:
         near = spikes[max(0, last - 2) : last + 2]
-        if not begins(near)[min(last, 2)]:
+        if not begins(near, steps)[min(last, 2)]:
             interval = 1e3 * float(spikes[last] - spikes[last - 1])
             words += f" · last ISI {number(interval, 1)} ms"
     return words

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
 from gui.lanes.axis import number
 from gui.lanes.card import LaneCard
 from gui.lanes.compare import MARKS, Comparison
+from gui.lanes.expected import starts
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.lane import Kind, Lane
 from gui.lanes.plot import LanePainter, Options
@@ -164,12 +165,12 @@ class LaneRow(QFrame):
         card.show_more("" if view.cursors is None else self._at_cursors(source))
 
     def _show_spikes(self, source: Source, edge: float) -> None:
-        spikes, view = source.spikes, self._view
+        spikes, steps, view = source.spikes, starts(source.holds), self._view
         if source.running:
-            words = interval_text(spikes, source.reach)
+            words = interval_text(spikes, source.reach, steps)
             self.card.show_value(newest(self.lane, source))
         else:
-            words = view_text(spikes, view.start, edge)
+            words = view_text(spikes, view.start, edge, steps)
             seen = count_between(spikes, view.start, edge)
             self.card.show_value(float(seen), "in view")
         if view.cursors is not None:

@@ -99,6 +99,15 @@ def test_slow_but_regular_firing_has_a_rate() -> None:
     assert np.allclose(rate_of(np.arange(0.0, 60, 5), 0, 60, 100).mean, 0.2)
 
 
+def test_interval_from_one_step_to_the_next_is_none_where_it_is_long() -> None:
+    steps = np.arange(0.0, 60, 5)
+    lone = steps + 1.0
+    assert rate_of(lone, 0, 60, 100, steps).empty, "one spike for each presentation"
+    assert rate_at(lone, 31.2, steps) is None and rate_at(lone, 34.0, steps) == 0.0
+    going_on = np.arange(0.0, 60, 0.3)
+    assert rate_of(going_on, 0, 60, 1000, steps).time.size == going_on.size - 1
+
+
 trains = st.lists(
     st.tuples(st.integers(1, 9), st.floats(0.05, 0.3), st.floats(1.5, 6.0)),
     min_size=1,

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QApplication
 from gui.lanes.card import LINE, TITLE, LaneCard
 from gui.lanes.decimate import HOLDS, Drawn
 from gui.lanes.lane import Lane, lanes_for
-from gui.lanes.readings import count_between, interval_text, view_text
+from gui.lanes.readings import Painted, count_between, interval_text, view_text
 from gui.look.theme import Theme
 
 LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "spikes"})}
@@ -19,7 +19,10 @@ def test_value_of_a_trace_is_between_its_points_and_nothing_in_a_gap() -> None:
     drawn = Drawn(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), value, value, value, gap)
     assert [drawn.at(t) for t in (-0.01, 0.05, 0.2, 0.21)] == [None, 0.5, 2.0, 2.0]
     assert drawn.at(2.0) is None and drawn.at(5.05) == 9.0
-    assert drawn.at(5.1 + HOLDS) == 9.0 and drawn.at(5.4) is None
+    assert drawn.at(5.25) == 9.0 and drawn.at(5.4) is None
+    alone = Drawn.line(np.array([1.0]), np.array([7.0]))
+    assert alone.at(1.0) == 7.0 and alone.at(1.1) is None
+    assert alone.at(1.0 + HOLDS / 2) == 7.0
     assert Drawn.nothing().at(0.0) is None
 
 
@@ -29,6 +32,10 @@ def test_spikes_of_a_stored_run_are_those_in_view() -> None:
     assert view_text(spikes, 4.9, 5.25) == "of 5 · last ISI 200.0 ms"
     assert view_text(spikes, 4.9, 5.1) == "of 5", "one spike has no interval"
     assert view_text(spikes, 0.0, 5.1) == "of 5", "nor has one after a silence"
+    lone = np.array([1.0, 46.0, 91.0])
+    assert view_text(lone, 0.0, 99.0) == "of 3 · last ISI 45000.0 ms"
+    steps = np.array([0.5, 45.5, 90.5])
+    assert view_text(lone, 0.0, 99.0, steps) == "of 3", "each in a step of its own"
     assert view_text(spikes, 5.1, 5.25) == "of 5", "the interval began out of view"
 
 
@@ -74,3 +81,12 @@ def test_low_card_gives_up_decimals_not_runs(theme) -> None:
     assert "−123.456" in high.more
     assert "−123.456" not in low.more and "−123" in low.more
     assert low.text == high.text, "the tool tip has them all"
+
+
+def test_a_wide_column_is_not_read_as_a_value() -> None:
+    time = np.linspace(0.0, 100.0, 201)
+    wide = Painted(0.0, 100.0, (Drawn.line(time, time),))
+    assert not wide.close(LANES["V_C1"], 50.0)
+    near = Painted(0.0, 1.0, (Drawn.line(time / 100 / 8, time),))
+    assert near.close(LANES["V_C1"], 0.5) and not near.close(LANES["V_C1"], 1.5)
+    assert not Painted().close(LANES["V_C1"], 0.0), "nothing was painted"

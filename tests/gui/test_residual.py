@@ -52,5 +52,16 @@ def test_what_the_model_does_not_reach_is_left_out() -> None:
 
 def test_what_is_before_the_model_is_left_out() -> None:
     rest = difference(seen(0.0, 500, 3.0), seen(2.0, 500, 3.0))
-    assert rest.time[0] >= 2.0
+    assert rest.time[0] >= 2.0 and rest.gap[0]
     assert np.abs(rest.mean[: rest.time.size // 2]).max() < 1.1
+
+
+def test_columns_cut_short_by_a_gap_leave_no_residual() -> None:
+    time = np.concatenate([np.arange(0.0, 1.0, STEP), np.arange(40.0, 41.0, STEP)])
+    measured = columns(np.array([time, *[ramps(time + STEP / 2)] * 3]), 30, STEP)
+    whole = np.arange(0.0, 50.0, STEP)
+    model = columns(np.array([whole, *[ramps(whole + STEP / 2)] * 3]), 20_000, STEP)
+    rest = difference(measured, model)
+    assert rest.time.size >= measured.time.size - 2
+    assert np.count_nonzero(rest.gap) == 2 and rest.gap[0]
+    assert np.abs(rest.mean).max() < 0.06
