@@ -203,6 +203,7 @@ def _unplugged(stage: Stage) -> None:
     """Pull the coil's plug in a run: the fault, and a coil nobody knows about."""
     demo = (resources.files("protocols") / "scenes" / "demo.toml").read_text()
     Path("demo.toml").write_text(f'{demo}\n[simulated]\ncoil_unplugged = "7 s"\n')
+    stage.window.review.show_tab(0)
     stage.window.opening.open_scene("demo.toml")
     stage.planned()
     stage.window.setup.start()

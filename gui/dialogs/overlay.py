@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QRect, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QHideEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
+    QApplication,
     QFrame,
     QGraphicsDropShadowEffect,
     QLabel,
@@ -49,6 +50,13 @@ class Overlay(QWidget):
         if event.type() == QEvent.Type.Resize and self.isVisible():
             self._place()
         return False
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Give the keyboard back to the window; Qt would pick some button."""
+        focus = QApplication.focusWidget()
+        page = self._window.findChild(QWidget, "page")
+        if page is not None and focus is not None and self.isAncestorOf(focus):
+            page.setFocus()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Dim what lies below."""

@@ -337,3 +337,14 @@ def test_what_is_no_field_is_not_sent_and_what_is_doubted_asked_again(
     card.stop.click()
     lab.until(lambda: not session.busy)
     assert card.isHidden() and session.coil_view().verified_off
+
+
+def test_a_card_that_closes_gives_the_keyboard_back_to_the_window(lab) -> None:
+    window = lab.window
+    window.activateWindow()
+    lab.until(window.isActiveWindow)
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    assert lab.app.focusWidget() is dialog.instruments.scan
+    QTest.mouseClick(dialog.close_button, Qt.MouseButton.LeftButton)
+    assert dialog.isHidden() and lab.app.focusWidget() is window.page
