@@ -32,8 +32,8 @@ from gui.session.session import Session
 from gui.setup.panel import SetupPanel
 from gui.state import Snapshot, State
 
-WIDE, NARROW = 1640, 1280
-"""Window widths, px, below which chips and then side panels are folded."""
+NARROW = 1280
+"""Window width, px, below which there is room for one side panel."""
 
 OFF_TIMEOUT = 3000
 """Milliseconds a closing window waits for the coil to be verified off."""
@@ -185,7 +185,6 @@ class Window(QMainWindow):
         """Fold what does not fit."""
         super().resizeEvent(event)
         width = self.width()
-        self.header.set_compact(width < WIDE, width < NARROW)
         for side, limit in ((self.review, NARROW + 40), (self.setup, 0)):
             if self._folds[side] is None:
                 side.setVisible(width >= limit)

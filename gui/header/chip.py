@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
@@ -13,14 +15,30 @@ from gui.parts import label
 from gui.state import InstrumentView, Lamp
 
 
+class Room(IntEnum):
+    """How much of each chip is shown."""
+
+    FULL = 0
+    """Lamp, name, detail, value."""
+    SHORT = 1
+    """Lamp, short name, value."""
+    BARE = 2
+    """Lamp and value."""
+
+
 class Chip(QWidget):
-    """One instrument in the header; wide with its limit, compact without."""
+    """One instrument in the header.
+
+    It grows with its value and does not shrink again: what stands beside it keeps its
+    place while numbers change.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setFixedHeight(44)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self._bad = False
+        self._view = InstrumentView("", Lamp.ABSENT)
         self._lamp = LampWidget(self)
         self._name = label("", "hname")
         self._detail = label("", "hsub")
@@ -36,7 +54,7 @@ class Chip(QWidget):
         row.addLayout(words)
         row.addSpacing(6)
         row.addWidget(self._value)
-        self._compact = False
+        self._room = Room.FULL
 
     @property
     def lamp(self) -> Lamp:
@@ -48,23 +66,26 @@ class Chip(QWidget):
         """The label that holds the live value."""
         return self._value
 
-    def set_compact(self, compact: bool, narrow: bool) -> None:
-        """Show lamp, short name and value only; where it is narrow, no name."""
-        self._compact = compact
-        self._detail.setVisible(not compact)
-        self._name.setVisible(not narrow)
+    def show_room(self, room: Room) -> None:
+        """Show as much as there is room for."""
+        self._room = room
+        self._arrange()
 
-    def show_instrument(self, view: InstrumentView) -> None:
-        """Show an instrument's state."""
+    def forget_width(self) -> None:
+        """Let it shrink again."""
+        self._value.setMinimumWidth(0)
+
+    def show_instrument(self, view: InstrumentView) -> bool:
+        """Show an instrument's state; whether the chip has become wider by it."""
+        before = self._view
+        if view == before:
+            return False
+        self._view = view
         self._lamp.show_state(view.lamp)
-        for where, text in (
-            (self._name, view.short if self._compact else view.name),
-            (self._detail, view.detail),
-            (self._value, view.value),
-        ):
-            if where.text() != text:
-                where.setText(text)
-        self._detail.setVisible(bool(view.detail) and not self._compact)
+        if view.detail != before.detail:  # other values follow, such as a verdict
+            self.forget_width()
+        self._value.setText(view.value)
+        self._arrange()
         told = " · ".join(text for text in (view.detail, view.value) if text)
         self.setToolTip(f"{view.name}: {told}")
         self.setAccessibleName(f"{view.name}, {view.detail}, {view.value}")
@@ -72,6 +93,23 @@ class Chip(QWidget):
         if bad is not self._bad:
             self._bad = bad
             self.update()
+        needed = self._value.sizeHint().width()
+        grown = needed > self._value.minimumWidth()
+        if grown:
+            self._value.setMinimumWidth(needed)
+        return grown or view.name != before.name
+
+    def _arrange(self) -> None:
+        view, room = self._view, self._room
+        self._name.setText(view.name if room is Room.FULL else view.short)
+        self._name.setVisible(room is not Room.BARE)
+        self._detail.setText(view.detail)
+        self._detail.setVisible(bool(view.detail) and room is Room.FULL)
+        layout = self.layout()
+        assert layout is not None
+        layout.invalidate()
+        layout.activate()  # its size is asked for at once
+        self.updateGeometry()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the chip's body."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFont
+from PySide6.QtGui import QFont, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout
 
-from gui.header.chip import Chip
+from gui.header.chip import Chip, Room
 from gui.header.stop import StopButton
 from gui.look import tokens as look
 from gui.look.icons import pixmap
@@ -46,7 +46,7 @@ class Header(QFrame):
         self._state.setMinimumWidth(112)
         self._clock = label("", "hsub")
         self._chips: list[Chip] = []
-        self._compact = self._narrow = False
+        self._shown: State | None = None
         self._chip_row = QHBoxLayout()
         self._chip_row.setSpacing(6)
         self._buttons = [
@@ -73,14 +73,31 @@ class Header(QFrame):
         """The button below which the menu opens."""
         return self._buttons[1]
 
-    def set_compact(self, compact: bool, narrow: bool) -> None:
-        """Chips without their limits; in a narrow window without minor buttons."""
-        self._compact, self._narrow = compact, narrow
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show as much of the chips as fits."""
+        super().resizeEvent(event)
+        self._fit_anew()
+
+    def _fit_anew(self) -> None:
         for chip in self._chips:
-            chip.set_compact(compact, narrow)
-        self._buttons[0].setVisible(not narrow)
-        self._title.setMinimumWidth(150 if narrow else 190)
-        self.badge.setText("SIM" if compact else "SIMULATED BENCH")
+            chip.forget_width()
+        self._fit()
+
+    def _fit(self) -> None:
+        """Chips at their widest that fit; where it is narrow, no minor button."""
+        layout = self.layout()
+        assert layout is not None
+        for room in Room:
+            for chip in self._chips:
+                chip.show_room(room)
+            bare = room is Room.BARE
+            self._buttons[0].setVisible(not bare)
+            self._title.setMinimumWidth(190 if room is Room.FULL else 120)
+            self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
+            layout.invalidate()
+            layout.activate()  # nested ones, too
+            if layout.minimumSize().width() <= self.width():
+                return
 
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Render identity, chips, clock and STOP."""
@@ -88,13 +105,20 @@ class Header(QFrame):
         elided(self._title, snapshot.title)
         while len(self._chips) < len(snapshot.instruments):
             chip = Chip()
-            chip.set_compact(self._compact, self._narrow)
             self._chips.append(chip)
             self._chip_row.addWidget(chip)
+        if snapshot.state is not self._shown:
+            self._shown = snapshot.state
+            self._fit_anew()
+        wider = False
         for number, chip in enumerate(self._chips):
-            chip.setVisible(number < len(snapshot.instruments))
-            if number < len(snapshot.instruments):
-                chip.show_instrument(snapshot.instruments[number])
+            used = number < len(snapshot.instruments)
+            wider |= used and chip.isHidden()
+            chip.setVisible(used)
+            if used:
+                wider |= chip.show_instrument(snapshot.instruments[number])
+        if wider:
+            self._fit()
         word, clock = clock_text(snapshot)
         colour = _CLOCK_COLOURS[snapshot.state]
         if self._state.text() != word:

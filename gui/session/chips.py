@@ -118,6 +118,8 @@ def _model(session: Core, plan: Expectation) -> InstrumentView:
     """What the model expects; beside a run, how well it follows."""
     lamp = Lamp.ACTIVE if session.state is State.RUNNING else Lamp.GOOD
     seen = session.agreement
+    if seen is None and session.state is State.RUNNING and "V_C1" in plan.needs.stored:
+        return InstrumentView("Model", lamp, "comparing …", "NRMSE —")
     if seen is None:
         expected = f"{plan.preview.spikes.size} spikes expected"
         return InstrumentView("Model", lamp, "preview in lanes", expected)

@@ -35,22 +35,24 @@ class Buttons(QWidget):
             side_by_side.addWidget(button, share)
         theme.changed.connect(self._tint)
         self._tint()
-        self.show_next(State.DISCONNECTED, "", queue=False)
+        self.show_next(State.DISCONNECTED, "", cannot_wait="")
 
-    def show_next(self, state: State, problem: str, *, queue: bool) -> None:
+    def show_next(self, state: State, problem: str, *, cannot_wait: str) -> None:
         """Offer the form's run.
 
         Args:
             state: of the window.
             problem: why it cannot start now, "" if it can.
-            queue: whether it can wait in the queue.
+            cannot_wait: why it cannot wait in the queue, "" if it can.
         """
         self._swap(editing=False)
         self.run.setEnabled(not problem)
         self.run.setToolTip(problem or "Run what the form says (Ctrl+R)")
         self.run.setText(WORDS.get(state, "Run"))
-        self.queue.setEnabled(queue)
-        self.queue.setToolTip("Have it follow the runs before it (Ctrl+Return)")
+        self.queue.setEnabled(not cannot_wait)
+        self.queue.setToolTip(
+            cannot_wait or "Have it follow the runs before it (Ctrl+Return)"
+        )
 
     def show_edit(self, problem: str) -> None:
         """Offer to save the edited run; `problem` is why that cannot be done."""

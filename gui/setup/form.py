@@ -70,6 +70,16 @@ class Form(QWidget):
         """Put every parameter back to its default; can be undone."""
         self.propose({field.parameter.key: field.default for field in self.fields})
 
+    def undo_edit(self) -> None:
+        """Take the last edit back, unless the form is locked."""
+        if not self._locked:
+            self.undo.undo()
+
+    def redo_edit(self) -> None:
+        """Make the edit again that was taken back, unless the form is locked."""
+        if not self._locked:
+            self.undo.redo()
+
     @property
     def problem(self) -> str:
         """Why the form cannot be used, "" if it can."""

@@ -193,8 +193,11 @@ class SetupPanel(QFrame):
         if editing:
             self.buttons.show_edit(self._unusable)
         else:
-            can_queue = not self._unusable and snapshot.state is not State.DISCONNECTED
-            self.buttons.show_next(snapshot.state, self._blocked(), queue=can_queue)
+            alone = snapshot.state is State.DISCONNECTED
+            cannot_wait = "No bench is connected." if alone else self._unusable
+            self.buttons.show_next(
+                snapshot.state, self._blocked(), cannot_wait=cannot_wait
+            )
 
     def show_head(self, time: float | None) -> None:
         """Put the preview's play-head, where it shows the run in progress."""

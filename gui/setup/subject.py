@@ -52,8 +52,10 @@ class Subject(QObject):
             SceneError: it cannot be used.
         """
         scene = load(None if path is None else Path(path), overrides)
-        self.edited, self.lost = None, ""
-        self._fill(path, scene)
+        given_up = self.edited if self.touched else None
+        self.edited = None
+        words = "" if given_up is None else f"{given_up.title} waits unchanged."
+        self._fill(path, scene, words)
 
     def request(self) -> Request:
         """What the form asks for; of a queued run only the parameters are replaced.
@@ -87,7 +89,7 @@ class Subject(QObject):
         if self.edited is None:
             texts = self._form.texts()
             self._before = Kept(self.path, self._form.protocol, texts)
-        self.edited, self.lost = item, ""
+        self.edited = item
         self._fill(item.request.path, scene)
         self._taken_up = self._form.texts()
         return ""
@@ -103,11 +105,12 @@ class Subject(QObject):
             self._form.set_texts(before.texts)
         self.changed.emit()
 
-    def _fill(self, path: str | None, scene: Scene) -> None:
+    def _fill(self, path: str | None, scene: Scene, lost: str = "") -> None:
         self.path = path
         kind = type(scene.protocol)
         values = {key: getattr(scene.protocol, key) for key in kind.model_fields}
         self._form.show_protocol(kind, values)
+        self.lost = lost
         self.changed.emit()
 
     def _mind_queue(self) -> None:

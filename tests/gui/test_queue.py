@@ -8,6 +8,7 @@ from gui.parts import IconButton
 from gui.session.request import Request
 from gui.session.session import Queued
 from gui.state import State
+from tactile_lab.scene.load import load
 
 
 def busy(lab) -> None:
@@ -213,3 +214,45 @@ def test_moved_run_keeps_the_keyboard(lab) -> None:
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Delete)
     assert [item.title for item in session.queue] == ["two", "three"]
     idle(lab)
+
+
+def test_edited_run_is_executed_as_it_was_saved(lab) -> None:
+    session, setup = lab.session, lab.window.setup
+    lab.run()
+    setup.enqueue()
+    lab.until(lambda: len(session.queue) == 1)
+    setup.edit(session.queue[0])
+    type_into(setup.form.field("hold"), "250 ms")
+    setup.enqueue()  # Ctrl+Return saves while a run is edited, once it is planned
+    lab.until(lambda: setup.subject.edited is None)
+    assert len(session.queue) == 1
+    first = session.folder
+    session.stop("the next one follows when asked for")
+    lab.until(lambda: session.state is State.READY)
+    setup.queue.resume.click()
+    lab.until(lambda: session.folder != first and session.state is State.READY)
+    assert load(session.folder / "scene.toml").protocol.hold == 0.25
+
+
+def test_scene_opened_during_an_edit_leaves_the_queued_run_alone(lab) -> None:
+    session, setup = lab.session, lab.window.setup
+    three_waiting(lab)
+    asked = session.queue[0].request
+    setup.edit(session.queue[0])
+    type_into(setup.form.field("hold"), "9 s")
+    setup.open_scene(str(lab.folder / "short.toml"))
+    assert setup.subject.edited is None and session.queue[0].request == asked
+    assert "one waits unchanged" in setup.strip.words
+    idle(lab)
+
+
+def test_undo_is_locked_with_the_form(lab) -> None:
+    setup = lab.window.setup
+    setup.form.propose({"hold": "600 ms"})
+    busy(lab)
+    lab.window.activateWindow()
+    QTest.keyClick(lab.window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert setup.form.field("hold").text == "600 ms"
+    idle(lab)
+    QTest.keyClick(lab.window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    lab.until(lambda: setup.form.field("hold").text != "600 ms")
