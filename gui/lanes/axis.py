@@ -40,6 +40,12 @@ def number(value: float, places: int) -> str:
     return text.replace("-", "−")
 
 
+def signed(value: float, places: int) -> str:
+    """A difference: with its sign, unless it is zero to so many places."""
+    text = number(value, places)
+    return f"+{text}" if value > 0 and text.strip("0.") else text
+
+
 def nice_range(low: float, high: float, least: float) -> tuple[float, float]:
     """A range around [low, high], at least `least` wide, with air and round ends."""
     span = max(high - low, least)

@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout
 
-from gui.lanes.axis import number
+from gui.lanes.axis import number, signed
 from gui.lanes.compare import MARKS
 from gui.lanes.lane import Kind, Lane
 from gui.look.theme import Theme
@@ -47,9 +47,9 @@ class LaneCard(QFrame):
         title.setSpacing(7)
         title.addWidget(self._swatch)
         title.addWidget(label(lane.title, "strong"))
-        self._of_runs = label("", "muted")
-        self._of_runs.hide()
-        title.addWidget(self._of_runs)
+        self._beside = label("", "muted")
+        self._beside.hide()
+        title.addWidget(self._beside)
         title.addStretch(1)
         value = QHBoxLayout()
         value.setSpacing(5)
@@ -86,12 +86,17 @@ class LaneCard(QFrame):
             self._unit.setText(unit)
 
     def show_more(self, words: str) -> None:
-        """Show small text below, where there is room."""
+        """Show small text below the value; in a low lane in its place."""
         self._one()
-        least = 44 if self._flat else 66
         if self._more.text() != words:
             self._more.setText(words)
-        self._more.setVisible(bool(words) and self.height() >= least)
+        below = self.height() >= (44 if self._flat else 66)
+        instead = bool(words) and not below and not self._flat
+        self._more.setVisible(bool(words) and (below or instead))
+        self._beside.setText(self.lane.unit)
+        self._beside.setVisible(instead)
+        for one in (self._value, self._unit):
+            one.setVisible(not instead)
 
     def show_runs(self, values: Values, changes: Values | None, where: str) -> None:
         """Show a line per run: its marker, its value and its change, in shown units.
@@ -112,7 +117,7 @@ class LaneCard(QFrame):
         self.setToolTip("\n".join([f"{first} {where or 'at the right'}", *texts]))
         for one in (self._value, self._unit):
             one.hide()
-        self._of_runs.show()
+        self._beside.show()
         self._lay_out_runs()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -138,9 +143,6 @@ class LaneCard(QFrame):
             self._runs = None
             self.setToolTip("")
             self._more.setText("")
-            self._of_runs.hide()
-            for one in (self._value, self._unit):
-                one.show()
 
     def _lines(self, places: int | None = None) -> list[tuple[str, ...]]:
         """Value and change of each run."""
@@ -162,7 +164,7 @@ class LaneCard(QFrame):
         tall = self.height() >= TITLE + LINE * len(values)
         told = tall or changes is None
         unit = f"{self.lane.unit} {where}" if told else f"Δ {self.lane.unit}"
-        self._of_runs.setText(unit.strip())
+        self._beside.setText(unit.strip())
         self._more.setVisible(self.height() >= TITLE + LINE - 3)
         for places in range(self.lane.places, -1, -1):
             lines = self._lines(places)
@@ -195,5 +197,4 @@ class LaneCard(QFrame):
     def _signed(self, value: float | None, places: int | None = None) -> str:
         if value is None:
             return "—"
-        text = number(value, self.lane.places if places is None else places)
-        return f"+{text}" if value > 0 and text.strip("0.") else text
+        return signed(value, self.lane.places if places is None else places)

@@ -21,6 +21,9 @@ AXIS = 52
 GUTTER = 56
 """Width right of the plot for the value tag, px."""
 
+LINE = 13
+"""Height that a number on the axis needs, px."""
+
 TIME_AXIS = 22
 """Height of the time axis below the last lane, px."""
 
@@ -82,9 +85,13 @@ def _names(painter: QPainter, frame: Frame, source: Source, tokens: Tokens) -> N
 
 def _value_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
     rows = max(2, int((frame.bottom - frame.top) / 21))
+    values = ticks(frame.low, frame.high, rows)
+    if len(values) < 2:  # one number alone says nothing of the scale
+        rows = 5
+        values = ticks(frame.low, frame.high, rows)
     step = step_of(frame.high - frame.low, rows)
     places = decimals(step)
-    values = ticks(frame.low, frame.high, rows)
+    values = _apart(values, abs(frame.y1(step) - frame.y1(0.0)))
     heights = [round(frame.y1(value)) + 0.5 for value in values]
     painter.setPen(paint.pen(tokens.grid))
     painter.drawLines([QLineF(frame.left, y, frame.right, y) for y in heights])
@@ -96,6 +103,13 @@ def _value_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
     painter.drawLine(
         QPointF(frame.left - 0.5, 4), QPointF(frame.left - 0.5, frame.bottom)
     )
+
+
+def _apart(values: list[float], pixels: float) -> list[float]:
+    """Of ticks `pixels` apart, those that can be told beside each other; both ends."""
+    if pixels >= LINE or len(values) < 2:
+        return values
+    return [values[0], values[-1]]
 
 
 def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens, place: Place) -> None:

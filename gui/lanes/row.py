@@ -6,7 +6,7 @@ from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
 
-from gui.lanes.axis import number
+from gui.lanes.axis import number, signed
 from gui.lanes.card import LaneCard
 from gui.lanes.compare import MARKS, Comparison
 from gui.lanes.expected import starts
@@ -202,9 +202,7 @@ class LaneRow(QFrame):
         assert cursors is not None
         a, b = (self._values(source, time)[0] for time in cursors)
         change, places = _change(a, b), min(self.lane.places, 2)
-        delta = "—"
-        if change is not None:
-            delta = f"{'+' if change >= 0 else ''}{number(change, places)}"
+        delta = "—" if change is None else signed(change, places)
         words = [
             f'<span style="color:{colour};font-weight:600">{name}</span> '
             f"{'—' if value is None else number(value, places)}"

@@ -207,12 +207,14 @@ class Tools(QWidget):
                 "AB", cursors, (tokens.accent, tokens.V_C1), strict=True
             )
         ]
-        between = f"Δt <b>{show(span, 's')}</b>{rate}"
+        apart = f"Δt <b>{show(span, 's')}</b>"
+        between = apart + rate
         whole = f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; {between}"
         self._readout.setToolTip(whole)
-        self._readout.setText(whole)
-        if self._readout.sizeHint().width() > self._readout.width():
-            self._readout.setText(between)
+        for words in (whole, between, apart):
+            self._readout.setText(words)
+            if self._readout.sizeHint().width() <= self._readout.width():
+                break
 
     def _lay_out(self) -> None:
         row = QHBoxLayout(self)

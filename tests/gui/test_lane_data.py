@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gui.lanes.axis import decimals, nice_range, number, ticks
+from gui.lanes.axis import decimals, nice_range, number, signed, ticks
 from gui.lanes.decimate import columns, zigzag
 from gui.lanes.derive import rate_at, rate_of
 from gui.lanes.expected import Aligned, Hold, Preview
@@ -204,3 +204,9 @@ def test_ticks_are_round() -> None:
     assert decimals(50) == 0
     assert number(-0.04, 1) == "0.0"
     assert number(-1.5, 1) == "−1.5"
+    assert [signed(v, 1) for v in (1.5, -1.5, 0.04, -0.04)] == [
+        "+1.5",
+        "−1.5",
+        "0.0",
+        "0.0",
+    ]

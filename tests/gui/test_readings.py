@@ -90,3 +90,14 @@ def test_a_wide_column_is_not_read_as_a_value() -> None:
     near = Painted(0.0, 1.0, (Drawn.line(time / 100 / 8, time),))
     assert near.close(LANES["V_C1"], 0.5) and not near.close(LANES["V_C1"], 1.5)
     assert not Painted().close(LANES["V_C1"], 0.0), "nothing was painted"
+
+
+def test_what_is_at_the_cursors_takes_the_place_of_the_value_where_it_is_low(theme):
+    low, high = (card(LANES["V_C1"], theme, height) for height in (48, 90))
+    for one in (low, high):
+        one.show_value(3.721)
+        one.show_more("A 1.00 B 2.00")
+        assert one.more == "A 1.00 B 2.00"
+    assert low.sizeHint().height() <= 48 < high.sizeHint().height()
+    low.show_more("")
+    assert not low.more and low.text == "3.721"
