@@ -25,7 +25,7 @@ class Closing(Overlay):
         self._sign = QLabel()
         self._title = label("", "big", wrap=True)
         self._text = label("", "", wrap=True)
-        self._now = label("", "muted", wrap=True)
+        self.now = label("", "muted", wrap=True)
         self.keep = push("Keep running", "primary")
         self.stop = push("Stop, coil off and close", "danger")
         buttons = QHBoxLayout()
@@ -36,7 +36,7 @@ class Closing(Overlay):
         words.setSpacing(8)
         words.addWidget(self._title)
         words.addWidget(self._text)
-        words.addWidget(self._now)
+        words.addWidget(self.now)
         words.addSpacing(8)
         words.addLayout(buttons)
         row = QHBoxLayout(self.card)
@@ -67,10 +67,10 @@ class Closing(Overlay):
             )
             self.keep.setText("Keep running")
         left = ""
-        if snapshot.expected is not None:
+        if snapshot.expected is not None and not snapshot.manual:
             rest = max(0.0, snapshot.expected - snapshot.elapsed)
             left = f" · remaining {minutes(rest)}"
-        self._now.setText(f"Coil now {current}{left}")
+        self.now.setText(f"Coil now {current}{left}")
         self.open()
         self.keep.setDefault(True)
         self.keep.setFocus()
@@ -79,7 +79,7 @@ class Closing(Overlay):
         """Tell how the closing goes, without a question."""
         self._title.setText(title)
         self._text.setText(text)
-        self._now.setText("")
+        self.now.setText("")
         self.keep.hide()
         self.stop.setEnabled(False)
         self._place()

@@ -77,7 +77,8 @@ PANELS = (
         "Connect instruments",
         "Asks ports and devices for their names, suggests driver and row, tests, and "
         "saves a bench file. Its other pages run the wiring check and the field "
-        "calibration, show verdicts and loop, and put the calibration into the bench.",
+        "calibration, show verdicts and loop, and put the calibration into the bench. "
+        "Where a person moves probes or reads the teslameter, the run asks and waits.",
     ),
     (
         "Command line",

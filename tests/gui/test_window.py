@@ -178,7 +178,10 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
     lab.until(lambda: abs((session.coil_view().current or 0) - 0.1) < 2e-3)
     lab.until(lambda: window.header.stop.truth is Truth.LIVE)
     assert not window.setup.run.isEnabled()
+    session.expected = 10.0  # of the run before
     assert not window.close(), "the coil is live: closing asks"
+    assert "100 mA" in window.closing.now.text()
+    assert "remaining" not in window.closing.now.text(), "that was the run's"
     window.closing.keep.click()
     window.header.stop.click()
     lab.until(lambda: session.manual is None)
