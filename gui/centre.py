@@ -122,7 +122,8 @@ class Centre(QWidget):
         above.addWidget(self.watch_bar)
         above.addWidget(self.stack, 1)
         lower = panel()
-        below = column(lower, margin=12, spacing=9)
+        below = column(lower, spacing=7)
+        below.setContentsMargins(12, 10, 12, 10)
         below.addWidget(self.progress)
         below.addWidget(self.log, 1)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
@@ -134,7 +135,7 @@ class Centre(QWidget):
         self.splitter.setSizes([780, 200])
         self.splitter.setChildrenCollapsible(False)
         upper.setMinimumHeight(320)
-        lower.setMinimumHeight(162)
+        lower.setMinimumHeight(151)
         column(self).addWidget(self.splitter)
         self.empty = EmptyCard(self.stack, theme)
 

@@ -24,6 +24,10 @@ _CLOCK_COLOURS = {
 }
 
 
+WHOLE, SHORT = 190, 120
+"""Widths of the title, px: that of a run's name, and the least."""
+
+
 class Header(QFrame):
     """Dark in both themes, 68 px high."""
 
@@ -92,11 +96,14 @@ class Header(QFrame):
                 chip.show_room(room)
             bare = room is Room.BARE
             self._buttons[0].setVisible(not bare)
-            self._title.setMinimumWidth(190 if room is Room.FULL else 120)
+            least = WHOLE if room is Room.FULL else SHORT
+            self._title.setMinimumWidth(least)
             self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
             layout.invalidate()
             layout.activate()  # nested ones, too
-            if layout.minimumSize().width() <= self.width():
+            spare = self.width() - layout.minimumSize().width()
+            if spare >= 0:
+                self._title.setMinimumWidth(min(WHOLE, least + spare))
                 return
 
     def render_snapshot(self, snapshot: Snapshot) -> None:

@@ -63,11 +63,15 @@ class LogTable(QTableView):
         rows = sorted(index.row() for index in self.selectionModel().selectedRows())
         QGuiApplication.clipboard().setText("\n".join(self._line(row) for row in rows))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep the viewport a multiple of a row, and the message readable."""
-        over = (self.height() - 2 * self.frameWidth()) % ROW
-        if self.viewportMargins().top() != over:
+    def updateGeometries(self) -> None:
+        """Keep the viewport a multiple of a row."""
+        super().updateGeometries()  # which takes the margin for that of its headers
+        over = self.viewport().height() % ROW
+        if over:
             self.setViewportMargins(0, over, 0, 0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep the message readable."""
         super().resizeEvent(event)
         self._fit(self.currentIndex())
 
