@@ -17,6 +17,9 @@ from tactile_lab.scene.toml_text import to_toml
 BY_PERSON = "read by a person"
 """In place of a teslameter's dialect: it has no output that could be read."""
 
+PRINTED = {"-": "−", "Ohm": "Ω", "^2": "²"}
+"""What files are typed with, and what is shown for it."""
+
 
 @dataclass
 class Choice:
@@ -150,14 +153,21 @@ def _take_over(choice: Choice, data: dict[str, Any]) -> None:
 
 def _short(text: str, symbol: str) -> str:
     """The same quantity with the prefix that makes it shortest."""
-    return exact(parse(text, symbol), symbol).replace("Ohm", "Ω") if text else ""
+    if not text:
+        return ""
+    shown = exact(parse(text, symbol), symbol)
+    for typed, printed in PRINTED.items():
+        shown = shown.replace(typed, printed)
+    return shown
 
 
 def _typed(text: Any) -> Any:
     """A text as people type it into a file: with what a keyboard has."""
     if not isinstance(text, str):
         return text
-    return text.replace("−", "-").replace("Ω", "Ohm")
+    for typed, printed in PRINTED.items():
+        text = text.replace(printed, typed)
+    return text
 
 
 def _channel(choice: Choice, row: tuple[str, str, str, str, str]) -> dict[str, Any]:

@@ -111,7 +111,8 @@ class Session(Incoming):
         if self.errand is not None:
             said = f"Done: {self.errand.text}"
             if self.errand.current is not None:
-                said = f"Typed {answer} at {show(self.errand.current, 'A')}"
+                at = show(self.errand.current, "A")
+                said = f"Typed {answer.replace('-', '−')} at {at}"
             self.log(Level.INFO, "runner", said)
             self.errand = None
             if self._run is not None:

@@ -53,6 +53,7 @@ def test_true_minus_on_screen_and_keyboards_minus_in_the_file() -> None:
     choice = start_choice()
     choice.coil_port = "/dev/ttyUSB0"
     assert choice.channels[0][3] == "−2.5 V"
+    assert choice.magnet["A1"] == "28.27 mm²"
     text = bench_text(choice)
     assert 'offset = "-2.5 V"' in text and text.isascii()
     choice.channels[0] = (*choice.channels[0][:3], "-2.5 V", "")
