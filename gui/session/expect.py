@@ -9,6 +9,7 @@ from gui.session.expectation import Expectation
 from tactile_lab.acquisition.runner import BASELINE
 from tactile_lab.plan.plan import Plan, plan
 from tactile_lab.scene.scene import Scene
+from tactile_lab.trial import Trial
 
 MODELLED = ("V_C1", "V_C2", "V_K", "I_DS")
 SPACING = 1e-3
@@ -37,15 +38,7 @@ def _preview(made: Plan) -> Preview:
     """The plan's own prediction on the run's axis, which starts a baseline earlier."""
     drive, result = made.timeline, made.preview
     length = drive.duration + BASELINE
-    holds = [
-        Hold(
-            step.start + BASELINE,
-            step.start + BASELINE + step.trial.length,
-            step.trial.label,
-            step.trial.pause,
-        )
-        for step in drive.steps
-    ]
+    holds = [_hold(step.start + BASELINE, step.trial) for step in drive.steps]
     force, none = drive.force.shifted(BASELINE), np.empty(0)
     if result is None:
         return Preview(force, {}, none, holds, length)
@@ -61,6 +54,14 @@ def _preview(made: Plan) -> Preview:
         traces[name] = (at + BASELINE, result.sample(name, at))
     spikes = none if result.spike_times is None else result.spike_times + BASELINE
     return Preview(force, traces, spikes, holds, length)
+
+
+def _hold(start: float, trial: Trial) -> Hold:
+    """A trial that starts at `start` s of the run."""
+    held = None
+    if trial.hold is not None:
+        held = start + trial.hold[0], start + trial.hold[1]
+    return Hold(start, start + trial.length, trial.label, trial.pause, held)
 
 
 def _around(spikes: np.ndarray, length: float) -> np.ndarray:

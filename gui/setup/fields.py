@@ -35,7 +35,7 @@ INSIDE = 2
 class QuantityEdit(QLineEdit):
     """A line edit; arrow keys change the number by one in its leading digit's place.
 
-    While nobody edits it, text longer than the field ends in an ellipsis.
+    While nobody edits it, text longer than the field is shortened.
     """
 
     def __init__(self, parameter: Parameter) -> None:
@@ -48,7 +48,8 @@ class QuantityEdit(QLineEdit):
         room = self._room().width()
         if self.hasFocus():
             return self.text()
-        way = Qt.TextElideMode.ElideRight
+        file = self._parameter.kind is Kind.FILE  # its name is what tells it
+        way = Qt.TextElideMode.ElideLeft if file else Qt.TextElideMode.ElideRight
         return self.fontMetrics().elidedText(self.text(), way, room)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -223,6 +224,8 @@ class Field(QFrame):
         self._edit.textEdited.connect(self._edited)
         if self.parameter.optional:
             self._edit.setPlaceholderText("automatic")
+        elif not self.parameter.required and not self.default:
+            self._edit.setPlaceholderText("none")
         if self.parameter.kind in (Kind.QUANTITY, Kind.INTEGER, Kind.NUMBER):
             self._edit.setAlignment(Qt.AlignmentFlag.AlignRight)
         return self._edit

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import inspect
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QPaintEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QStyle,
+    QStyleOptionComboBox,
+    QStylePainter,
+)
 
 from tactile_lab.plugins import protocol_class, protocol_names, scene_path
 from tactile_lab.trial import Protocol
@@ -36,7 +42,22 @@ class Picker(QComboBox):
                 kind = shown if name == shown.name else protocol_class(name)
                 self.addItem(kind.title, name)
         self.setCurrentIndex(names.index(shown.name))
-        self.setToolTip(about(shown))
+        self.setToolTip(f"{shown.title}\n{about(shown)}")
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the name, shortened to the room it has."""
+        option = QStyleOptionComboBox()
+        self.initStyleOption(option)
+        style, field = self.style(), QStyle.SubControl.SC_ComboBoxEditField
+        control = QStyle.ComplexControl.CC_ComboBox
+        room = style.subControlRect(control, option, field, self).width()
+        way = Qt.TextElideMode.ElideRight
+        option.currentText = self.fontMetrics().elidedText(
+            self.currentText(), way, room
+        )
+        painter = QStylePainter(self)
+        painter.drawComplexControl(control, option)
+        painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
 
 
 def scene_of(protocol: str) -> str:

@@ -19,6 +19,9 @@ HEIGHT = 118
 LEFT, RIGHT = 38, 8
 """Margins of the plot, px."""
 
+APART, LONGEST = 6, 6
+"""Least space between two levels' names, px, and characters of the longest shown."""
+
 
 class WaveformPreview(QWidget):
     """Force against time as it will be played, in mN and s."""
@@ -126,27 +129,24 @@ class WaveformPreview(QWidget):
     def _names(
         self, painter: QPainter, frame: Frame, preview: Preview, force: np.ndarray
     ) -> None:
-        """The level above each hold, where there is room."""
+        """The level beyond each hold, where there is room."""
         painter.setPen(QColor(self._theme.tokens.text))
         taken = -1e9
         for hold in preview.holds:
-            if hold.pause:
+            start, end = hold.held or (hold.start, hold.end)
+            inside = (preview.force.time >= start) & (preview.force.time <= end)
+            if hold.pause or not inside.any():
                 continue
-            inside = (preview.force.time >= hold.start) & (
-                preview.force.time < hold.end
-            )
-            if not inside.any():
-                continue
-            peak = float(np.max(np.abs(force[inside])))
-            at = preview.force.time[inside][np.abs(force[inside]) >= peak - 1e-9]
-            x = frame.x1(float(at.mean()))
-            if x - taken < 30 or peak == 0:
-                continue
-            taken = x
+            here, times = force[inside], preview.force.time[inside]
+            most = float(np.max(np.abs(here)))
+            far = np.abs(here) >= most - 1e-9
             text = hold.label.replace(" mN", "")
-            if len(text) > 6:
+            width = painter.fontMetrics().horizontalAdvance(text)
+            left = frame.x1(float(times[far].mean())) - width / 2
+            left = min(max(left, frame.left), frame.right - width)
+            if left < taken + APART or most == 0 or len(text) > LONGEST:
                 continue
-            y = frame.y1(peak) - 15
-            painter.drawText(
-                QRectF(x - 24, y, 48, 14), Qt.AlignmentFlag.AlignHCenter, text
-            )
+            taken = left + width
+            below = float(here[far][0]) < 0
+            y = frame.y1(-most) + 1 if below else frame.y1(most) - 15
+            painter.drawText(QRectF(left, y, width + 1, 14), text)
