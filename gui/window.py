@@ -111,7 +111,7 @@ class Window(QMainWindow):
         self.review.manual.render_snapshot(
             snapshot, session.readings.get("field"), reading=session.reading_field
         )
-        self.review.manual.follow(session.manual.asked if session.manual else 0.0)
+        self.review.manual.follow(session.manual)
 
     def fold(self, side: QWidget, folded: bool) -> None:
         """Fold a side panel by hand; the window's width no longer decides."""

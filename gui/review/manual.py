@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
 from gui.review.scope_inputs import ScopeInputs
+from gui.session.link import HandAfar
 from gui.state import CoilView, Snapshot, State, Truth, milliamperes, truth
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse, show
@@ -122,8 +123,16 @@ class ManualView(QWidget):
         """The current as it was read back last."""
         return self._now.text()
 
-    def follow(self, asked: float) -> None:
-        """Show what was asked of the coil, A, unless somebody is about to ask anew."""
+    @property
+    def doing(self) -> str:
+        """What the coil does, in words."""
+        return self._force.text()
+
+    def follow(self, hand: HandAfar | None) -> None:
+        """Show what was asked of the coil, unless somebody is about to ask anew."""
+        asked = 0.0 if hand is None else hand.asked
+        if hand is not None and not hand.opened:
+            self._force.setText("opening the source …")
         edited = self.current.isModified() or self.current.hasFocus()
         if not edited and not self.slider.isSliderDown():
             self.current.setText(show(asked, "A") if asked else "0 mA")

@@ -116,11 +116,11 @@ class Hand:
         last, said = None, 0.0
         while not coil.ended:
             applied = coil.thread.take_applied()
-            state = coil.state
-            if applied or state != last or time.monotonic() - said > AT_LEAST:
+            known = coil.state, coil.thread.opened
+            if applied or known != last or time.monotonic() - said > AT_LEAST:
                 read = any(one.measured is not None for one in applied)
-                self._tell(CoilByHand(state, bool(applied), read))
-                last, said = state, time.monotonic()
+                self._tell(CoilByHand(*known, acted=bool(applied), read_back=read))
+                last, said = known, time.monotonic()
             coil.thread.join(EVERY)
 
 

@@ -103,9 +103,17 @@ class HandAfar(Afar):
 
     Attributes:
         asked: current that it was asked to hold last, A.
+        opened: the source has answered.
     """
 
     asked = 0.0
+    opened = False
+
+    def hear(self, told: Told) -> None:
+        """Something came from it; called by the reading thread."""
+        if isinstance(told, CoilByHand):
+            self.opened = told.opened
+        super().hear(told)
 
     def hold(self, current: float) -> None:
         """Go to `current`, A, as fast as the slew limit lets it, and stay."""

@@ -153,11 +153,13 @@ class CoilByHand:
 
     Attributes:
         coil: what its thread knows.
+        opened: the source has answered.
         acted: the source acknowledged something since this was told last.
         read_back: and its current was read back.
     """
 
     coil: CoilState
+    opened: bool
     acted: bool
     read_back: bool
 

@@ -64,8 +64,12 @@ def test_field_is_read_on_request(lab) -> None:
 def test_a_current_that_is_set_while_the_source_opens_is_not_lost(lab) -> None:
     session = lab.session
     session.begin_manual()
+    lab.window.render_state()
+    assert "opening" in lab.window.review.manual.doing
     session.manual.hold(0.05)
     lab.until(lambda: abs((session.coil_view().current or 0.0) - 0.05) < 2e-3)
+    lab.window.render_state()
+    assert "read back" in lab.window.review.manual.doing
     session.stop("test is over")
     lab.until(lambda: session.manual is None)
     assert session.state is State.READY and session.coil_view().verified_off
@@ -90,7 +94,7 @@ def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
     session.manual = hand
     state = CoilState(live=True, setpoint=0.1, measured=0.1, off=None)
     for _ in range(3):
-        hand.hear(CoilByHand(state, acted=True, read_back=True))
+        hand.hear(CoilByHand(state, opened=True, acted=True, read_back=True))
     lab.until(lambda: len(renewed) == 3)
     assert session.coil_view().current == 0.1
     hand.hear(HandOff(None, "The coil's thread ended without a word."))
