@@ -52,20 +52,24 @@ PANELS = (
     (
         "Steps and log",
         "One block per step, with the time left. The log tells what happened; filter "
-        "it, or add a note: it is stamped with the run's time and kept with the run.",
+        "it, or add a note: it is stamped with the run's time and kept with the run. "
+        "A click, or the arrow keys, open a long line in full; Ctrl+C copies it.",
     ),
     (
         "Results",
         "Fits are preliminary while the run lasts: the force of onset, the slope of "
         "the peak rate, the adaptation's time constant and the fall in the hold, each "
         "beside the model's. Bars tell how far the run is from the model: the root "
-        "mean square over the range of each voltage, and the median offset of spikes.",
+        "mean square over the range of each voltage (NRMSE), and the median offset of "
+        "spikes. The header's Model chip has that of V_C1: in step while the residual "
+        "keeps to its band by and large, else beside the run.",
     ),
     (
         "Runs",
-        "Enter or double click opens a run in the same lanes. Re-run puts its settings "
-        "into the form, or into the queue while a run is in progress. Tick two or "
-        "three to compare them, stacked or laid over each other.",
+        "Enter or double click opens a run in the same lanes; the one on screen has an "
+        "eye. Re-run puts its settings into the form, or into the queue while a run is "
+        "in progress. Tick two or three to compare them, stacked or laid over each "
+        "other.",
     ),
     (
         "Manual",
