@@ -153,9 +153,6 @@ class Incoming(Core):
 
     def _trial_ended(self, outcome: Outcome) -> None:
         self.outcomes.append(outcome)
-        if outcome.skipped:
-            text = f"{outcome.skipped} coil set-points came too late and were skipped"
-            self.log(Level.WARNING, "coil", text)
         self.trial_ended.emit(outcome)
 
     def _run_state(self, told: events.StateChanged) -> None:

@@ -90,6 +90,12 @@ class Account:
         if self.journal is not None:
             self.journal.outcome(outcome)
         self.emit(events.TrialEnded(outcome))
+        if outcome.skipped:
+            self.warn(
+                f"{outcome.trial.label}: {outcome.skipped} coil set-points came too "
+                "late and were skipped. The run holds what was applied. Relieve the "
+                "computer, or use a faster link to the source."
+            )
 
     def pause(self, start: float, end: float) -> None:
         """Nothing was streamed from `start` to `end` s of run time, as planned."""

@@ -109,6 +109,8 @@ class CoilThread(InstrumentThread):
             if self._energise:
                 self.coil.energise()
                 self.settings.update(self.coil.settings())
+                # before the first trial: its ramp would lose set-points to this
+                self._note(self._read_back(self.clock.now(), 0.0))
                 self._energise, self.live = False, True
                 self.clock.notify()
             now = self.clock.now()
@@ -148,10 +150,8 @@ class CoilThread(InstrumentThread):
             self._note(
                 Applied(now, acted, commanded, measured, self.coil.resistance_ratio)
             )
-        elif now - last.time >= READ_BACK_EVERY:
-            reading = self.coil.read_current()
-            ratio = self.coil.resistance_ratio
-            self._note(Applied(now, reading.time, last.setpoint, reading.value, ratio))
+        elif now - last.time >= READ_BACK_EVERY and self._rests(waveform, now):
+            self._note(self._read_back(now, last.setpoint))
         interval = self.coil.update_interval
         late = int((self.clock.now() - self._next) / interval)
         self.skipped += max(0, late - 1)
@@ -159,6 +159,18 @@ class CoilThread(InstrumentThread):
         arrived = self.last and abs(self.last.setpoint - setpoint) <= RESOLUTION
         if now >= self._until and arrived:
             self._waveform = None
+
+    def _rests(self, waveform: Waveform, now: float) -> bool:
+        """Whether a read-back delays no set-point: it takes about an update."""
+        soon = min(now + 2 * self.coil.update_interval, self._until)
+        ahead = waveform.at(soon) - waveform.at(min(now, self._until))
+        return abs(float(ahead)) <= RESOLUTION
+
+    def _read_back(self, now: float, setpoint: float) -> Applied:
+        """The current under a set-point that stands."""
+        reading = self.coil.read_current()
+        ratio = self.coil.resistance_ratio
+        return Applied(now, reading.time, setpoint, reading.value, ratio)
 
     def _note(self, applied: Applied) -> None:
         self.last = applied

@@ -80,7 +80,8 @@ def test_more_noise_means_a_higher_threshold(run_scene, short):
         *short, "detect.threshold=auto", 'simulated.noise={ V_K = "200 mV" }'
     )
     quiet = run_scene(*short)
-    assert ran.done.spikes == quiet.done.spikes
+    # the sample after a spike's peak may lie at 1.7 V: one in a hundred stays below
+    assert abs(ran.done.spikes - quiet.done.spikes) <= 1
     assert 1.2 < ran.stored().info["detection"]["threshold_V"] < 1.7
 
 

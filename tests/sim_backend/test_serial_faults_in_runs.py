@@ -60,6 +60,14 @@ def test_what_a_run_survives(tmp_path: Path, fault: SerialFault) -> None:
     assert samples > 150_000
 
 
+def test_set_points_that_came_too_late_are_told_and_stored(tmp_path: Path) -> None:
+    done, _ = run(tmp_path, SerialFault(kind="late", amount=0.25, line=PULSE))
+    with Run.load(done.folder) as stored:
+        assert stored.trials["skipped"].sum() > 0
+    log = (done.folder / "log.jsonl").read_text(encoding="utf-8")
+    assert "coil set-points came too late and were skipped" in log
+
+
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [
