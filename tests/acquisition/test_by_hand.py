@@ -16,6 +16,7 @@ def test_an_idle_coil_is_set_as_soon_as_it_is_asked_to():
         clock.wait_for(lambda: hand.thread.live)
         clock.sleep_until(clock.now() + 0.037)  # at no beat of the idle thread
         hand.alive()
+        hand.thread.take_applied()
         asked = clock.now()
         hand.thread.play(Waveform.constant(0.1), 1e9)
         clock.sleep_until(asked + 0.3)

@@ -221,10 +221,10 @@ def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
 
 def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     window = lab.window
-    window.opening.open_run(lab.runs(1)[0])
-    lab.until(lambda: window.opening.run is not None)
+    folder = lab.runs(1)[0]
+    window.opening.open_run(folder)
+    lab.until(lambda: window.session.run_name == f"Looking at {folder.name}")
     run, stack, view = window.opening.run, window.centre.stack, window.centre.view
-    lab.until(lambda: stack.source is run)
     begin, _ = run.holds[-1].held
     run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])
     view.show_span(begin, 0.25)
@@ -232,8 +232,8 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     def says(key: str) -> str:
         return stack.row(key).card.text
 
-    lab.until(lambda: says("spikes") == "2")
-    assert says("force") == "120.0" and says("rate") == "10.00"
+    lab.until(lambda: says("spikes") == "2" and says("force") == "120.0")
+    lab.until(lambda: says("rate") == "10.00")
     assert stack.row("spikes").card.more in ("", "of 4 · last ISI 100.0 ms")
     shown = run.trace("V_C1", begin, begin + 0.25, 500)
     assert abs(float(says("V_C1")) - shown.at(begin + 0.25)) < 0.02
