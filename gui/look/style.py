@@ -14,10 +14,15 @@ QFrame[role="panel"] { background: $panel; border: 1px solid $border;
   border-radius: 8px; }
 QFrame[role="card"] { background: $sunken; border: 1px solid $border;
   border-radius: 6px; }
-QFrame[role="card"]:focus, QFrame[role="card-chosen"]:focus {
-  border: 2px solid $accent; }
-QFrame[role="card-chosen"] { background: $selected; border: 1px solid $accent;
+QFrame[role="run"], QFrame[role="run-chosen"] { background: $sunken;
+  border: 1px solid $border; border-radius: 6px; padding: 1px 1px 1px 3px; }
+QFrame[role="run-chosen"] { border-left: 4px solid $accent; padding-left: 0; }
+QFrame[role="run"]:focus, QFrame[role="run-chosen"]:focus {
+  border: 2px solid $accent; padding: 0 0 0 2px; }
+QFrame[role="card-edited"] { background: $selected; border: 1px solid $accent;
   border-radius: 6px; }
+QFrame[role="card"]:focus, QFrame[role="card-edited"]:focus {
+  border: 2px solid $accent; }
 QFrame[role="lanecard"] { background: $sunken; border: 0;
   border-right: 1px solid $border; }
 QFrame[role="line"] { background: $border; border: 0; max-height: 1px;

@@ -55,7 +55,7 @@ class RunCard(QFrame):
         super().__init__()
         self.entry = entry
         self.thumbnail = ThumbnailView(theme)
-        self.setProperty("role", "card")
+        self.setProperty("role", "run")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setToolTip(
@@ -93,7 +93,7 @@ class RunCard(QFrame):
 
     def mark(self, *, chosen: bool, shown: bool) -> None:
         """Show whether it is the chosen one, and whether it is on screen."""
-        set_role(self, "card-chosen" if chosen else "card")
+        set_role(self, "run-chosen" if chosen else "run")
         self._eye.setVisible(shown)
         said = f"{self.entry.title}, {self.entry.status}, {self.entry.started}"
         self.setAccessibleName(f"{said}, on screen" if shown else said)

@@ -39,7 +39,7 @@ class QueueCard(QFrame):
         super().__init__()
         self.item, self.editing = item, editing
         number, count = place
-        self.setProperty("role", "card-chosen" if editing else "card")
+        self.setProperty("role", "card-edited" if editing else "card")
         self.setFixedHeight(ROW - 5)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
