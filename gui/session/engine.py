@@ -41,6 +41,7 @@ from gui.session.looking import Looking
 from gui.session.messages import Planned, Told, Twins, TwinSeen
 from gui.session.request import Request
 from gui.session.running import Running
+from gui.session.task import Task
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
 
@@ -62,7 +63,7 @@ class Engine:
     def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
         self._pipe, self._realtime = pipe, realtime
         self._sending = threading.Lock()
-        self._runs: dict[int, Running | Looking | Hand] = {}
+        self._runs: dict[int, Task] = {}
         self._twin: WholeTwin | None = None
         self._solving = threading.Lock()
 
@@ -122,7 +123,7 @@ class Engine:
             case MakeTwin(folder=folder) | LookAtTwin(folder=folder):
                 start(lambda: self._tell_twin(command, folder), "twin of a run")
 
-    def _begin(self, number: int, run: Running | Looking | Hand) -> None:
+    def _begin(self, number: int, run: Task) -> None:
         self._runs = {n: r for n, r in self._runs.items() if r.alive}
         self._runs[number] = run
         run.start()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gui.session.commands import TakeCoil
-from gui.session.messages import CoilByHand, FieldByHand, Gone, HandOff, Told
+from gui.session.messages import CoilByHand, FieldByHand, HandOff, Told
 from gui.session.request import Request
-from gui.session.threads import start
+from gui.session.task import Task
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
@@ -27,7 +26,7 @@ AT_LEAST = 0.2
 window for a renewal of the lease."""
 
 
-class Hand:
+class Hand(Task):
     """Drives the coil of one bench as the window says, until stopped.
 
     What it is asked goes straight to the coil's thread. The lease is the window's: if
@@ -39,24 +38,10 @@ class Hand:
     """
 
     def __init__(self, asked: TakeCoil, tell: Callable[[Told], None]) -> None:
-        self._asked, self._tell = asked, tell
+        super().__init__("coil by hand", tell)
+        self._asked = asked
         self._coil: ManualCoil | None = None
         self._current: float | None = None
-        self._stop_asked: str | None = None
-        self._lock = threading.Lock()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Open the source; its output stays off."""
-        self._thread = start(self._main, "coil by hand")
-
-    def stop(self, reason: str) -> None:
-        """Switch off; returns at once."""
-        with self._lock:
-            self._stop_asked = reason
-            coil = self._coil
-        if coil is not None:
-            coil.stop(reason)
 
     def hold(self, current: float) -> None:
         """Go to `current`, A, as soon as the source is open, and stay."""
@@ -76,21 +61,8 @@ class Hand:
         """What the coil belongs to; None before it is made."""
         return None if self._coil is None else self._coil.bench
 
-    @property
-    def alive(self) -> bool:
-        """Whether the coil has not been left yet."""
-        return self._thread is not None and self._thread.is_alive()
-
-    def join(self, timeout: float) -> None:
-        """Wait for the end, at most `timeout` s."""
-        if self._thread is not None:
-            self._thread.join(timeout)
-
-    def _main(self) -> None:
-        try:
-            self._tell(self._drive())
-        finally:
-            self._tell(Gone())
+    def _work(self) -> None:
+        self._tell(self._drive())
 
     def _drive(self) -> HandOff:
         from tactile_lab.acquisition.by_hand import ManualCoil
@@ -103,10 +75,8 @@ class Hand:
         coil.start()
         with self._lock:
             self._coil = coil
-            reason, current = self._stop_asked, self._current
-        if reason is not None:
-            coil.stop(reason)
-        elif current is not None:
+            current = self._current
+        if not self._stopped_by(coil) and current is not None:
             coil.hold(current)
         self._watch(coil)
         return HandOff(coil.off, coil.failure)

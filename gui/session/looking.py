@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gui.session.commands import RecordWatch, StartWatch
-from gui.session.messages import Begun, Broken, Gone, Recorded, Refused, Told
+from gui.session.messages import Begun, Broken, Recorded, Refused, Told
 from gui.session.sampling import tell_samples
+from gui.session.task import Task
 from gui.session.threads import start
 from gui.state import Fault
 from tactile_lab.acquisition.ending import CoilState
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 NO_COIL = CoilState(live=False, setpoint=None, measured=None, off=None)
 
 
-class Looking:
+class Looking(Task):
     """Watches until stopped; keeps the last minute when asked to.
 
     Args:
@@ -29,33 +30,9 @@ class Looking:
     """
 
     def __init__(self, asked: StartWatch, tell: Callable[[Told], None]) -> None:
-        self._asked, self._tell = asked, tell
+        super().__init__("watch", tell)
+        self._asked = asked
         self._watching: Watching | None = None
-        self._stop_asked: str | None = None
-        self._lock = threading.Lock()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Start to watch."""
-        self._thread = start(self._main, "watch")
-
-    def stop(self, reason: str) -> None:
-        """Let go of the instruments; returns at once."""
-        with self._lock:
-            self._stop_asked = reason
-            watching = self._watching
-        if watching is not None:
-            watching.stop(reason)
-
-    @property
-    def alive(self) -> bool:
-        """Whether it has not ended yet."""
-        return self._thread is not None and self._thread.is_alive()
-
-    def join(self, timeout: float) -> None:
-        """Wait for the end, at most `timeout` s."""
-        if self._thread is not None:
-            self._thread.join(timeout)
 
     def record(self, asked: RecordWatch) -> None:
         """Keep the last minute as a run, in a thread of its own."""
@@ -74,7 +51,7 @@ class Looking:
 
         start(work, "record")
 
-    def _main(self) -> None:
+    def _work(self) -> None:
         try:
             self._watch()
         except (TactileLabError, OSError) as error:
@@ -82,19 +59,14 @@ class Looking:
         except Exception as error:  # whatever it is, the window must be told
             title = f"Watching broke: {type(error).__name__}."
             self._tell(Broken(Fault(title, str(error)), None))
-        finally:
-            self._tell(Gone())
 
     def _watch(self) -> None:
         from tactile_lab.acquisition.watching import Watching
 
         scene = self._asked.request.load()
         watching = Watching(scene, realtime=True, emit=self._tell)
-        with self._lock:
-            self._watching = watching
-            reason = self._stop_asked
-        if reason is not None:
-            watching.stop(reason)
+        self._watching = watching
+        self._stopped_by(watching)
         gain = scene.bench.magnet.newtons_per_ampere
         self._tell(Begun(None, gain, scene.circuit.critical_V_C1))
         ended = threading.Event()

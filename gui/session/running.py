@@ -15,13 +15,13 @@ from gui.session.messages import (
     Broken,
     Ended,
     Errand,
-    Gone,
     Refused,
     Reported,
     Told,
     Twinned,
 )
 from gui.session.sampling import tell_samples
+from gui.session.task import Task
 from gui.session.threads import start
 from gui.state import Fault
 from tactile_lab.acquisition import events
@@ -36,7 +36,7 @@ TWINNED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
 """Signals beside which the twin runs."""
 
 
-class Running:
+class Running(Task):
     """Executes one request; STOP reaches it from any thread without waiting.
 
     Args:
@@ -48,25 +48,11 @@ class Running:
     def __init__(
         self, asked: StartRun, tell: Callable[[Told], None], *, realtime: bool = True
     ) -> None:
-        self._asked, self._tell, self._realtime = asked, tell, realtime
+        super().__init__("run", tell)
+        self._asked, self._realtime = asked, realtime
         self._execution: Execution | None = None
         self._twin: LiveTwin | None = None
-        self._stop_asked: str | None = None
         self._answers: SimpleQueue[str] = SimpleQueue()
-        self._lock = threading.Lock()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Start the run."""
-        self._thread = start(self._main, "run")
-
-    def stop(self, reason: str) -> None:
-        """Switch the coil off and end the run; returns at once."""
-        with self._lock:
-            self._stop_asked = self._stop_asked or reason
-            execution = self._execution
-        if execution is not None:
-            execution.stop(reason)
 
     def note(self, text: str, at: float) -> None:
         """Put a note into the run's log, stamped with its time, s."""
@@ -77,23 +63,10 @@ class Running:
         """The person has done what the run waits for, and typed `answer`."""
         self._answers.put(answer)
 
-    @property
-    def alive(self) -> bool:
-        """Whether the run has not ended yet."""
-        return self._thread is not None and self._thread.is_alive()
-
-    def join(self, timeout: float) -> None:
-        """Wait for the end, at most `timeout` s."""
-        if self._thread is not None:
-            self._thread.join(timeout)
-
-    def _main(self) -> None:
-        try:
-            execution = self._prepare()
-            if execution is not None:
-                self._run(execution)
-        finally:
-            self._tell(Gone())
+    def _work(self) -> None:
+        execution = self._prepare()
+        if execution is not None:
+            self._run(execution)
 
     def _prepare(self) -> Execution | None:
         from tactile_lab.acquisition.asked_field import AskedField
@@ -120,11 +93,8 @@ class Running:
             text = f"{type(error).__name__}: {error}"
             self._tell(Refused(Fault("The run broke before it began.", text)))
             return None
-        with self._lock:
-            self._execution = execution
-            reason = self._stop_asked
-        if reason is not None:
-            execution.stop(reason)
+        self._execution = execution
+        self._stopped_by(execution)
         return execution
 
     def _run(self, execution: Execution) -> None:
