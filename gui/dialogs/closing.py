@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.icons import pixmap
@@ -28,22 +28,9 @@ class Closing(Overlay):
         self.now = label("", "muted", wrap=True)
         self.keep = push("Keep running", "primary")
         self.stop = push("Stop, coil off and close", "danger")
-        buttons = QHBoxLayout()
-        buttons.addStretch(1)
-        buttons.addWidget(self.stop)
-        buttons.addWidget(self.keep)
-        words = QVBoxLayout()
-        words.setSpacing(8)
-        words.addWidget(self._title)
-        words.addWidget(self._text)
-        words.addWidget(self.now)
-        words.addSpacing(8)
-        words.addLayout(buttons)
-        row = QHBoxLayout(self.card)
-        row.setContentsMargins(24, 22, 22, 20)
-        row.setSpacing(16)
-        row.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(words, 1)
+        self.ask_with(
+            self._sign, [self._title, self._text, self.now], [self.stop, self.keep]
+        )
         self.keep.clicked.connect(self._keep)
         self.stop.clicked.connect(self._stop)
 

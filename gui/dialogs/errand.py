@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.icons import pixmap
@@ -122,24 +121,11 @@ class ErrandCard(Overlay):
         typed.setSpacing(10)
         typed.addWidget(self.entry)
         typed.addWidget(self.understood, 1)
-        buttons = QHBoxLayout()
-        buttons.addStretch(1)
-        buttons.addWidget(self.stop)
-        buttons.addWidget(self.done)
-        words = QVBoxLayout()
-        words.setSpacing(8)
-        words.addWidget(self.text)
-        words.addWidget(self.doubt)
-        words.addLayout(typed)
-        words.addWidget(self.before)
-        words.addWidget(self.coil)
-        words.addSpacing(8)
-        words.addLayout(buttons)
-        row = QHBoxLayout(self.card)
-        row.setContentsMargins(24, 22, 22, 20)
-        row.setSpacing(16)
-        row.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(words, 1)
+        self.ask_with(
+            self._sign,
+            [self.text, self.doubt, typed, self.before, self.coil],
+            [self.stop, self.done],
+        )
 
 
 def _amperes(current: float) -> str:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import QEvent, QObject, QRect, Qt
 from PySide6.QtGui import QColor, QHideEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
     QGraphicsDropShadowEffect,
+    QHBoxLayout,
     QLabel,
+    QLayout,
     QScrollArea,
+    QVBoxLayout,
     QWidget,
 )
 
@@ -38,6 +43,32 @@ class Overlay(QWidget):
         self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         window.installEventFilter(self)
         self.hide()
+
+    def ask_with(
+        self,
+        sign: QLabel,
+        words: Sequence[QWidget | QLayout],
+        answers: Sequence[QWidget],
+    ) -> None:
+        """Lay the card out as a question: a sign, words below each other, answers."""
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        for answer in answers:
+            buttons.addWidget(answer)
+        column = QVBoxLayout()
+        column.setSpacing(8)
+        for part in words:
+            if isinstance(part, QWidget):
+                column.addWidget(part)
+            else:
+                column.addLayout(part)
+        column.addSpacing(8)
+        column.addLayout(buttons)
+        row = QHBoxLayout(self.card)
+        row.setContentsMargins(24, 22, 22, 20)
+        row.setSpacing(16)
+        row.addWidget(sign, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(column, 1)
 
     def open(self) -> None:
         """Show the card."""
