@@ -12,11 +12,15 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog
 
 from gui.lanes.card import CARD
+from gui.lanes.compare import MARKS, Comparison
+from gui.lanes.decimate import FloatArray
 from gui.lanes.derive import rate_of
 from gui.lanes.expected import starts
-from gui.lanes.lane import Kind
+from gui.lanes.lane import Kind, Lane
 from gui.lanes.row import LaneRow
+from gui.lanes.source import Source
 from gui.lanes.stack import LaneStack
+from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.tokens import LIGHT, Tokens
 from gui.session.messages import Level
@@ -24,7 +28,6 @@ from gui.setup.texts import FieldError
 from tactile_lab.errors import TactileLabError
 
 if TYPE_CHECKING:
-    from gui.lanes.compare import Comparison
     from gui.lanes.stored import RunSource
     from gui.panels import Panels
 
@@ -124,6 +127,8 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
     painter.setPen(QColor(tokens.text))
     painter.setFont(sized(14, QFont.Weight.DemiBold))
     painter.drawText(QRectF(12, 6, size.width() - 24, 22), title)
+    if isinstance(stack.source, Comparison):
+        _legend(painter, stack.source, tokens, size.width() - 12)
     top = TITLE
     for row in stack.visible_rows():
         painter.save()
@@ -137,10 +142,30 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
         top += row.height()
 
 
+def _legend(
+    painter: QPainter, comparison: Comparison, tokens: Tokens, right: int
+) -> None:
+    """Marker and name of each run, beside the title."""
+    names = [
+        f"{m} {one.name}" for m, one in zip(MARKS, comparison.members, strict=False)
+    ]
+    for name, colour in zip(
+        reversed(names), reversed(tokens.runs[: len(names)]), strict=True
+    ):
+        width = painter.fontMetrics().horizontalAdvance(name)
+        painter.setPen(QColor(colour))
+        right -= width
+        painter.drawText(QRectF(right, 6, width + 2, 22), name)
+        right -= 16
+
+
 def _card(painter: QPainter, row: LaneRow, tokens: Tokens) -> None:
     kind = row.lane.kind
     name = "residual" if kind is Kind.RESIDUAL else row.lane.signal
-    painter.fillRect(QRectF(12, 9, 10, 10), QColor(tokens.trace(name)))
+    # in a comparison colour means run
+    grey = isinstance(row.plot.source, Comparison)
+    swatch = QColor(tokens.border_strong if grey else tokens.trace(name))
+    painter.fillRect(QRectF(12, 9, 10, 10), swatch)
     painter.setPen(QColor(tokens.text))
     painter.setFont(sized(13, QFont.Weight.DemiBold))
     unit = f" / {row.lane.unit}" if row.lane.unit else ""
@@ -154,32 +179,21 @@ def table(stack: LaneStack, title: str) -> str:
     """The visible time as CSV in SI: columns for each lane, units in the header.
 
     Lanes have times of their own, so each has its own time column; shorter columns
-    end early.
+    end early. Of compared runs each has columns, on the common time.
     """
-    view, columns = stack.view, []
+    source, columns = stack.source, []
+    runs: list[tuple[str, Source, float]] = [("", source, 0.0)]
+    if isinstance(source, Comparison):
+        runs = [
+            (f"run{k}_", m.source, m.shift) for k, m in enumerate(source.members, 1)
+        ]
+        names = (f"run{k} {m.name}" for k, m in enumerate(source.members, 1))
+        title = "; ".join([title, *names])
     for row in stack.visible_rows():
-        lane, source = row.lane, stack.source
-        if lane.kind is Kind.RESIDUAL:
-            continue
-        if lane.kind is Kind.RASTER:
-            first, last = np.searchsorted(source.spikes, [view.start, view.end])
-            columns.append(("spikes_s", source.spikes[first:last]))
-            continue
-        if lane.kind is Kind.RATE:
-            steps = starts(source.holds)
-            drawn = rate_of(source.spikes, view.start, view.end, 1 << 20, steps)
-        else:
-            drawn = source.trace(lane.signal, view.start, view.end, CSV_POINTS)
-        unit = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}.get(
-            lane.unit, lane.unit
-        )
-        columns.append((f"{lane.signal}_time_s", drawn.time))
-        for name, values in (
-            ("mean", drawn.mean),
-            ("min", drawn.low),
-            ("max", drawn.high),
-        ):
-            columns.append((f"{lane.signal}_{name}_{unit}", values))
+        if row.lane.kind is not Kind.RESIDUAL:
+            for prefix, run, shift in runs:
+                found = _columns(row.lane, run, stack.view, shift)
+                columns += [(prefix + name, values) for name, values in found]
     height = max((values.size for _, values in columns), default=0)
     lines = [f"# {title}; SI units", ",".join(name for name, _ in columns)]
     for at in range(height):
@@ -187,3 +201,26 @@ def table(stack: LaneStack, title: str) -> str:
             ",".join(f"{v[at]:.9g}" if at < v.size else "" for _, v in columns)
         )
     return "\n".join(lines) + "\n"
+
+
+def _columns(
+    lane: Lane, source: Source, view: TimeView, shift: float
+) -> list[tuple[str, FloatArray]]:
+    """Names and values of a lane's columns, `shift` s later than in the run."""
+    start, end = view.start - shift, view.end - shift
+    if lane.kind is Kind.RASTER:
+        first, last = np.searchsorted(source.spikes, [start, end])
+        return [("spikes_s", source.spikes[first:last] + shift)]
+    if lane.kind is Kind.RATE:
+        drawn = rate_of(source.spikes, start, end, 1 << 20, starts(source.holds))
+    else:
+        drawn = source.trace(lane.signal, start, end, CSV_POINTS)
+    unit = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}.get(
+        lane.unit, lane.unit
+    )
+    return [
+        (f"{lane.signal}_time_s", drawn.time + shift),
+        (f"{lane.signal}_mean_{unit}", drawn.mean),
+        (f"{lane.signal}_min_{unit}", drawn.low),
+        (f"{lane.signal}_max_{unit}", drawn.high),
+    ]

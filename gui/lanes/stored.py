@@ -226,9 +226,9 @@ class RunSource:
                 return
             self._wanted[signal] = view
             if self._reader is None:
-                self._reader = threading.Thread(
-                    target=self._read, name="zoom", daemon=True
-                )
+                # no daemon: one that dies within a read takes HDF5's lock along, and
+                # the process never ends
+                self._reader = threading.Thread(target=self._read, name="zoom")
                 self._reader.start()
 
     def _read(self) -> None:

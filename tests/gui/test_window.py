@@ -10,6 +10,7 @@ from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPushButton, QToolButton
 
+from gui.dialogs.saving import table
 from gui.lanes.expected import PlanSource
 from gui.session.session import Queued
 from gui.state import State, Truth
@@ -416,6 +417,15 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert not at_cursor.isEnabled(), "there is no cursor to align at"
     window.centre.compare_bar.layout_.group.button(2).click()
     lab.until(lambda: "less ●" in stack.row("V_C1").card.text)
+    view = window.centre.view
+    view.show_span(0.0, 1.0)
+    lines = table(stack, "Comparing 2 runs").splitlines()
+    assert lines[0].count("run1 ") == lines[0].count("run2 ") == 1
+    header = lines[1].split(",")
+    for run, member in zip(("run1", "run2"), comparison.members, strict=True):
+        time = float(lines[2].split(",")[header.index(f"{run}_force_time_s")])
+        known = member.source.trace("force", 0.0, 1.0, 100)
+        assert abs(time - known.time[0] - member.shift) < 1e-6
     window.opening.close_run()
     assert not window.centre.compare_bar.isVisible()
     assert stack.source is session.source, "back to the last run"
