@@ -28,7 +28,7 @@ SETTLE = 0.02
 RECONNECT = 1.0
 """How long to try to open a lost port again before each attempt, s."""
 
-UNKNOWN = "OUTPUT STATE UNKNOWN - switch the coil source off at the instrument. "
+UNKNOWN = "OUTPUT STATE UNKNOWN: switch the coil source off at the instrument. "
 
 DOUBT = (
     " It did not confirm every line, so its set-point may not be 0 A: look before you "

@@ -130,7 +130,7 @@ def switch_off(told: dict[str, Any], port: serial.SerialBase, log: Log) -> bool:
                 reasons.add(str(reason))
                 log.write(f"trying again: {reason}")
             time.sleep(RETRY)
-    log.write("OUTPUT STATE UNKNOWN - switch the coil source off at the instrument")
+    log.write("OUTPUT STATE UNKNOWN: switch the coil source off at the instrument")
     return False
 
 

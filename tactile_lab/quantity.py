@@ -117,10 +117,12 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     """`value` (SI) for a person: "50 mN", with a prefix that keeps 1 to 999 in front.
 
     Areas are in m^2 or mm^2; other powers and compound units get no prefix. A true
-    minus is used.
+    minus is used. Below 1e-18 it is a rounding error, and 0 for a person.
     """
     if not math.isfinite(value):
         return f"{value} {unit}"
+    if abs(value) < 1e-18:
+        value = 0.0
     prefix, number = "", value
     if unit in ("m^2", "m²") and 0 < abs(value) < 0.01:
         prefix, number = "m", value * 1e6

@@ -99,6 +99,8 @@ def test_what_is_shown_is_right_to_its_digits(value):
         (999.96, "V", "1 kV"),
         (1e6, "S/s", "1 MS/s"),
         (2.25e-4, "m^2", "225 mm^2"),
+        (-8.3e-20, "T", "0 T"),
+        (1.41e-15, "A", "1.41 fA"),
         (float("inf"), "s", "inf s"),
     ],
 )
