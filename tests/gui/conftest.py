@@ -74,6 +74,8 @@ class Lab:
         while session.queue:
             session.unqueue(0)
         window.closing.hide()
+        window.activateWindow()  # another test may have had a window of its own
+        self.until(window.isActiveWindow)
         if session.busy:
             session.stop("test is over")
         session.watch(False)
