@@ -166,4 +166,6 @@ def thinned(
     if np.count_nonzero(gap) > 1:
         edges = np.union1d(edges, np.flatnonzero(gap))
     low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
-    return Drawn(time[edges], low, high, (low + high) / 2, gap[edges])
+    counts = np.diff(np.append(edges, value.size))
+    mean = np.add.reduceat(value, edges) / counts
+    return Drawn(time[edges], low, high, mean, gap[edges])

@@ -158,9 +158,12 @@ class LanePainter:
             self._plan(painter, frame, source, tokens)
             measured = Drawn.nothing()
         if self.lane.averaged:
+            spiky = self.lane.signal == "V_K"
+            if not spiky:
+                tint = paint.mixed(tokens.twin, tokens.plot, 0.2)
+                paint.envelope(painter, frame, twin, tint)
             tint = paint.mixed(colour, tokens.plot, 0.3)
             paint.envelope(painter, frame, measured, tint)
-            spiky = self.lane.signal == "V_K"
             shown = twin if spiky else averaged(twin)
             paint.trace(painter, frame, shown, paint.pen(tokens.twin))
             paint.trace(painter, frame, averaged(measured), paint.pen(colour))

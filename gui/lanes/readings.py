@@ -39,7 +39,10 @@ def newest(lane: Lane, source: Source) -> float | None:
     if lane.kind is Kind.RASTER:
         return float(source.spikes.size)
     if lane.kind is Kind.RATE:
-        return rate_at(source.spikes, reach, starts(source.holds))
+        spikes = source.spikes
+        # spikes may be told before the samples they were found in
+        now = max(reach, float(spikes[-1])) if spikes.size else reach
+        return rate_at(spikes, now, starts(source.holds))
     if lane.kind is Kind.RESIDUAL:
         reach = min(reach, source.followed)
     drawn = traces(lane, source, reach - 0.05, reach, 50, model=False)[0]
@@ -122,7 +125,7 @@ def _value(
     lane: Lane, source: Source, time: float, own: float, drawn: Drawn
 ) -> float | None:
     """At `time` of the picture, which is `own` of the run."""
-    if not 0 <= own <= source.reach:
+    if source.reach <= 0 or not 0 <= own <= source.reach:
         return None
     if lane.kind is Kind.RATE:
         return rate_at(source.spikes, own, starts(source.holds))

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.axis import decimals, nice_range, number, signed, ticks
-from gui.lanes.decimate import columns, zigzag
+from gui.lanes.decimate import columns, line_between, zigzag
 from gui.lanes.derive import rate_at, rate_of
 from gui.lanes.expected import Aligned, Hold, Preview
 from gui.lanes.history import COARSE, FINE, SlowTrack, Track
@@ -35,6 +35,15 @@ def test_columns_do_not_wander_when_the_view_scrolls() -> None:
     two = columns(rows[:, 103:5103], 500, 1e-3)
     both = np.intersect1d(one.time[1:-1], two.time[1:-1])
     assert both.size > 0.95 * one.time.size
+
+
+def test_dense_line_keeps_extremes_and_means() -> None:
+    time = np.arange(0.0, 100.0, 0.01)
+    saw = (time % 0.5) * 2  # from 0 to 1, 0.49 in the mean
+    drawn = line_between(time, saw, 0.0, 100.0, 25)
+    assert drawn.time.size <= 100
+    assert drawn.low.min() == 0.0 and drawn.high.max() == saw.max()
+    assert np.allclose(drawn.mean, 0.49, atol=1e-9), "columns of whole periods"
 
 
 def test_gap_breaks_the_line() -> None:

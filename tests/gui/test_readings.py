@@ -7,8 +7,17 @@ from PySide6.QtWidgets import QApplication
 from gui.lanes.card import LINE, TITLE, LaneCard
 from gui.lanes.decimate import HOLDS, Drawn
 from gui.lanes.lane import Lane, lanes_for
-from gui.lanes.readings import Painted, count_between, interval_text, view_text
+from gui.lanes.readings import (
+    Painted,
+    count_between,
+    interval_text,
+    newest,
+    values_at,
+    view_text,
+)
+from gui.lanes.source import LiveSource
 from gui.look.theme import Theme
+from tactile_lab.acquisition.live import Bins
 
 LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "spikes"})}
 
@@ -101,3 +110,15 @@ def test_what_is_at_the_cursors_takes_the_place_of_the_value_where_it_is_low(the
     assert low.sizeHint().height() <= 48 < high.sizeHint().height()
     low.show_more("")
     assert not low.more and low.text == "3.721"
+
+
+def test_newest_rate_counts_a_spike_told_before_its_samples() -> None:
+    source = LiveSource(None, 1.0)
+    rate = next(lane for lane in LANES.values() if lane.key == "rate")
+    assert newest(rate, source) is None, "nothing was measured"
+    assert values_at(rate, source, 0.0, Painted()) == (None,)
+    source.add_bins(
+        {"V_C1": Bins(np.array([0.0, 1.0]), 1.0, *[np.zeros(2, np.float32)] * 3)}
+    )
+    source.add_spikes((1.8, 1.9, 2.01))
+    assert abs(newest(rate, source) - 1 / 0.11) < 1e-9
