@@ -62,6 +62,7 @@ def main(folder: Path) -> None:
         ):
             scene(stage)
         stage.close()
+        _calibration(folder)
         _read_by_a_person(folder)
 
 
@@ -211,6 +212,22 @@ def _unplugged(stage: Stage) -> None:
     stage.live(0.3)
     stage.shoot("window_fault_dark", "dark")
     stage.shoot("window_fault_light")
+
+
+def _calibration(folder: Path) -> None:
+    """The field calibration from its page; as fast as it computes."""
+    stage = Stage(folder, "sim", realtime=False)
+    stage.until(lambda: stage.session.state is State.READY)
+    stage.planned()
+    dialog = _connect(stage)
+    dialog.show_page(2)
+    dialog.calibration.field.click()
+    stage.until(lambda: stage.session.state is State.RUNNING)
+    stage.ended()
+    stage.until(dialog.calibration.use.isVisible)
+    stage.live(0.3)
+    stage.shoot("window_calibration")
+    stage.close()
 
 
 def _read_by_a_person(folder: Path) -> None:

@@ -89,7 +89,8 @@ def _scope(session: Core) -> InstrumentView:
         return InstrumentView(NAMES["scope"], lamp, words)
     if expectation is not None:
         rate = expectation.record.sample_rate
-        words = f"{len(expectation.needs.channels)} channels · 8 bit"
+        count = len(expectation.needs.channels)
+        words = f"{count} channel{'' if count == 1 else 's'} · 8 bit"
         if session.monitor.alive:
             lamp, value = Lamp.ACTIVE, "monitor"
         elif session.state is State.RUNNING:
