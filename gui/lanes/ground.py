@@ -24,6 +24,9 @@ GUTTER = 56
 LINE = 13
 """Height that a number on the axis needs, px."""
 
+CLOSE = 3
+"""Pixels for each hold below which they are painted as one."""
+
 TIME_AXIS = 22
 """Height of the time axis below the last lane, px."""
 
@@ -44,7 +47,8 @@ def ground(
     painter: QPainter, frame: Frame, source: Source, tokens: Tokens, place: Place
 ) -> None:
     """Bands of holds, grid, axis numbers, hold names, the future."""
-    for hold, left, right in _visible(source, frame):
+    holds = _visible(source, frame)
+    for hold, left, right in holds:
         band = QRectF(left, 0, right - left, frame.bottom + 3)
         painter.fillRect(band, QColor(tokens.sunken if hold.pause else tokens.band))
     if source.running and source.reach < frame.end:
@@ -56,25 +60,32 @@ def ground(
     if place.values:
         _value_grid(painter, frame, tokens)
     if place.top:
-        _names(painter, frame, source, tokens)
+        _names(painter, holds, tokens)
 
 
 def _visible(source: Source, frame: Frame) -> list[tuple[Hold, float, float]]:
-    """Holds in view with their left and right ends, px."""
+    """Holds in view with their left and right ends, px.
+
+    Where they are too many to be told apart, one that spans them all.
+    """
+    holds = [h for h in source.holds if h.end > frame.start and h.start < frame.end]
+    if len(holds) * CLOSE > frame.right - frame.left:
+        holds = [Hold(holds[0].start, holds[-1].end, "")]
     return [
         (
             hold,
             max(frame.x1(hold.start), frame.left),
             min(frame.x1(hold.end), frame.right),
         )
-        for hold in source.holds
-        if hold.end > frame.start and hold.start < frame.end
+        for hold in holds
     ]
 
 
-def _names(painter: QPainter, frame: Frame, source: Source, tokens: Tokens) -> None:
+def _names(
+    painter: QPainter, holds: list[tuple[Hold, float, float]], tokens: Tokens
+) -> None:
     """Names of the holds, over the grid."""
-    for hold, left, right in _visible(source, frame):
+    for hold, left, right in holds:
         if right - left > 34:
             text = "recovery" if hold.pause else hold.label
             painter.save()
