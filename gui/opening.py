@@ -51,6 +51,7 @@ class Opening(QObject):
         self.gathering = Gathering(panels.review.results, self)
         Agreeing(panels.session, self.gathering)
         self._model: object = None
+        self._ended: Path | None = None
         self._records = Records(panels.session, self)
         self._records.loaded.connect(self._show_run)
         self._records.exchanged.connect(self._exchange)
@@ -162,6 +163,7 @@ class Opening(QObject):
     def follow_run(self, source: LiveSource) -> None:
         """Show the run that begins."""
         self.leave_run()
+        self._ended = None
         panels = self._panels
         self.show_lanes()
         panels.centre.stack.show_source(source)
@@ -192,6 +194,7 @@ class Opening(QObject):
             self._panels.centre.view.set_now(source.reach, source.length)
         self.gathering.end(done, source)
         if (done.folder / DATA).exists():  # not where it ended before the first sample
+            self._ended = done.folder
             self._records.exchange(done.folder)
         self.list_runs()
 
@@ -218,6 +221,8 @@ class Opening(QObject):
             centre.stack.show_source(source)
             centre.view.set_now(source.reach, source.length)
             centre.view.show_all()
+            if self._ended is not None:
+                self._records.exchange(self._ended)
         self._panels.setup.plan_now()
 
     def show_lanes(self) -> None:

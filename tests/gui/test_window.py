@@ -429,6 +429,8 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window.opening.close_run()
     assert not window.centre.compare_bar.isVisible()
     assert stack.source is session.source, "back to the last run"
+    lab.until(lambda: stack.source is window.opening.run, 30.0)
+    assert window.opening.run.path == session.folder, "and then to its record"
     lab.until(lambda: "●" not in stack.row("V_C1").card.text)
 
 
