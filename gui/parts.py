@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
@@ -57,9 +57,22 @@ def panel(role: str = "panel") -> QFrame:
     return made
 
 
+class Primary(QPushButton):
+    """A filled button; a border alone would not show on it where the keyboard is."""
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the button, and a ring inside it while it has the focus."""
+        super().paintEvent(event)
+        if self.hasFocus():
+            painter = QPainter(self)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(self.palette().color(QPalette.ColorRole.ButtonText), 2))
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(4, 4, -4, -4), 3, 3)
+
+
 def push(text: str, role: str = "", *, name: str = "") -> QPushButton:
     """A push button with an accessible name."""
-    made = QPushButton(text)
+    made = Primary(text) if role == "primary" else QPushButton(text)
     if role:
         made.setProperty("role", role)
     made.setAccessibleName(name or text)

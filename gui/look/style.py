@@ -74,7 +74,7 @@ QPushButton:disabled, QToolButton:disabled { color: $faint; background: $sunken;
 QPushButton[role="primary"] { background: $accent; color: $on_accent;
   border: 1px solid $accent; font-weight: 600; }
 QPushButton[role="primary"]:hover { background: $accent_hover; }
-QPushButton[role="primary"]:focus { border: 6px double $on_accent; padding: 0 7px; }
+QPushButton[role="primary"]:focus { border: 1px solid $accent; padding: 5px 12px; }
 QPushButton[role="primary"]:disabled { background: $selected; color: $faint;
   border-color: $selected; }
 QPushButton[role="danger"] { color: $red; border: 1px solid $red; font-weight: 600; }
