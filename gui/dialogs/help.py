@@ -68,8 +68,8 @@ PANELS = (
         "Runs",
         "Enter or double click opens a run in the same lanes; the one on screen has an "
         "eye. Re-run puts its settings into the form, or into the queue while a run is "
-        "in progress. Tick two or three to compare them, stacked or laid over each "
-        "other.",
+        "in progress. Tick two or three to compare them: stacked, laid over each "
+        "other, or less the first; aligned by start, by step, or by cursor A.",
     ),
     (
         "Manual",
