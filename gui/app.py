@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import QApplication
 from gui.look import fonts
 from gui.look.theme import Theme
 from gui.session.session import Session
+from gui.session.threads import start
 from gui.window import Window
 
 
@@ -69,9 +71,15 @@ def begin(window: Window, target: str | None, bench: str | None) -> None:
     if is_run and path is not None:
         window.opening.open_run(path)
     window.opening.list_runs()
+    start(_load_reader, "load reader")
     window.page.setFocus()
     if bench is not None:  # in a turn of its own: the scene is painted meanwhile
         QTimer.singleShot(0, lambda: window.session.connect_bench(bench))
+
+
+def _load_reader() -> None:
+    """Load what reads runs now: at the end of a run it would hold up the lanes."""
+    importlib.import_module("gui.lanes.stored")
 
 
 def _close_on_signals(window: Window) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from gui.agreeing import Agreeing
 from gui.choosing import choose_run, choose_scene
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
 
 
+LATER = 1000
+"""Milliseconds after a run's end until runs are listed anew: its record comes first."""
+
+
 class Opening(QObject):
     """What is on screen: the plan, the run in progress, or a run from disk.
 
@@ -48,7 +52,7 @@ class Opening(QObject):
         self._panels = panels
         self.run: RunSource | Comparison | None = None
         self.ending = ""
-        self.gathering = Gathering(panels.review.results, self)
+        self.gathering = Gathering(panels.review.results, panels.session, self)
         Agreeing(panels.session, self.gathering)
         self._model: object = None
         self._ended: Path | None = None
@@ -196,7 +200,7 @@ class Opening(QObject):
         if (done.folder / DATA).exists():  # not where it ended before the first sample
             self._ended = done.folder
             self._records.exchange(done.folder)
-        self.list_runs()
+        QTimer.singleShot(LATER, self.list_runs)
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""

@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from gui.lanes.lane import title_of
 from gui.look.theme import Theme
 from gui.parts import column, label, panel, row
-from gui.review.fit import Bar, Card
 from gui.review.wording import unbroken
+from gui.session.fit import Bar, Card
 
 ROW = 19
 """Height of a bar's row, px."""

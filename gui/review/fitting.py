@@ -1,4 +1,4 @@
-"""Has the steps so far fitted away from the window's thread; the newest fit counts."""
+"""Has the steps so far fitted beside the window; the newest fit counts."""
 
 from __future__ import annotations
 
@@ -8,36 +8,57 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.compare import Comparison
 from gui.lanes.source import Source
-from gui.review.finding import Finding
-from gui.review.fit import Fit, beside, fit
-from gui.session.threads import start
+from gui.session.finding import Finding
+from gui.session.fit import Beside, beside
+from gui.session.messages import Fitted
+from gui.session.session import Session
 
 
 class Fitting(QObject):
-    """One fit at a time is on its way to the results."""
+    """One fit at a time is on its way to the results.
+
+    Args:
+        session: has the fits made; in a thread of this process, they would take more
+            from the frames than their own time.
+        parent: owner.
+    """
 
     fitted = Signal(object)
     """The newest `Fit`; None where there is nothing to fit."""
-    _done = Signal(int, object)
 
-    def __init__(self, parent: QObject) -> None:
+    def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
+        self._session = session
         self._serial = 0
-        self._done.connect(self._take)
+        self._busy = False
+        self._next: tuple[tuple[Finding, ...], Beside] | None = None
+        session.fitted.connect(self._take)
 
     def ask(self, findings: Sequence[Finding], source: Source | None) -> None:
         """Fit `findings`, and compare `source` with the model beside it."""
         self._serial += 1
         if source is None or isinstance(source, Comparison):
+            self._next = None
             self.fitted.emit(None)
             return
-        serial, steps, seen = self._serial, list(findings), beside(source)
-        start(lambda: self._done.emit(serial, fit(steps, seen)), "fit")
+        self._next = tuple(findings), beside(source)
+        self._go_on()
 
     def forget(self) -> None:
         """A fit that is on its way no longer counts."""
         self._serial += 1
+        self._next = None
 
-    def _take(self, serial: int, found: Fit) -> None:
-        if serial == self._serial:
-            self.fitted.emit(found)
+    def _go_on(self) -> None:
+        """Have the newest fit made, unless one is on its way."""
+        if self._busy or self._next is None:
+            return
+        (steps, seen), self._next = self._next, None
+        self._busy = True
+        self._session.fit(self._serial, steps, seen)
+
+    def _take(self, told: Fitted) -> None:
+        self._busy = False
+        if told.serial == self._serial:
+            self.fitted.emit(told.found)
+        self._go_on()

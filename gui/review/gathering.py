@@ -10,10 +10,11 @@ from PySide6.QtGui import QDesktopServices
 
 from gui.lanes.source import LiveSource, Source
 from gui.review.conclusion import conclusion_of
-from gui.review.finding import Finding, facts_of, loss_text, of_outcome, of_run
-from gui.review.fit import Fit
 from gui.review.fitting import Fitting
 from gui.review.results import ResultsView
+from gui.session.finding import Finding, facts_of, loss_text, of_outcome, of_run
+from gui.session.fit import Fit
+from gui.session.session import Session
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.errors import RunFolderError
 from tactile_lab.trial import Outcome
@@ -34,7 +35,7 @@ class Gathering(QObject):
     agreed = Signal(object)
     """How well the model follows now: an `Agreement`, or None if nobody knows."""
 
-    def __init__(self, view: ResultsView, parent: QObject) -> None:
+    def __init__(self, view: ResultsView, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self.findings: list[Finding] = []
         self.folder: Path | None = None
@@ -42,7 +43,7 @@ class Gathering(QObject):
         self._whole = False
         self._elsewhere = False
         self._total = 0
-        self._fitting = Fitting(self)
+        self._fitting = Fitting(session, self)
         self._fitting.fitted.connect(self._show_fit)
 
     def begin(self, steps: int, *, fires: bool) -> None:

@@ -28,12 +28,12 @@ from gui.parts import (
     stack,
     with_gutter,
 )
-from gui.review.finding import Finding
-from gui.review.fit import Fit
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.loop import LoopPlot
 from gui.review.rate_plot import RatePlot
 from gui.review.wording import unbroken
+from gui.session.finding import Finding
+from gui.session.fit import Fit
 
 HEAD, ROW, MOST = 52, 26, 12
 """Heights of the table's head and of a row, px; rows that always have room."""

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gui.session.request import Request
+
+if TYPE_CHECKING:
+    from gui.session.finding import Finding
+    from gui.session.fit import Beside
 
 
 @dataclass(frozen=True)
@@ -153,6 +158,15 @@ class LookAtTwin:
     bins: int
 
 
+@dataclass(frozen=True, eq=False)
+class FitSteps:
+    """Fit steps, and compare what was seen with the model; `serial` comes back."""
+
+    serial: int
+    steps: tuple[Finding, ...]
+    seen: Beside
+
+
 @dataclass(frozen=True)
 class Leave:
     """The window closes: end all runs, then the process."""
@@ -173,5 +187,6 @@ Command = (
     | CheckBench
     | MakeTwin
     | LookAtTwin
+    | FitSteps
     | Leave
 )

@@ -62,6 +62,10 @@ class Core(QObject):
         realtime: a simulated bench is paced by the wall clock.
 
     Attributes:
+        link: to the engine, which drives instruments.
+        desk: to a second one that fits and solves models and holds no instrument: its
+            work delays no set-point, and as a thread of the window it would delay
+            frames.
         expectation: plan of what the form asks for; None until it is computed.
         running: plan of the run in progress or the last one; None without one.
         running_request, running_title: what that was asked to do, and its name.
@@ -81,6 +85,7 @@ class Core(QObject):
     recorded = Signal(object)
     twinned = Signal(object)
     twin_seen = Signal(object)
+    fitted = Signal(object)
     queue_changed = Signal()
 
     def __init__(
@@ -114,6 +119,8 @@ class Core(QObject):
         self.coil = CoilWatch()
         self.inbox: SimpleQueue[Told] = SimpleQueue()
         self.link = Link(self.inbox, separate=separate, realtime=realtime)
+        self.desk_inbox: SimpleQueue[Told] = SimpleQueue()
+        self.desk = Link(self.desk_inbox, separate=separate)
         self.monitor = Monitor(self.link)
         self.folder: Path | None = None
         self._run: RunAfar | None = None

@@ -22,6 +22,7 @@ from gui.session.commands import (
     CheckBench,
     Command,
     ErrandDone,
+    FitSteps,
     Leave,
     LookAtTwin,
     MakePlan,
@@ -38,7 +39,7 @@ from gui.session.commands import (
 )
 from gui.session.hand import Hand, read_field
 from gui.session.looking import Looking
-from gui.session.messages import Planned, Told, Twins, TwinSeen
+from gui.session.messages import Fitted, Planned, Told, Twins, TwinSeen
 from gui.session.request import Request
 from gui.session.running import Running
 from gui.session.task import Task
@@ -120,6 +121,8 @@ class Engine:
                 start(lambda: self.tell(0, _planned(serial, request)), "plan")
             case CheckBench(request=request):
                 start(lambda: self._check(request), "check")
+            case FitSteps():
+                start(lambda: self.tell(0, _fitted(command)), "fit")
             case MakeTwin(folder=folder) | LookAtTwin(folder=folder):
                 start(lambda: self._tell_twin(command, folder), "twin of a run")
 
@@ -177,6 +180,15 @@ def main(pipe: Connection, realtime: bool = True) -> None:
 def _leave(number: int, frame: object) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise EOFError
+
+
+def _fitted(asked: FitSteps) -> Fitted:
+    from gui.session.fit import fit
+
+    try:
+        return Fitted(asked.serial, fit(asked.steps, asked.seen))
+    except (TactileLabError, ValueError, ArithmeticError):
+        return Fitted(asked.serial, None)
 
 
 def _planned(serial: int, request: Request) -> Planned:

@@ -17,6 +17,7 @@ from gui.session.messages import (
     Ended,
     Errand,
     FieldByHand,
+    Fitted,
     HandOff,
     Level,
     Line,
@@ -53,7 +54,23 @@ class Incoming(Core):
             except Empty:
                 break
             self._take(told)
+        self._mind_desk()
         return self.source is not None and self.source.take_new()
+
+    def _mind_desk(self) -> None:
+        """Take what the desk told: it holds no instrument."""
+        while not self.desk_inbox.empty():
+            match told := self.desk_inbox.get_nowait():
+                case Fitted():
+                    self.fitted.emit(told)
+                case Twins():
+                    self.twinned.emit(told)
+                case TwinSeen():
+                    self.twin_seen.emit(told)
+                case Lost(why=why):
+                    text = f"Fits and the model beside runs were interrupted: {why}"
+                    self.log(Level.WARNING, "desk", text)
+                    self.fitted.emit(Fitted(-1, None))
 
     def _take(self, told: Told) -> None:
         match told:
@@ -121,10 +138,6 @@ class Incoming(Core):
                     self.readings["field"] = mean
                 self.log(Level.INFO if mean is not None else Level.ERROR, "meter", text)
                 self.changed.emit()
-            case Twins():
-                self.twinned.emit(told)
-            case TwinSeen():
-                self.twin_seen.emit(told)
             case Lost():
                 self._lost(told)
             case Line():

@@ -14,7 +14,9 @@ from gui.session.commands import (
     CheckBench,
     Command,
     ErrandDone,
+    FitSteps,
     Leave,
+    LookAtTwin,
     MakePlan,
     MakeTwin,
     ReadField,
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 
 Inbox = SimpleQueue[Told]
 
-OPENING = (MakePlan, CheckBench, MakeTwin, ReadField)
+OPENING = (MakePlan, CheckBench, MakeTwin, LookAtTwin, FitSteps, ReadField)
 """What an engine is started for; the rest concerns something in one that has died."""
 
 

@@ -18,6 +18,7 @@ from tactile_lab.bench import CoilLimits, OffReport
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
     from gui.session.expectation import Expectation
+    from gui.session.fit import Fit
     from tactile_lab.acquisition.ending import CoilState, Executed
 
 
@@ -227,6 +228,14 @@ class TwinSeen:
     part: TwinSlice
 
 
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The fit that was asked for as `serial`; None where it broke."""
+
+    serial: int
+    found: Fit | None
+
+
 @dataclass(frozen=True)
 class Gone:
     """A run's thread has ended; nothing of it holds an instrument any more."""
@@ -258,6 +267,7 @@ Told = (
     | Twinned
     | Twins
     | TwinSeen
+    | Fitted
     | Gone
     | Lost
     | Line

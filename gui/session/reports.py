@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -34,7 +35,9 @@ def write_report(folder: Path) -> None:
 
 
 def main(folder: str) -> None:
-    """Write the report of the run in `folder`."""
+    """Write the report of the run in `folder`; the window and a next run come first."""
+    if hasattr(os, "nice"):
+        os.nice(10)
     from tactile_lab.report.from_run import read
     from tactile_lab.report.write import write
 

@@ -8,9 +8,17 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gui.session import chips
-from gui.session.commands import CheckBench, LookAtTwin, MakePlan, MakeTwin, ReadField
+from gui.session.commands import (
+    CheckBench,
+    FitSteps,
+    LookAtTwin,
+    MakePlan,
+    MakeTwin,
+    ReadField,
+)
 from gui.session.core import Core, Queued
 from gui.session.incoming import Incoming
 from gui.session.messages import Level
@@ -20,6 +28,10 @@ from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import check_scope
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
+
+if TYPE_CHECKING:
+    from gui.session.finding import Finding
+    from gui.session.fit import Beside
 
 __all__ = ["Core", "Queued", "Session"]
 
@@ -71,11 +83,15 @@ class Session(Incoming):
 
     def make_twin(self, folder: Path) -> None:
         """Have the twin of a run on disk computed; `twinned` tells the result."""
-        self.link.ask(MakeTwin(folder))
+        self.desk.ask(MakeTwin(folder))
 
     def look_at_twin(self, folder: Path, start: float, end: float, bins: int) -> None:
         """Have that twin sampled between two times, s; `twin_seen` tells the result."""
-        self.link.ask(LookAtTwin(folder, start, end, bins))
+        self.desk.ask(LookAtTwin(folder, start, end, bins))
+
+    def fit(self, serial: int, steps: tuple[Finding, ...], seen: Beside) -> None:
+        """Have steps fitted and compared with the model; `fitted` tells the result."""
+        self.desk.ask(FitSteps(serial, steps, seen))
 
     def stop(self, reason: str = "STOP in the window") -> None:
         """Coil off, now. Reaches the coil's thread directly and never waits.
@@ -226,3 +242,4 @@ class Session(Incoming):
     def close(self) -> None:
         """Let go of the engine; nothing drives a coil any more."""
         self.link.close()
+        self.desk.close()

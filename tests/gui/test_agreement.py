@@ -3,8 +3,8 @@
 import numpy as np
 
 from gui.lanes.decimate import Drawn
-from gui.review.fit import Beside, fit
 from gui.session.agreement import Agreement
+from gui.session.fit import Beside, fit
 from gui.state import Lamp
 
 

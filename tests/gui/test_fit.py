@@ -9,10 +9,10 @@ from PySide6.QtWidgets import QLabel
 
 from gui.lanes.decimate import Drawn
 from gui.lanes.readings import interval_text
-from gui.review.finding import Finding, finding
-from gui.review.fit import Beside, fit
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.wording import unbroken
+from gui.session.finding import Finding, finding
+from gui.session.fit import Beside, fit
 
 HOLD = (0.0, 2.0)
 

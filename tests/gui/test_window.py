@@ -389,7 +389,8 @@ def test_frames_lose_no_references(lab) -> None:
 
 def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
-    lab.runs(2)
+    lab.runs(1)
+    lab.complete_run()
     window.opening.list_runs()
     lab.until(lambda: len(window.review.runs.cards) >= 2)
     complete = [c for c in window.review.runs.cards if c.entry.status == "complete"]

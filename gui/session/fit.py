@@ -15,8 +15,8 @@ from gui.lanes.axis import number
 from gui.lanes.decimate import Drawn, FloatArray
 from gui.lanes.derive import difference
 from gui.lanes.source import Source
-from gui.review.finding import Finding, finding
 from gui.session.agreement import Agreement
+from gui.session.finding import Finding, finding
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match
