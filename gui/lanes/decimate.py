@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,12 +73,19 @@ class Drawn:
             return float(self.mean[after - 1])
         return float(np.interp(time, self.time, self.mean))
 
-    @property
+    @cached_property
     def column(self) -> float:
         """Usual time from one point to the next, s; 0 below two points."""
-        # np.median loads masked arrays when first called, in the midst of a frame
-        steps = np.sort(np.diff(self.time))
-        return float(steps[steps.size // 2]) if steps.size else 0.0
+        return middle(np.diff(self.time))
+
+
+def middle(values: FloatArray) -> float:
+    """The median, the larger of two; 0 without values.
+
+    np.median loads masked arrays when first called, in the midst of a frame.
+    """
+    half = values.size // 2
+    return float(np.partition(values, half)[half]) if values.size else 0.0
 
 
 def columns(rows: FloatArray, count: int, width: float) -> Drawn:

@@ -22,7 +22,7 @@ from PySide6.QtGui import (
     QTransform,
 )
 
-from gui.lanes.decimate import Drawn, FloatArray, zigzag
+from gui.lanes.decimate import Drawn, FloatArray, middle, zigzag
 from gui.look.fonts import sized
 
 FAR = 1e5
@@ -185,8 +185,7 @@ def pulses(painter: QPainter, frame: Frame, drawn: Drawn, colour: str) -> None:
     if drawn.empty:
         return
     reach = drawn.high - drawn.low
-    # np.median loads masked arrays when first called, in the midst of a frame
-    stands = reach > 4 * float(np.sort(reach)[reach.size // 2]) + 1e-12
+    stands = reach > 4 * middle(reach) + 1e-12
     x = frame.x(drawn.time[stands]).tolist()
     low, high = (
         frame.y(drawn.low[stands]).tolist(),

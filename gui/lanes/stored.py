@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, columns, line_between, stepped
+from gui.lanes.decimate import Drawn, FloatArray, columns, line_between, middle, stepped
 from gui.lanes.expected import Hold, settled
 from gui.lanes.recorded_twin import RecordedTwin
 from gui.lanes.twinned import TwinSlice
@@ -67,7 +67,7 @@ class Pyramid:
 
 def typical_step(time: FloatArray) -> float:
     """Time from one entry to the next, s; gaps do not count."""
-    return float(np.median(np.diff(time[:10_001]))) if time.size > 1 else 1.0
+    return middle(np.diff(time[:10_001])) if time.size > 1 else 1.0
 
 
 def joined(rows: FloatArray) -> FloatArray:
@@ -95,6 +95,7 @@ class RunSource:
 
     Attributes:
         info: contents of `run.json`.
+        signals: what the run stored, force and spikes included.
         model: the twin, once it has come.
         fetched: set each time samples asked for have arrived.
     """
@@ -127,22 +128,15 @@ class RunSource:
         self.simulated = run.simulated
         self._gain = float(attributes.get("newtons_per_ampere", 1.0)) or 1.0
         self._slow = _slow(run, self._gain)
+        slow = (name for name, (time, _) in self._slow.items() if time.size)
+        searched = () if run.detection is None else ("spikes",)
+        self.signals: tuple[str, ...] = (*slow, *self._pyramids, *searched)
         self._force = stepped(*self._slow["force"], self.length)
         self._details: dict[str, list[tuple[float, float, int, Drawn]]] = {}
         self._wanted: dict[str, tuple[float, float, int]] = {}
         self._lock = threading.Lock()
         self._closed = False
         self._reader: threading.Thread | None = None
-
-    @property
-    def signals(self) -> tuple[str, ...]:
-        """What the run stored, force and spikes included."""
-        slow = tuple(name for name, (time, _) in self._slow.items() if time.size)
-        found = (*slow, *self._pyramids)
-        return (*found, "spikes") if "spikes" in self._recorded() else found
-
-    def _recorded(self) -> set[str]:
-        return {"spikes"} if self._run.detection is not None else set()
 
     @property
     def loop(self) -> FloatArray:
