@@ -185,10 +185,10 @@ class LanePainter:
     ) -> None:
         """Mark rates, and samples where they lie apart: between them nobody looked."""
         inside = (measured.time >= frame.start) & (measured.time <= frame.end)
-        inside &= measured.low == measured.high
         x, y = frame.x(measured.time[inside]), frame.y(measured.mean[inside])
         rates = self.lane.kind is Kind.RATE and x.size <= DOTS
-        if rates or (x.size > 1 and np.diff(x).min() >= APART):
+        samples = bool(np.all((measured.low == measured.high)[inside]))
+        if rates or (samples and x.size > 1 and np.diff(x).min() >= APART):
             paint.dots(painter, x, y, colour)
 
     def _plan(

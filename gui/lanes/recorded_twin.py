@@ -33,7 +33,7 @@ class RecordedTwin:
         self, whole: TwinSlice, ask: Callable[[float, float, int], None]
     ) -> None:
         self.spikes: FloatArray = whole.spikes
-        self._whole = _rows(whole)
+        self._whole, self._end = _rows(whole), whole.end
         self._parts: list[dict[str, tuple[FloatArray, float]]] = []
         self._ask = ask
         self._waiting = False
@@ -56,10 +56,12 @@ class RecordedTwin:
             if covers and narrower < width:
                 rows, width = finer, narrower
         wanted = (end - start) * (1 + 2 * MARGIN) / CLOSE
-        if end - start < count * width and width > 2 * wanted and not self._waiting:
+        seen = start < self._end and end > 0.0  # beyond the run there is no model
+        coarse = end - start < count * width and width > 2 * wanted
+        if seen and coarse and not self._waiting:
             self._waiting = True
             margin = MARGIN * (end - start)
-            self._ask(start - margin, end + margin, CLOSE)
+            self._ask(max(start - margin, 0.0), min(end + margin, self._end), CLOSE)
         first, last = np.searchsorted(rows[0], [start, end])
         first, last = max(0, int(first) - 1), min(rows.shape[1], int(last) + 1)
         return columns(rows[:, first:last], count, width)

@@ -21,9 +21,14 @@ from tactile_lab.store.signal import StoredSignal
 BRANCH = 16
 """Bins joined into one on the next level."""
 
+MARGIN, FINER = 0.5, 2
+"""Part of a view's width that is read on either side of it, and columns a pixel."""
+
+PICTURE = 100
+"""Columns from which on samples are read; for a number, what is in memory does."""
+
 DETAILS = 4
-"""Views of a signal's samples kept: those of picture and cursors must not displace each
-other, or each would be read again for ever."""
+"""Views of a signal's samples kept."""
 
 
 FINEST = 1 << 17
@@ -56,13 +61,40 @@ class Pyramid:
             if (end - start) / coarser.width < 2 * count:
                 break
             level = coarser
-        first, last = np.searchsorted(level.rows[0], [start, end])
-        first, last = max(0, first - 1), min(level.rows.shape[1], last + 1)
-        return columns(level.rows[:, first:last], count, level.width)
+        return cut(level.rows, level.width, start, end, count)
 
     def coarse(self, start: float, end: float, count: int) -> bool:
         """Whether samples would show more than bins do."""
         return (end - start) / self.levels[0].width < count
+
+
+@dataclass(frozen=True, eq=False)
+class Detail:
+    """A part of a signal, read more finely than the pyramid has it.
+
+    Attributes:
+        rows: time, least, largest, mean.
+        width: of one entry, s.
+        start, end: what was asked for, s.
+        exact: whether each entry is a sample.
+    """
+
+    rows: FloatArray
+    width: float
+    start: float
+    end: float
+    exact: bool
+
+    def covers(self, start: float, end: float) -> bool:
+        """Whether it has all of [start, end] s."""
+        return self.start <= start and end <= self.end
+
+
+def cut(rows: FloatArray, width: float, start: float, end: float, count: int) -> Drawn:
+    """What lies in [start, end] s in about `count` columns."""
+    first, last = np.searchsorted(rows[0], [start, end])
+    first, last = max(0, int(first) - 1), min(rows.shape[1], int(last) + 1)
+    return columns(rows[:, first:last], count, width)
 
 
 def typical_step(time: FloatArray) -> float:
@@ -132,7 +164,7 @@ class RunSource:
         searched = () if run.detection is None else ("spikes",)
         self.signals: tuple[str, ...] = (*slow, *self._pyramids, *searched)
         self._force = stepped(*self._slow["force"], self.length)
-        self._details: dict[str, list[tuple[float, float, int, Drawn]]] = {}
+        self._details: dict[str, tuple[Detail, ...]] = {}
         self._wanted: dict[str, tuple[float, float, int]] = {}
         self._lock = threading.Lock()
         self._closed = False
@@ -177,16 +209,19 @@ class RunSource:
         pyramid = self._pyramids.get(signal)
         if pyramid is None:
             return Drawn.nothing()
-        if pyramid.coarse(start, end, count):
-            have = self._details.get(signal, [])
-            for *view, drawn in have:
-                if view == [start, end, count]:
-                    return drawn
+        if not pyramid.coarse(start, end, count):
+            return pyramid.between(start, end, count)
+        inside = max(start, 0.0), min(end, self.length)
+        having = [d for d in self._details.get(signal, ()) if d.covers(*inside)]
+        best = min(having, key=lambda detail: detail.width, default=None)
+        enough = best is not None and (
+            best.exact or best.width <= (end - start) / count
+        )
+        if not enough and count >= PICTURE:
             self._fetch(signal, (start, end, count))
-            for begin, until, _, drawn in reversed(have):
-                if begin <= start and end <= until:
-                    return drawn
-        return pyramid.between(start, end, count)
+        if best is None:
+            return pyramid.between(start, end, count)
+        return cut(best.rows, best.width, start, end, count)
 
     def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
         """The model's."""
@@ -234,17 +269,23 @@ class RunSource:
                         self._run.close()
                     return
                 signal, view = self._wanted.popitem()
-            start, end, count = view
-            margin = 0.5 * (end - start)
-            stored = self._run.signal(signal)
-            part = stored.between(max(0.0, start - margin), end + margin)
-            cells = max(count, min(part.stop - part.start, 2 * count))
-            found = stored.envelope(part.start, part.stop, cells=cells)
-            rows = np.array([found.time, found.low, found.high, found.mean])
-            drawn = columns(rows, 1 << 30, typical_step(found.time))
-            have = self._details.get(signal, [])
-            self._details[signal] = [*have, (start, end, count, drawn)][-DETAILS:]
+            detail = self._detail(signal, *view)
+            have = self._details.get(signal, ())
+            self._details[signal] = (*have, detail)[-DETAILS:]
             self.fetched.set()
+
+    def _detail(self, signal: str, start: float, end: float, count: int) -> Detail:
+        """Read around a view, finer than it needs: it may move and zoom a while."""
+        margin = MARGIN * (end - start)
+        start, end = start - margin, end + margin
+        stored = self._run.signal(signal)
+        part = stored.between(max(0.0, start), end)
+        samples = part.stop - part.start
+        cells = max(1, min(samples, round(FINER * (1 + 2 * MARGIN) * count)))
+        found = stored.envelope(part.start, part.stop, cells=cells)
+        rows = np.array([found.time, found.low, found.high, found.mean])
+        exact = rows.shape[1] == samples
+        return Detail(rows, typical_step(found.time), start, end, exact)
 
 
 def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:

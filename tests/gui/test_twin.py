@@ -141,6 +141,17 @@ def test_a_close_look_is_asked_for_once_and_then_exact(start, width, count) -> N
     assert np.allclose(drawn.mean[middle], exact, atol=1e-3)
 
 
+@given(start=st.floats(-1.0, 3.0), width=st.floats(1e-5, 0.04))
+def test_nothing_is_asked_for_beyond_the_run(start, width) -> None:
+    asked: list[tuple[float, float, int]] = []
+    twin = parts(asked)
+    twin.between("V_C1", start, start + width, 1000)
+    beyond = start >= 1.5 or start + width <= 0
+    assert len(asked) == (0 if beyond else 1)
+    for first, last, _ in asked:
+        assert 0.0 <= first < last <= 1.5
+
+
 def test_looks_at_a_few_places_do_not_drive_each_other_out() -> None:
     asked: list[tuple[float, float, int]] = []
     twin = parts(asked)

@@ -204,6 +204,9 @@ def test_old_run_opens_in_the_same_lanes(lab) -> None:
     lab.until(lambda: run.twin("V_C2", 0.2, 0.201, 1000).time.size > 500)
     run.trace("V_C2", 0.2, 0.201, 1000)
     lab.until(lambda: run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+    moved = run.trace("V_C2", 0.2004, 0.2014, 1000)
+    closer = run.trace("V_C2", 0.2003, 0.2007, 1000)
+    assert moved.time.size > 150 and closer.time.size > 60, "read around what is seen"
 
 
 def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
