@@ -67,7 +67,7 @@ def endurance(seconds: float, folder: Path) -> None:
             f"{now[1]:.0f} ({now[1] - first[1]:+.0f}) |"
         )
     bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
-    fault = "" if session.fault is None else session.fault.title
+    fault = "" if session.fault is None else f": {session.fault.title}"
     bench.say(
         f"Then {session.state.value} {fault}, {session.source.spikes.size} spikes."
     )
