@@ -122,6 +122,13 @@ def columns(rows: FloatArray, count: int, width: float) -> Drawn:
     )
 
 
+def cut(rows: FloatArray, width: float, start: float, end: float, count: int) -> Drawn:
+    """What `rows` of bins, `width` s each, have in [start, end] s; see `columns`."""
+    first, last = np.searchsorted(rows[0], [start, end])
+    first, last = max(0, int(first) - 1), min(rows.shape[1], int(last) + 1)
+    return columns(rows[:, first:last], count, width)
+
+
 def zigzag(drawn: Drawn) -> tuple[FloatArray, FloatArray]:
     """One polyline through all columns: down to the low, up to the high, and on.
 

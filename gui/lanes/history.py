@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, columns, line_between, stepped
+from gui.lanes.decimate import Drawn, FloatArray, cut, line_between, stepped
 from tactile_lab.acquisition.live import Bins
 
 FINE = 1 << 17
@@ -75,16 +75,9 @@ class Track:
         if fine.shape[1] == 0:
             return Drawn.nothing()
         if start >= fine[0, 0] or self._coarse_to == 0:
-            return self._cut(fine, start, end, count, self._width)
+            return cut(fine, self._width, start, end, count)
         coarse = self._coarse[:, : self._coarse_to]
-        return self._cut(coarse, start, end, count, self._width * self._per)
-
-    def _cut(
-        self, rows: FloatArray, start: float, end: float, count: int, width: float
-    ) -> Drawn:
-        first, last = np.searchsorted(rows[0], [start, end])
-        first, last = max(0, first - 1), min(rows.shape[1], last + 1)
-        return columns(rows[:, first:last], count, width)
+        return cut(coarse, self._width * self._per, start, end, count)
 
     def _coarsen(self, rows: FloatArray) -> None:
         """Add to the whole-run picture; halve its resolution when it is full."""

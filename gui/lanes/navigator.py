@@ -201,7 +201,3 @@ class Navigator(QWidget):
         """Zoom about the pointer."""
         turns = event.angleDelta().y() / 120
         self._view.zoom(1.25**turns, self._time(event.position().x()))
-
-    def point_of(self, time: float) -> QPointF:
-        """Where a time lies, for tests and help."""
-        return QPointF(self.frame().x1(time), HEIGHT / 2)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, columns
+from gui.lanes.decimate import Drawn, FloatArray, cut
 from gui.lanes.twinned import TwinSlice
 from tactile_lab.acquisition.live import Bins
 
@@ -62,9 +62,7 @@ class RecordedTwin:
             self._waiting = True
             margin = MARGIN * (end - start)
             self._ask(max(start - margin, 0.0), min(end + margin, self._end), CLOSE)
-        first, last = np.searchsorted(rows[0], [start, end])
-        first, last = max(0, int(first) - 1), min(rows.shape[1], int(last) + 1)
-        return columns(rows[:, first:last], count, width)
+        return cut(rows, width, start, end, count)
 
 
 def _rows(part: TwinSlice) -> dict[str, tuple[FloatArray, float]]:

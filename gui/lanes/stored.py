@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, columns, line_between, middle, stepped
+from gui.lanes.decimate import Drawn, FloatArray, cut, line_between, middle, stepped
 from gui.lanes.expected import Hold, settled
 from gui.lanes.recorded_twin import RecordedTwin
 from gui.lanes.twinned import TwinSlice
@@ -88,13 +88,6 @@ class Detail:
     def covers(self, start: float, end: float) -> bool:
         """Whether it has all of [start, end] s."""
         return self.start <= start and end <= self.end
-
-
-def cut(rows: FloatArray, width: float, start: float, end: float, count: int) -> Drawn:
-    """What lies in [start, end] s in about `count` columns."""
-    first, last = np.searchsorted(rows[0], [start, end])
-    first, last = max(0, int(first) - 1), min(rows.shape[1], int(last) + 1)
-    return columns(rows[:, first:last], count, width)
 
 
 def typical_step(time: FloatArray) -> float:
