@@ -10,9 +10,6 @@ from tactile_lab.quantity import show
 STALE = 1.5
 """Seconds without a word from a live coil's source after which its state is unknown."""
 
-OFF_BELOW = 2e-3
-"""Read-back current magnitude, A, below which a coil counts as at zero."""
-
 
 class State(Enum):
     """The one state of the window."""

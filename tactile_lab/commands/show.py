@@ -140,6 +140,6 @@ def _print(summary: dict[str, Any]) -> None:
     if summary["loss"]:
         click.echo(summary["loss"]["text"])
     for name, digest in summary["inputs"].items():
-        click.echo(f"kept        {name}  sha256 {digest[:16]}")
+        click.echo(f"kept         {name}  sha256 {digest[:16]}")
     for figure in summary["figures"]:
         click.echo(f"figure       {figure}")
