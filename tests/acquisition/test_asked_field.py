@@ -1,6 +1,7 @@
 """The field read by a person: asked, doubted, taken down, or given in a file."""
 
 import pytest
+from benches import READ_BY_HAND
 
 from tactile_lab.acquisition.asked_field import AskedField, read_off
 from tactile_lab.acquisition.events import RunState
@@ -13,16 +14,6 @@ from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 
-BENCH = """
-name = "read by hand"
-simulated = true
-[coil]
-baud = 19200
-[field_meter]
-driver = "manual"
-[magnet]
-r = "6 mm"
-"""
 SHORT = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
 FALLING = (1.0, 0.5, 0.0, -0.5, -1.0)
 SHOWN = [
@@ -34,7 +25,7 @@ SHOWN = [
 
 def scene(folder, overrides=SHORT):
     path = folder / "bench.toml"
-    path.write_text(BENCH)
+    path.write_text(READ_BY_HAND)
     return load("calibrate_field", overrides, str(path))
 
 
@@ -84,7 +75,7 @@ def test_a_person_who_leaves_ends_the_run_safely(tmp_path):
 
 def test_only_a_scene_that_records_the_field_asks(tmp_path):
     path = tmp_path / "bench.toml"
-    path.write_text(BENCH)
+    path.write_text(READ_BY_HAND)
     quiet = load("calibrate_field", ['record.signals=["coil_current"]'], "sim")
     assert not needs(quiet).asked_field
     wished = ['record.signals=["force"]', "protocol.force_at_zero=true"]

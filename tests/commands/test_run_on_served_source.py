@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from benches import SERVED
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 
@@ -19,16 +20,6 @@ name = "pulses"
 levels = ["80 mN"]
 [record]
 signals = ["force"]
-"""
-
-BENCH = """
-name = "served"
-simulated = false
-[coil]
-dialect = "patient.toml"
-port = "{port}"
-[magnet]
-r = "6 mm"
 """
 
 PATIENCE = 60.0
@@ -55,7 +46,7 @@ class Served:
         (folder / "patient.toml").write_text(
             row.read_text().replace("[serial]", '[serial]\ntimeout = "400 ms"')
         )
-        (folder / "bench.toml").write_text(BENCH.format(port=port))
+        (folder / "bench.toml").write_text(SERVED.format(port=port))
 
     def run(self) -> subprocess.Popen:
         """The run, once its current flows."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from benches import READ_BY_HAND
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
@@ -272,22 +273,10 @@ def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     assert window.centre.empty.isVisible()
 
 
-METER = """
-name = "read by hand"
-simulated = true
-[coil]
-baud = 19200
-[field_meter]
-driver = "manual"
-[magnet]
-r = "6 mm"
-"""
-
-
 @pytest.fixture
 def calibrating(lab) -> Iterator:
     """A short calibration in progress on a bench whose teslameter a person reads."""
-    (lab.folder / "by-hand.toml").write_text(METER)
+    (lab.folder / "by-hand.toml").write_text(READ_BY_HAND)
     short = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
     request = Request("calibrate_field", short, str(lab.folder / "by-hand.toml"))
     lab.session.start(request, "Calibration")

@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
+from benches import SERVED
 from PySide6.QtWidgets import QApplication
 
 from gui.session.commands import (
@@ -30,15 +31,6 @@ from gui.state import State, Truth, truth
 from sim_backend.serve import ServedBench
 
 LONGEST = 90.0
-BENCH = """
-name = "served"
-simulated = false
-[coil]
-dialect = "patient.toml"
-port = "{port}"
-[magnet]
-r = "6 mm"
-"""
 SCENE = """
 [protocol]
 name = "pulses"
@@ -132,7 +124,7 @@ class Source:
             row.read_text().replace("[serial]", '[serial]\ntimeout = "2 s"')
         )
         self.bench = folder / "bench.toml"
-        self.bench.write_text(BENCH.format(port=self.served.addresses["coil"]))
+        self.bench.write_text(SERVED.format(port=self.served.addresses["coil"]))
         self.request = Request("demo", ('record.signals=["force"]',), str(self.bench))
 
     @property
