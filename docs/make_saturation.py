@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 
 from tactile_lab.model.circuit import Circuit, FloatArray
-from tactile_lab.model.compare.tables import provenance
 from tactile_lab.model.simulate import simulate
+from tactile_lab.validation.tables import provenance
 from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent

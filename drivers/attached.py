@@ -11,10 +11,10 @@ from typing import Any
 
 from serial.tools import list_ports
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import dialect_ids, load_dialect
 from drivers.dialect_row import CoilDialect, Dialect, Wire
-from drivers.serial_link import SerialLink
+from drivers.serial_line.link import SerialLink
 from drivers.teslameter import Teslameter
 from drivers.usb_presence import present
 from tactile_lab.bench import CoilLimits

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect, meter_dialect
-from drivers.picoscope import PicoScope
-from drivers.scope_dialect import load_scope_dialect
+from drivers.picoscope.scope import PicoScope
 from drivers.teslameter import Teslameter
-from drivers.usbtmc_scope import UsbtmcScope
+from drivers.usbtmc.dialect import load_scope_dialect
+from drivers.usbtmc.scope import UsbtmcScope
 from tactile_lab.bench import Bench, FieldMeter, Scope
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import SceneError

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from drivers.attached import attached
+from drivers.coil.guard import Guard
 from drivers.dialect import coil_dialect
-from drivers.guard import Guard
-from drivers.picosdk import load
+from drivers.picoscope.sdk import load
 from tactile_lab.errors import InstrumentError
 
 NEEDED = ("numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drivers.conversation import Conversation
 from drivers.dialect_row import MeterDialect
-from drivers.serial_link import SerialLink, Spy
+from drivers.serial_line.conversation import Conversation
+from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import BadReplyError, LimitError

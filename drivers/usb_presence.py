@@ -12,7 +12,7 @@ from typing import Any
 import usb.core
 import usb.util
 
-from drivers.usb_errors import UDEV, is_gone, translating
+from drivers.usbtmc.errors import UDEV, is_gone, translating
 
 PICO = 0x0CE9
 """Vendor id of Pico Technology; product ids are not relied on."""

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect, meter_dialect
-from drivers.picoscope import PicoScope
+from drivers.picoscope.scope import PicoScope
 from drivers.teslameter import Teslameter
-from sim_backend.faults import SerialFault
-from sim_backend.from_row import coil_far_end, meter_far_end
-from sim_backend.options import PlantOptions
-from sim_backend.picoscope import Make
-from sim_backend.picoscope_faults import Fault
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.plant import Plant
-from sim_backend.scope_input import BUFFERED
-from sim_backend.scope_source import Acquisition, Codes
-from sim_backend.serial_wires import plug_in
+from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.plant.options import PlantOptions
+from sim_backend.plant.plant import Plant
+from sim_backend.plant.scope_input import BUFFERED
+from sim_backend.plant.scope_source import Acquisition, Codes
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.from_row import coil_far_end, meter_far_end
+from sim_backend.serial_line.wires import plug_in
 from tactile_lab.bench import Bench, Channel
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.errors import SceneError

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim_backend.serial_wires import SimPort
+from sim_backend.serial_line.wires import SimPort
 
 
 def serial_class_for_url(url: str) -> tuple[str, type[SimPort]]:

@@ -10,12 +10,12 @@ from typing import TextIO
 
 from drivers.dialect import coil_dialect, meter_dialect
 from drivers.dialect_row import Wire
-from sim_backend.coil_panel import Deed
-from sim_backend.driven_coil import DrivenCoil
-from sim_backend.from_row import coil_far_end, meter_far_end
-from sim_backend.options import PlantOptions
-from sim_backend.serial_servers import PtyServer, SerialServer, TcpServer
-from sim_backend.serial_wires import FarEnd, LineInstrument
+from sim_backend.coil.panel import Deed
+from sim_backend.plant.driven_coil import DrivenCoil
+from sim_backend.plant.options import PlantOptions
+from sim_backend.serial_line.from_row import coil_far_end, meter_far_end
+from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
+from sim_backend.serial_line.wires import FarEnd, LineInstrument
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
 from tactile_lab.magnetics import Magnet

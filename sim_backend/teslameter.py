@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from sim_backend.scpi import Handler, ScpiError, ScpiParser, number
+from sim_backend.serial_line.scpi import Handler, ScpiError, ScpiParser, number
 from tactile_lab.clock import Clock
 from tactile_lab.errors import SceneError
 

@@ -172,7 +172,7 @@ def scope_capability(scope: ScopeSpec) -> ScopeCapability:
     from tactile_lab.bench import ScopeCapability
 
     if scope.driver == "usbtmc":
-        rows: Any = importlib.import_module("drivers.scope_dialect")
+        rows: Any = importlib.import_module("drivers.usbtmc.dialect")
         row = rows.load_scope_dialect(scope.dialect or "rigol-ds1000z")
         return ScopeCapability(
             gapless=False,
@@ -181,7 +181,7 @@ def scope_capability(scope: ScopeSpec) -> ScopeCapability:
             bits=row.bits,
             fastest=row.fastest,
         )
-    pico: Any = importlib.import_module("drivers.picoscope")
+    pico: Any = importlib.import_module("drivers.picoscope.scope")
     return ScopeCapability(
         gapless=True,
         inputs=tuple(pico.INPUTS),
@@ -209,7 +209,7 @@ def check_scope(scope: ScopeSpec, channels: Sequence[Channel], rate: float) -> f
     wiring.check_channels(channels, capability)
     fastest = capability.fastest[min(len(channels), len(capability.fastest)) - 1]
     if scope.driver == "ps3000a":  # it may stream faster than its maker guarantees
-        setup: Any = importlib.import_module("drivers.picoscope_setup")
+        setup: Any = importlib.import_module("drivers.picoscope.setup")
         setup.streaming_interval(1 / rate)
     elif rate > fastest:
         raise LimitError(

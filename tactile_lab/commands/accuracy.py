@@ -11,9 +11,9 @@ import click
 from tactile_lab.commands.terminal import refusing
 
 if TYPE_CHECKING:
-    from tactile_lab.model.campaign import Case
-    from tactile_lab.model.compare.contest import Row
-    from tactile_lab.model.compare.problem import Problem
+    from tactile_lab.validation.campaign import Case
+    from tactile_lab.validation.contest import Row
+    from tactile_lab.validation.problem import Problem
 
 
 @click.command()
@@ -52,9 +52,9 @@ def command(
             _write(_honesty(campaign), out, "honesty.md")
             return
         from tactile_lab.errors import ParameterError
-        from tactile_lab.model.compare.contest import contest, methods
-        from tactile_lab.model.compare.scenes import accuracy_scenes
-        from tactile_lab.model.compare.tables import figure, write_csv
+        from tactile_lab.validation.contest import contest, methods
+        from tactile_lab.validation.scenes import accuracy_scenes
+        from tactile_lab.validation.tables import figure, write_csv
 
         scenes = accuracy_scenes()
         unknown = set(names) - {s.name for s in scenes}
@@ -88,8 +88,8 @@ def _say(text: str) -> None:
 
 
 def _report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
-    from tactile_lab.model.compare.tables import fastest, own, provenance, table
     from tactile_lab.quantity import show
+    from tactile_lab.validation.tables import fastest, own, provenance, table
 
     parts = [
         "# Error against run time\n",
@@ -131,15 +131,15 @@ def _report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
 
 
 def _honesty(count: int) -> str:
-    from tactile_lab.model.campaign import random_case, saturated_case
+    from tactile_lab.validation.campaign import random_case, saturated_case
 
     fewer = -(-count // 5)
     return "\n".join(
         [
             "# Is the error estimate honest?\n",
             f"Written by `tactile-lab accuracy --campaign {count} --out docs`. "
-            "Random scenes and parameters (`tactile_lab/model/campaign.py`), half at "
-            "random tolerances, against the 40-digit reference.\n",
+            "Random scenes and parameters (`tactile_lab/validation/campaign.py`), half "
+            "at random tolerances, against the 40-digit reference.\n",
             "## The cascade, Eqs. (16) to (18)\n",
             *_section(random_case, count),
             "\n## T1 saturates\n",
@@ -152,8 +152,8 @@ def _honesty(count: int) -> str:
 def _section(draw: Callable[[int], Case], count: int) -> list[str]:
     import numpy as np
 
-    from tactile_lab.model.campaign import compare
-    from tactile_lab.model.compare.tables import provenance
+    from tactile_lab.validation.campaign import compare
+    from tactile_lab.validation.tables import provenance
 
     found = []
     for seed in range(count):

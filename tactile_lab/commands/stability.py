@@ -10,8 +10,8 @@ import click
 from tactile_lab.commands.terminal import refusing
 
 if TYPE_CHECKING:
-    from tactile_lab.model.compare.contest import Row, Truth
-    from tactile_lab.model.compare.extremes import Extreme
+    from tactile_lab.validation.contest import Row, Truth
+    from tactile_lab.validation.extremes import Extreme
 
 
 @click.command()
@@ -33,7 +33,7 @@ def command(out: Path | None, names: tuple[str, ...], cap: float, alone: bool) -
 
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             os.environ.setdefault(name, "1")
-        from tactile_lab.model.compare.extremes import extremes
+        from tactile_lab.validation.extremes import extremes
 
         _compile()
         lines, bad = [], 0
@@ -75,7 +75,7 @@ def _compile() -> None:
 
 
 def _line(case: Extreme, cap: float, alone: bool) -> tuple[str, str]:
-    from tactile_lab.model.compare.contest import Method, judge, methods, truth
+    from tactile_lab.validation.contest import Method, judge, methods, truth
 
     problem = case.problem
     exact = truth(problem) if case.truth == "reference" else None
@@ -110,10 +110,10 @@ def _ours(case: Extreme, exact: Truth | None) -> tuple[str, str, str]:
     import numpy as np
 
     from tactile_lab.errors import TactileLabError
-    from tactile_lab.model.compare.extremes import formula
-    from tactile_lab.model.compare.stopwatch import spent
     from tactile_lab.model.simulate import simulate
     from tactile_lab.quantity import show
+    from tactile_lab.validation.extremes import formula
+    from tactile_lab.validation.stopwatch import spent
 
     p = case.problem
     keep = ("statistics",) if case.statistics else ("spikes", "statistics")
@@ -180,9 +180,9 @@ def _unjudged(case: Extreme, method: object, cap: float) -> str:
     """A rival's answer where there is no table of true spike times."""
     import numpy as np
 
-    from tactile_lab.model.compare.contest import Method, Truth, judge
-    from tactile_lab.model.compare.extremes import formula
     from tactile_lab.model.simulate import simulate
+    from tactile_lab.validation.contest import Method, Truth, judge
+    from tactile_lab.validation.extremes import formula
 
     assert isinstance(method, Method)
     p = case.problem
@@ -198,7 +198,7 @@ def _unjudged(case: Extreme, method: object, cap: float) -> str:
 
 
 def _report(lines: list[str], cap: float, alone: bool) -> str:
-    from tactile_lab.model.compare.tables import provenance
+    from tactile_lab.validation.tables import provenance
 
     rivals = () if alone else RIVALS
     heads = ["case", "stiffness ratio", "truth", "ours", "error (s)", "time", *rivals]

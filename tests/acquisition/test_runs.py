@@ -186,7 +186,7 @@ def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(
     run_scene, short
 ):
     from sim_backend.bench import open_bench
-    from sim_backend.picoscope_faults import Fault
+    from sim_backend.picoscope.faults import Fault
 
     ran = run_scene(
         *short,

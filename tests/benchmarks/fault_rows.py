@@ -16,13 +16,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from drivers.picoscope import PicoScope
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.faults import SerialFault
-from sim_backend.picoscope import Make
-from sim_backend.picoscope_faults import Fault
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.serial_wires import FarEnd
+from drivers.picoscope.scope import PicoScope
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.wires import FarEnd
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import Bench
 

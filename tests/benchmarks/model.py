@@ -13,10 +13,10 @@ from collections.abc import Callable
 import numpy as np
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.compare import general
-from tactile_lab.model.compare.scenes import accuracy_scenes
-from tactile_lab.model.compare.stopwatch import spent as cpu_time
 from tactile_lab.model.simulate import simulate
+from tactile_lab.validation import general
+from tactile_lab.validation.scenes import accuracy_scenes
+from tactile_lab.validation.stopwatch import spent as cpu_time
 from tactile_lab.waveform import Waveform
 
 

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 from provenance import provenance
 
-from drivers.picoscope import PicoScope
-from sim_backend.picoscope import Make
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.scope_source import Acquisition, Codes
+from drivers.picoscope.scope import PicoScope
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock, SimulatedClock
 from tactile_lab.errors import SamplesLostError

@@ -21,11 +21,11 @@ from pathlib import Path
 
 from provenance import provenance
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.serial_servers import PtyServer, SerialServer, TcpServer
-from sim_backend.serial_wires import FarEnd
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
+from sim_backend.serial_line.wires import FarEnd
 from sim_backend.serve import CoilOnly
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
@@ -33,7 +33,7 @@ from tactile_lab.magnetics import Magnet
 
 OWNER = """
 import sys
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock

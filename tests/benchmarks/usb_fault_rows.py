@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from fault_rows import Row  # beside this file
 
-from drivers.scope_dialect import load_scope_dialect
-from drivers.usbtmc_scope import UsbtmcScope
-from sim_backend.rigol_ds1000z import SimulatedDs1000z
-from sim_backend.scope_source import Voltages
-from sim_backend.usb_bus import SimulatedBus
-from sim_backend.usb_device import SimulatedDevice
-from sim_backend.usb_faults import UsbFault
-from sim_backend.usbtmc import INTERFACE, UsbtmcFunction
+from drivers.usbtmc.dialect import load_scope_dialect
+from drivers.usbtmc.scope import UsbtmcScope
+from sim_backend.plant.scope_source import Voltages
+from sim_backend.usbtmc.bus import SimulatedBus
+from sim_backend.usbtmc.device import SimulatedDevice
+from sim_backend.usbtmc.faults import UsbFault
+from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
+from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import InstrumentError

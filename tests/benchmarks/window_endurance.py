@@ -19,8 +19,8 @@ from window_frames import Bench, memory
 from gui.app import begin
 from gui.session.request import Request
 from gui.state import State
-from sim_backend import serial_wires
-from sim_backend.faults import SerialFault
+from sim_backend.serial_line import wires as serial_wires
+from sim_backend.serial_line.faults import SerialFault
 
 HOUR = """
 [protocol]

@@ -3,10 +3,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.serial_wires import FarEnd, plug_in, unplug
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.wires import FarEnd, plug_in, unplug
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 

@@ -4,7 +4,7 @@ import pytest
 
 from drivers.attached import ask_name, attached, fitting, try_out
 from drivers.diagnosis import diagnose, disk
-from drivers.transcript import read_transcript
+from drivers.serial_line.transcript import read_transcript
 from sim_backend.serve import ServedBench
 from tactile_lab.errors import BadReplyError
 

@@ -3,10 +3,10 @@ import math
 
 import pytest
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect, meter_dialect
 from drivers.teslameter import Teslameter
-from sim_backend.serial_wires import plug_in
+from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock

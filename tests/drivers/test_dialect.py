@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import (
     coil_dialect,
     dialect_ids,
@@ -11,8 +11,8 @@ from drivers.dialect import (
     parse_dialect,
 )
 from drivers.dialect_row import CoilDialect
-from sim_backend.coil_source import MODELS, SimCoilSource
-from sim_backend.serial_wires import plug_in
+from sim_backend.coil.source import MODELS, SimCoilSource
+from sim_backend.serial_line.wires import plug_in
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError, SceneError

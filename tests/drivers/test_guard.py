@@ -9,13 +9,13 @@ import time
 import pytest
 from patient import patient
 
-from drivers.coil_source import CoilSource
+from drivers.coil.guard import SILENCE, Guard
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
-from drivers.guard import SILENCE, Guard
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.faults import SerialFault
-from sim_backend.serial_servers import PtyServer, TcpServer
-from sim_backend.serial_wires import FarEnd
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.servers import PtyServer, TcpServer
+from sim_backend.serial_line.wires import FarEnd
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InterlockError
@@ -24,8 +24,8 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals"
 
 OWNER = """
 import sys, time
-from drivers import guard
-from drivers.coil_source import CoilSource
+from drivers.coil import guard
+from drivers.coil.source import CoilSource
 from patient import patient
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
@@ -173,8 +173,8 @@ def test_ctrl_c_at_the_terminal_does_not_reach_the_guard(served, owner):
 @pytest.fixture
 def guarded(served, tmp_path, monkeypatch):
     """A source guarded in this very process, its output on."""
-    monkeypatch.setattr("drivers.guard.SILENCE", LONG_SILENCE)
-    monkeypatch.setattr("drivers.coil_off.VERIFICATIONS", 1)
+    monkeypatch.setattr("drivers.coil.guard.SILENCE", LONG_SILENCE)
+    monkeypatch.setattr("drivers.coil.off.VERIFICATIONS", 1)
     _, server = served
     row = patient("kepco-bop", timeout=0.6)
     log = tmp_path / "tactile-lab" / "guard.log"

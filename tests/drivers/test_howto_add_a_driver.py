@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.scope_dialect import load_scope_dialect
-from drivers.usbtmc_scope import UsbtmcScope
-from sim_backend.rigol_ds1000z import SimulatedDs1000z
-from sim_backend.scope_source import Voltages
-from sim_backend.usb_bus import SimulatedBus
-from sim_backend.usb_device import SimulatedDevice
-from sim_backend.usbtmc import INTERFACE, UsbtmcFunction
+from drivers.usbtmc.dialect import load_scope_dialect
+from drivers.usbtmc.scope import UsbtmcScope
+from sim_backend.plant.scope_source import Voltages
+from sim_backend.usbtmc.bus import SimulatedBus
+from sim_backend.usbtmc.device import SimulatedDevice
+from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
+from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 

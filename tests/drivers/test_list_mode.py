@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
-from sim_backend.faults import SerialFault
+from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.bench import CoilLimits
 from tactile_lab.errors import LimitError, LinkLostError, RefusedError
 

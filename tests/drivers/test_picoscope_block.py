@@ -8,12 +8,12 @@ import weakref
 import numpy as np
 import pytest
 
-from drivers.picoscope import PicoScope
-from drivers.picoscope_block import Trigger, timebase
-from sim_backend.picoscope import Make
-from sim_backend.picoscope_faults import Fault
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.scope_source import Voltages
+from drivers.picoscope.block import Trigger, timebase
+from drivers.picoscope.scope import PicoScope
+from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.plant.scope_source import Voltages
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError, LinkLostError, NoReplyError, ParameterError

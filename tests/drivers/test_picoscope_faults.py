@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 
-from drivers.picoscope import PicoScope
-from sim_backend.picoscope import Make
-from sim_backend.picoscope_faults import Fault
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.scope_source import Voltages
+from drivers.picoscope.scope import PicoScope
+from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.plant.scope_source import Voltages
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
@@ -347,7 +347,7 @@ def test_random_busyness_never_loses_a_sample() -> None:
 
 
 def test_every_status_of_the_table_becomes_one_of_our_errors() -> None:
-    from drivers.picoscope_status import MEANINGS, failure
+    from drivers.picoscope.status import MEANINGS, failure
 
     for code in MEANINGS:
         assert isinstance(failure(code, "Testing"), TactileLabError)

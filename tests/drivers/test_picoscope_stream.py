@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.picoscope import PicoScope
-from sim_backend.picoscope import Make
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.scope_source import Acquisition, Codes, Voltages
+from drivers.picoscope.scope import PicoScope
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.plant.scope_source import Acquisition, Codes, Voltages
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 

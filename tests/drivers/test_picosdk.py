@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.picoscope import PicoScope
-from drivers.picosdk import ENVIRONMENT, PROTOTYPES, bind, candidates, load
-from drivers.picosdk_calls import LibraryCalls
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.picosdk_header import StreamingReady
-from sim_backend.scope_source import Acquisition, Codes, Voltages
+from drivers.picoscope.scope import PicoScope
+from drivers.picoscope.sdk import ENVIRONMENT, PROTOTYPES, bind, candidates, load
+from drivers.picoscope.sdk_calls import LibraryCalls
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.picoscope.sdk_header import StreamingReady
+from sim_backend.plant.scope_source import Acquisition, Codes, Voltages
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import NotFoundError, RefusedError

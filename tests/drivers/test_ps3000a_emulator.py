@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.picoscope import PicoScope
-from drivers.picoscope_block import Trigger
-from drivers.picoscope_list import Attached, attached
-from drivers.picosdk import ENVIRONMENT, load
-from sim_backend.picosdk import FakePs3000a
-from sim_backend.picosdk_header import marked
+from drivers.picoscope.block import Trigger
+from drivers.picoscope.listing import Attached, attached
+from drivers.picoscope.scope import PicoScope
+from drivers.picoscope.sdk import ENVIRONMENT, load
+from sim_backend.picoscope.sdk import FakePs3000a
+from sim_backend.picoscope.sdk_header import marked
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError, LinkLostError, SamplesLostError

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.sample_count import SampleCount
+from drivers.picoscope.sample_count import SampleCount
 from tactile_lab.errors import SamplesLostError
 
 RATE = 1e6

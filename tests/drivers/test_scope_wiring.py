@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.picoscope import PicoScope
+from drivers.picoscope.scope import PicoScope
 from drivers.scope_wiring import check_channels, described
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.faults import SerialFault
-from sim_backend.serial_wires import FarEnd
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.wires import FarEnd
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (

@@ -3,8 +3,8 @@ import pytest
 from drivers.dialect import dialect_ids, load_dialect
 from drivers.dialect_row import MeterDialect
 from drivers.teslameter import Teslameter
-from sim_backend.faults import SerialFault
-from sim_backend.serial_wires import plug_in
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import MODELS, SimTeslameter
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import BadReplyError, LimitError

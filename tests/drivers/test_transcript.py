@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import dialect_ids, load_dialect
 from drivers.dialect_row import CoilDialect
+from drivers.serial_line.transcript import Transcript, read_transcript
 from drivers.teslameter import Teslameter
-from drivers.transcript import Transcript, read_transcript
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.replay import Replay
-from sim_backend.serial_wires import plug_in
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.replay import Replay
+from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock

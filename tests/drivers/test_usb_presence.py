@@ -7,10 +7,10 @@ import usb.core
 import usb.util
 
 from drivers.usb_presence import PICO, Watch, present
-from sim_backend.usb_bus import SimulatedBus
-from sim_backend.usb_device import SimulatedDevice
-from sim_backend.usb_faults import UsbFault
-from sim_backend.usbtmc import INTERFACE
+from sim_backend.usbtmc.bus import SimulatedBus
+from sim_backend.usbtmc.device import SimulatedDevice
+from sim_backend.usbtmc.faults import UsbFault
+from sim_backend.usbtmc.function import INTERFACE
 from tactile_lab.errors import NotFoundError
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.usbtmc_frames import (
+from drivers.usbtmc.frames import (
     Header,
     block_payload,
     message_out,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.usbtmc_link import UsbtmcLink
-from sim_backend.usb_bus import SimulatedBus
-from sim_backend.usb_device import SimulatedDevice
-from sim_backend.usb_faults import UsbFault
-from sim_backend.usbtmc import INTERFACE, UsbtmcFunction
+from drivers.usbtmc.link import UsbtmcLink
+from sim_backend.usbtmc.bus import SimulatedBus
+from sim_backend.usbtmc.device import SimulatedDevice
+from sim_backend.usbtmc.faults import UsbFault
+from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
     BadReplyError,

@@ -14,8 +14,8 @@ from gui.dialogs.saving import table
 from gui.lanes.expected import PlanSource
 from gui.session.session import Queued
 from gui.state import State, Truth
-from sim_backend import serial_wires
-from sim_backend.faults import SerialFault
+from sim_backend.serial_line import wires as serial_wires
+from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.store.run import Run
 
 

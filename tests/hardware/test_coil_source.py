@@ -17,10 +17,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
 from drivers.dialect_row import CoilDialect
-from drivers.serial_link import SerialLink
+from drivers.serial_line.link import SerialLink
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError
@@ -50,7 +50,7 @@ def fact(name: str, value: object) -> None:
 
 @pytest.fixture
 def coil(monkeypatch: pytest.MonkeyPatch) -> Iterator[CoilSource]:
-    monkeypatch.setattr("drivers.guard.SILENCE", 5.0)
+    monkeypatch.setattr("drivers.coil.guard.SILENCE", 5.0)
     source = CoilSource(patient(coil_dialect(ROW)), PORT, LIMITS, RealClock())
     source.open()
     yield source
@@ -115,7 +115,7 @@ def test_remote(link: SerialLink) -> None:
 
 OWNER = """
 import sys, time
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock

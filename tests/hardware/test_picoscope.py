@@ -15,10 +15,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.picoscope import PicoScope
-from drivers.picoscope_block import Trigger
-from drivers.picoscope_list import attached
-from drivers.picosdk import RANGES
+from drivers.picoscope.block import Trigger
+from drivers.picoscope.listing import attached
+from drivers.picoscope.scope import PicoScope
+from drivers.picoscope.sdk import RANGES
 from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LimitError, TactileLabError

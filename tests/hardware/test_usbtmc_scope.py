@@ -14,9 +14,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.scope_dialect import load_scope_dialect
 from drivers.usb_presence import present
-from drivers.usbtmc_scope import UsbtmcScope
+from drivers.usbtmc.dialect import load_scope_dialect
+from drivers.usbtmc.scope import UsbtmcScope
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import RealClock
 

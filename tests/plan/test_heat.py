@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.coil_supervision import HeatBudget
+from drivers.coil.supervision import HeatBudget
 from tactile_lab.bench import CoilLimits
 from tactile_lab.plan.heat import heat_along
 from tactile_lab.waveform import Waveform

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_backend.chain import Follower
+from sim_backend.plant.chain import Follower
 
 TL074 = Follower(1 / (2 * np.pi * 3e6), 13e6)
 DECAY = 1.5e-6

@@ -6,13 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import dialect_ids, load_dialect
 from drivers.dialect_row import CoilDialect
 from drivers.teslameter import Teslameter
-from sim_backend.from_row import RowCoil, RowMeter, coil_far_end, meter_far_end
-from sim_backend.invented import invented
-from sim_backend.serial_wires import plug_in
+from sim_backend.serial_line.from_row import (
+    RowCoil,
+    RowMeter,
+    coil_far_end,
+    meter_far_end,
+)
+from sim_backend.serial_line.invented import invented
+from sim_backend.serial_line.wires import plug_in
 from sim_backend.serve import ServedBench
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock

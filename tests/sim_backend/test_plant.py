@@ -19,7 +19,7 @@ from plant_world import (
     volts,
 )
 
-from sim_backend.plant import Plant, PlantOptions, passive_attraction
+from sim_backend.plant.plant import Plant, PlantOptions, passive_attraction
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit

@@ -16,8 +16,8 @@ from plant_world import (
     volts,
 )
 
-from sim_backend import sensor
-from sim_backend.plant import PlantOptions
+from sim_backend.plant import sensor
+from sim_backend.plant.plant import PlantOptions
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.simulate import simulate
@@ -137,7 +137,7 @@ def test_a_stage_first_needed_later_starts_from_equilibrium() -> None:
 def test_a_backlog_of_commands_is_worked_off(monkeypatch: pytest.MonkeyPatch) -> None:
     codes = []
     for backlog in (16, 4096):
-        monkeypatch.setattr("sim_backend.plant.BACKLOG", backlog)
+        monkeypatch.setattr("sim_backend.plant.plant.BACKLOG", backlog)
         made = plant(IDEAL)
         for k in range(50):
             made.set_current(k * 0.01, newtons(0.1 * (k % 3)))

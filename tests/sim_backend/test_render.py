@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_backend.render import (
+from sim_backend.plant.render import (
     NOISE_UNIT,
     TABLE_BITS,
     TILE_BITS,

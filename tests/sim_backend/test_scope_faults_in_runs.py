@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sim_backend.bench import open_bench
-from sim_backend.picoscope_faults import Fault
+from sim_backend.picoscope.faults import Fault
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sim_backend.bench import open_bench
-from sim_backend.faults import SerialFault
+from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution

@@ -7,13 +7,13 @@ import time
 import pytest
 import serial
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.dialect import coil_dialect, meter_dialect
 from drivers.teslameter import Teslameter
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.faults import SerialFault
-from sim_backend.serial_servers import PtyServer, TcpServer
-from sim_backend.serial_wires import FarEnd
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.servers import PtyServer, TcpServer
+from sim_backend.serial_line.wires import FarEnd
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
@@ -116,7 +116,7 @@ def test_one_bad_exchange_does_not_end_the_run(served, kind):
 @pytest.mark.parametrize("form", ["closed", "reset"])
 def test_unplugged_while_playing(served, form, monkeypatch):
     # long enough, and another test may be given the lost pseudo-terminal's name
-    monkeypatch.setattr("drivers.coil_off.RECONNECT", 0.0)
+    monkeypatch.setattr("drivers.coil.off.RECONNECT", 0.0)
     clock, source, end, server, coil = served
     coil.open()
     coil.energise()

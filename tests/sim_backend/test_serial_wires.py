@@ -7,8 +7,8 @@ import pytest
 import serial
 
 from drivers.dialect import coil_dialect
-from sim_backend.coil_source import SimCoilSource
-from sim_backend.serial_wires import plug_in, unplug
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.wires import plug_in, unplug
 from sim_backend.serve import CoilOnly
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.magnetics import Magnet

@@ -7,7 +7,7 @@ import time
 import pytest
 from patient import patient
 
-from drivers.coil_source import CoilSource
+from drivers.coil.source import CoilSource
 from drivers.teslameter import Teslameter
 from sim_backend.serve import ServedBench
 from tactile_lab.bench import CoilLimits

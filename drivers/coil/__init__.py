@@ -1,0 +1,1 @@
+"""The current source: ramps, limits, the guard that switches it off."""

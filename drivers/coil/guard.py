@@ -1,0 +1,197 @@
+"""The owner's side of the guard: a small process that outlives a dead or hung program.
+
+The guard (`drivers.coil.guard_process`) holds the other end of a pipe. While armed it
+takes silence, or the pipe's end, for danger: it kills a hung owner, opens the port
+and switches the output off.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Protocol
+
+from drivers.coil import guard_process
+from drivers.dialect_row import CoilDialect, Wire
+from drivers.serial_line.port import port_settings
+from tactile_lab.errors import InstrumentError
+
+SILENCE = 0.5
+"""Time without heartbeat after which an armed guard acts, s."""
+
+READY = 10.0
+"""Longest wait for the guard process to be ready, s."""
+
+
+class Watch(Protocol):
+    """A guard that switches the output off when the heartbeat stops."""
+
+    @property
+    def lost(self) -> str | None:
+        """Why the guard no longer guards, or None."""
+        ...
+
+    def start(self) -> None:
+        """Be ready to guard."""
+
+    def arm(self) -> None:
+        """From now on silence means danger."""
+
+    def beat(self) -> None:
+        """The thread that owns the source is alive."""
+
+    def disarm(self) -> None:
+        """The output is verified off; silence is fine again."""
+
+    def stop(self) -> None:
+        """Leave when disarmed; while armed, hand the released port to the guard."""
+
+
+def in_process(port: str) -> bool:
+    """Whether what answers at `port` dies with this process and needs no guard."""
+    return port.startswith(("sim://", "loop://"))
+
+
+class Guard:
+    """Starts and speaks to one guard process.
+
+    Args:
+        port: address of the source.
+        row: its dialect.
+        wire: its serial settings in force.
+        log: file the guard appends to; None for the user's state folder.
+    """
+
+    def __init__(
+        self, port: str, row: CoilDialect, wire: Wire, log: Path | None = None
+    ) -> None:
+        self._log = log or default_log()
+        self._settings = guard_settings(port, row, wire, self._log)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._armed = False
+        self._lost: str | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the guard, None before `start`."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def lost(self) -> str | None:
+        """Why the guard no longer guards, or None."""
+        if self._lost is None and self._process is not None:
+            code = self._process.poll()
+            if code is not None:
+                self._lost = f"it ended with code {code}; see {self._log}"
+        return self._lost
+
+    def start(self) -> None:
+        """Start the process and wait until it is ready.
+
+        Raises:
+            InstrumentError: it does not start.
+        """
+        if self._process is not None and self.lost is None:
+            return
+        self._lost = None
+        flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", str(Path(guard_process.__file__))],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            creationflags=flags,
+            bufsize=0,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps(self._settings).encode() + b"\n")
+        answer = self._process.stdout.readline()
+        if answer.strip() != b"ready":
+            self._process.kill()
+            raise InstrumentError(
+                f"The guard process that switches the output off when this program "
+                f"dies did not start; see {self._log}."
+            )
+        try:
+            os.set_blocking(self._process.stdin.fileno(), False)
+        except (AttributeError, OSError):
+            return  # Windows before Python 3.12: a hung guard could block us
+
+    def arm(self) -> None:
+        """From now on silence means danger."""
+        self._armed = True
+        self._say(guard_process.ARM)
+
+    def beat(self) -> None:
+        """The thread that owns the source is alive."""
+        if self._armed:
+            self._say(guard_process.BEAT)
+
+    def disarm(self) -> None:
+        """The output is verified off; silence is fine again."""
+        if self._armed:
+            self._say(guard_process.DISARM)
+        self._armed = False
+
+    def stop(self) -> None:
+        """Leave when disarmed; while armed, hand the released port to the guard.
+
+        Idempotent.
+        """
+        process, self._process = self._process, None
+        if process is None:
+            return
+        assert process.stdin is not None and process.stdout is not None
+        word = guard_process.TAKE_OVER if self._armed else guard_process.QUIT
+        self._armed = False
+        try:
+            process.stdin.write(word)
+        except OSError as reason:
+            self._lost = str(reason)
+        process.stdin.close()
+        process.stdout.close()
+        try:
+            process.wait(0.0 if word == guard_process.TAKE_OVER else 2.0)
+        except subprocess.TimeoutExpired:
+            # it works on by itself; nobody is left to wait for it
+            process.returncode = 0
+
+    def _say(self, word: bytes) -> None:
+        if self._process is None or self._process.stdin is None:
+            self._lost = "it was never started"
+            return
+        try:
+            if self._process.stdin.write(word) is None:
+                self._lost = "it no longer listens"
+        except OSError as reason:
+            self._lost = str(reason)
+
+
+def guard_settings(
+    port: str, row: CoilDialect, wire: Wire, log: Path
+) -> dict[str, object]:
+    """Everything the guard process needs to know, as plain data."""
+    end = wire.send_end
+    lines = [*row.stop_lines, row.set_line(0.0), *row.off]
+    return {
+        "owner": os.getpid(),
+        "silence": SILENCE,
+        "port": port,
+        "settings": port_settings(port, wire),
+        "send": wire.preamble + end + end.join(lines) + end,
+        "query": row.on_query + end,
+        "reply_end": wire.reply_end,
+        "off_match": row.off_match,
+        "log": str(log),
+    }
+
+
+def default_log() -> Path:
+    """Where guards write what they did."""
+    state = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
+    folder = Path(state) if state else Path.home() / ".local" / "state"
+    return folder / "tactile-lab" / "guard.log"

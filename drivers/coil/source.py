@@ -1,0 +1,349 @@
+"""A serial current source that drives the electromagnet; its dialect is a row of data.
+
+The limits live here, below every caller: current, slew, compliance before output-on,
+heat budget, read-back, resistance. Every way out leads through `safe_off`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from drivers.coil.guard import Guard, Watch, in_process
+from drivers.coil.interlock import Interlock
+from drivers.coil.limits import check_current, narrowed
+from drivers.coil.list_mode import check_list, upload
+from drivers.coil.off import switch_off
+from drivers.coil.wire import CoilWire
+from drivers.dialect_row import MARGIN, CoilDialect
+from drivers.serial_line.conversation import Conversation
+from drivers.serial_line.link import SerialLink, Spy
+from tactile_lab.bench import CoilLimits, OffReport, Reading
+from tactile_lab.clock import Clock
+from tactile_lab.errors import InstrumentError, InterlockError, LimitError, UnsafeError
+from tactile_lab.quantity import show
+
+CATCH_UP = 0.05
+"""Time after a late set-point, s, that one step may make up for at the slew limit."""
+
+
+class CoilSource:
+    """A current source behind a serial port.
+
+    Args:
+        dialect: how the model speaks.
+        port: address for pyserial.
+        limits: what coil and user allow; narrowed by what the model can do.
+        clock: the bench's time.
+        baud: instead of the row's.
+        guard: armed while the output is on; None for the one that fits the port.
+        guarded: False leaves a source without guard, for tests of something else.
+        spy: told of every byte, or None.
+    """
+
+    def __init__(
+        self,
+        dialect: CoilDialect,
+        port: str,
+        limits: CoilLimits,
+        clock: Clock,
+        *,
+        baud: int | None = None,
+        guard: Watch | None = None,
+        guarded: bool = True,
+        spy: Spy | None = None,
+    ) -> None:
+        self.dialect = dialect
+        self.warnings: list[str] = []
+        setup = dialect.serial
+        if baud is not None:
+            setup = setup.model_copy(update={"baud": baud})
+        link = SerialLink(
+            port,
+            setup,
+            clock,
+            what="coil source",
+            identify=dialect.identify,
+            spy=spy,
+            beat=self.beat,
+        )
+        self._limits = narrowed(limits, dialect)
+        self._clock = clock
+        if guard is None and guarded and not in_process(port):
+            guard = Guard(port, dialect, setup)
+        self._guard = guard
+        self._wire = CoilWire(Conversation(link, dialect), dialect, clock)
+        self._interval = dialect.promised_interval(baud)
+        self._setpoint: float | None = None
+        self._commanded = clock.now()
+        self._energised = False
+        self._reached = False
+        self._interlock = Interlock(self._limits, clock.now(), guard, self._warn)
+
+    @property
+    def identity(self) -> str:
+        """What the source answered when asked who it is."""
+        return self._wire.talk.link.identity or "not connected"
+
+    @property
+    def limits(self) -> CoilLimits:
+        """The narrowest of model, coil and user."""
+        return self._limits
+
+    @property
+    def update_interval(self) -> float:
+        """Time one verified set-point takes, s, with margin; measured by `open`."""
+        return self._interval
+
+    @property
+    def setpoint(self) -> float | None:
+        """Current last commanded, A; None while unknown."""
+        return self._setpoint
+
+    @property
+    def energised(self) -> bool:
+        """Whether the output is on, as far as this program knows."""
+        return self._energised
+
+    @property
+    def tripped(self) -> str | None:
+        """Why the interlock latched, or None."""
+        return self._interlock.tripped
+
+    def record(self, path: Path) -> None:
+        """Write every byte to a transcript at `path`, until closed; before `open`.
+
+        Raises:
+            SceneError: the file cannot be written.
+        """
+        self._wire.talk.link.record(path)
+
+    def open(self) -> None:
+        """Connect, identify, make safe, measure the update interval.
+
+        Raises:
+            NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
+            BadReplyError: another instrument answers.
+            UnsafeError: the output could not be verified off.
+        """
+        wire = self._wire
+        wire.talk.link.open()
+        try:
+            wire.talk.recognise()
+            self._reached = True
+            wire.talk.clear_errors()
+            wire.talk.offer(self.dialect.optional)
+            if wire.output_is_on():
+                self.warnings.append(
+                    f"The output was already on at {show(wire.current(), 'A')} when "
+                    "connected; it was ramped to zero and switched off."
+                )
+            else:
+                self._setpoint = 0.0  # nothing flows, nothing to ramp
+            report = self.safe_off()
+            if not report.verified:
+                raise UnsafeError(report.text)
+            for line in self.dialect.init:
+                wire.talk.command(line)
+            self._interval = wire.measured_interval()
+            if self._guard is not None:
+                self._guard.start()
+        except BaseException:
+            wire.talk.link.close()
+            raise
+
+    def energise(self) -> None:
+        """Set compliance and 0 A, verify both, then switch the output on.
+
+        Raises:
+            InterlockError: tripped and not acknowledged.
+            RefusedError: the source does not take a setting.
+        """
+        self._interlock.refuse_when_tripped()
+        if self._energised:
+            return
+        self._wire.set_compliance(self._limits.compliance)
+        self._wire.set_zero()
+        self._took(0.0)
+        if self._guard is not None:
+            self._guard.arm()
+        self._energised = True
+        try:
+            self._trip_on(self._interlock.before_setting(self._clock.now()))
+            self._wire.switch_on()
+        except BaseException:
+            self.safe_off()
+            raise
+
+    def set_current(self, current: float) -> float:
+        """Step towards `current`, A, as far as slew allows; what was commanded, A.
+
+        Raises:
+            LimitError: not finite, beyond the limit, of a sign the source cannot
+                give, or the output is off.
+            InterlockError: the heat budget is spent or the guard is gone; the output
+                is off by then.
+        """
+        check_current(current, self._limits, self.dialect)
+        self._interlock.refuse_when_tripped()
+        if not self._energised:
+            raise LimitError("The output is off; energise the coil before setting it.")
+        now = self._clock.now()
+        self._trip_on(self._interlock.before_setting(now))
+        if self._setpoint is None:  # the last answer was lost on the way
+            self._setpoint = self._wire.setpoint()
+        passed = min(now - self._commanded, max(2 * self._interval, CATCH_UP))
+        step = self._limits.slew * passed + 0.5 * 10.0**-self.dialect.digits
+        wanted = min(max(current, self._setpoint - step), self._setpoint + step)
+        self._commanded = now
+        try:
+            self._wire.set_current(wanted)
+            # a late answer may mean that the step was taken late
+            self._commanded = max(now, self._clock.now() - self._interval)
+        except InstrumentError:
+            self._setpoint = None  # it may or may not have been taken
+            raise
+        self._took(wanted)
+        return wanted
+
+    def play_list(self, currents: Sequence[float], dwell: float) -> float:
+        """Have the source itself play `currents`, A, each for `dwell` s; its length, s.
+
+        Returns once it has started. The set-point is unknown until `end_list`.
+
+        Raises:
+            LimitError: a list the source, coil or heat budget does not allow, or the
+                output is off or not at 0 A.
+        """
+        self._interlock.refuse_when_tripped()
+        self._trip_on(self._interlock.before_setting(self._clock.now()))
+        if not self._energised or self._setpoint != 0.0:
+            raise LimitError("A list starts with the output on and at 0 A.")
+        mode = check_list(currents, dwell, self._limits, self.dialect)
+        self._interlock.heat.refuse_list(currents, dwell, self._clock.now())
+        upload(self._wire, mode, currents, dwell)
+        for line in mode.start:
+            self._wire.talk.command(line)
+        self._setpoint = None
+        self._interlock.flows(self._clock.now(), None, on=True)
+        self._interlock.heat.spend_list(currents, dwell, self._clock.now())
+        return len(currents) * dwell
+
+    def end_list(self) -> None:
+        """Go back to a set-point of 0 A, once the list has ended."""
+        for line in self.dialect.stop_lines:
+            self._wire.talk.command(line)
+        self._wire.set_zero()
+        self._took(0.0)
+
+    def read_current(self) -> Reading:
+        """Measured output current, A; now and then the resistance is looked at too.
+
+        Raises:
+            InterlockError: the current keeps differing from the set-point, the heat
+                budget is spent, or the coil is hot; the output is off by then.
+        """
+        if not self._energised:
+            return Reading(self._clock.now(), self._wire.current_when_off())
+        self._trip_on(self._interlock.before_setting(self._clock.now()))
+        measured = self._wire.current()
+        now = self._clock.now()
+        self._trip_on(self._interlock.after_reading(now, measured, self._wire.voltage))
+        return Reading(now, measured)
+
+    def read_voltage(self) -> Reading:
+        """Measured output voltage, V."""
+        volts = self._wire.voltage()
+        return Reading(self._clock.now(), volts)
+
+    @property
+    def resistance_ratio(self) -> float | None:
+        """Resistance over that of the cold coil; None until it was looked at."""
+        return self._interlock.thermometer.ratio
+
+    def settings(self) -> dict[str, str]:
+        """Settings read back, for the run's record."""
+        link = self._wire.talk.link
+        return {
+            "identity": self.identity,
+            "dialect": self.dialect.id,
+            "port": link.port,
+            "baud": str(link.wire.baud),
+            "compliance_V": f"{self._wire.compliance():g}",
+            "setpoint_A": f"{self._wire.setpoint():g}",
+            "output": "on" if self._wire.output_is_on() else "off",
+            "update_interval_s": f"{self._interval:.6g}",
+        }
+
+    def beat(self) -> None:
+        """Tell the guard that the owning thread is alive."""
+        if self._guard is not None and self._energised:
+            self._guard.beat()
+
+    def acknowledge(self) -> None:
+        """Unlatch the interlock after its cause was looked at; heat used remains."""
+        self._interlock.acknowledge()
+
+    def safe_off(self, *, ramp: bool = True) -> OffReport:
+        """Ramp to 0 A, output off, read back; idempotent, never raises.
+
+        Args:
+            ramp: False goes to 0 A at once, for the second Ctrl-C.
+        """
+        if not self._reached:
+            return OffReport(
+                False,
+                None,
+                "The source was never reached: this program switched nothing on, and "
+                "what its output does is unknown.",
+            )
+        report = switch_off(
+            self._wire,
+            self._clock,
+            setpoint=self._setpoint,
+            slew=self._limits.slew,
+            exchange=self._interval / MARGIN,
+            ramp=ramp,
+        )
+        self._commanded = self._clock.now()
+        if report.verified:
+            self._energised = False
+            self._took(0.0)
+            if self._guard is not None:
+                self._guard.disarm()
+        else:
+            self._setpoint = None
+        return report
+
+    def close(self) -> None:
+        """Make safe and let go of the port; idempotent.
+
+        An output that cannot be verified off is told in `warnings`, and the guard
+        takes the port over.
+        """
+        talk = self._wire.talk
+        if talk.link.is_open:
+            report = self.safe_off()
+            if report.verified:
+                talk.offer(self.dialect.release)
+            else:
+                self._warn(report.text)
+            talk.link.close()
+        talk.link.end_record()
+        if self._guard is not None:
+            self._guard.stop()
+
+    def _took(self, current: float) -> None:
+        self._setpoint = current
+        self._interlock.flows(self._clock.now(), current, on=self._energised)
+
+    def _warn(self, text: str) -> None:
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def _trip_on(self, complaint: str | None) -> None:
+        if complaint is None:
+            return
+        self._interlock.tripped = complaint
+        report = self.safe_off()
+        raise InterlockError(f"{complaint} {report.text}")

@@ -1,0 +1,1 @@
+"""PicoScopes of the ps3000a family, through the vendor's library."""

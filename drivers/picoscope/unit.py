@@ -1,0 +1,163 @@
+"""One opened PicoScope: its handle, who it is, and calls that raise."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.picoscope import status
+from drivers.picoscope.power import acknowledge, open_unit
+from drivers.picoscope.sdk import INFORMATION, INPUTS, bind, load
+from drivers.picoscope.sdk_calls import LibraryCalls
+from tactile_lab.bench import Channel
+from tactile_lab.errors import RefusedError
+
+
+class Unit:
+    """A PicoScope's handle.
+
+    Args:
+        library: the library's file or folder, a loaded library (any object with the C
+            functions), or None to search the usual places.
+        serial: the unit's serial number; None for the first free one.
+        allow_usb2: accept a USB 3 scope on a USB 2 port.
+        allow_usb_power: accept a missing mains adapter.
+    """
+
+    def __init__(
+        self,
+        library: str | Any | None,
+        serial: str | None,
+        *,
+        allow_usb2: bool,
+        allow_usb_power: bool,
+    ) -> None:
+        self.information: dict[str, str] = {}
+        self.accepted: tuple[str, ...] = ()
+        """Names of power states acknowledged when the unit was opened or restarted."""
+        self.full_scale = 0
+        self._library = library
+        self._serial = serial
+        self._allowed = {"allow_usb2": allow_usb2, "allow_usb_power": allow_usb_power}
+        self._calls: LibraryCalls | None = None
+        self._handle = 0
+        self._power = status.OK
+        self._memory: dict[int, NDArray[np.int16]] = {}
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a handle."""
+        return self._handle != 0
+
+    @property
+    def shift(self) -> int:
+        """Low bits of every code that are always 0."""
+        return (self.full_scale & -self.full_scale).bit_length() - 1
+
+    def open(self) -> None:
+        """Load the library, open the unit, read who it is.
+
+        Raises:
+            NotFoundError: no library, or no free scope.
+            LimitError: it is powered or connected in a way that was not allowed.
+        """
+        if self._calls is None:
+            found = self._library is None or isinstance(self._library, str)
+            library = load(self._library) if found else bind(self._library)
+            self._calls = LibraryCalls(library)
+        self._handle, self.accepted = open_unit(
+            self._calls, self._serial, **self._allowed
+        )
+        self._power = status.OK
+        try:
+            self.information = {name: self._read(name) for name in INFORMATION}
+            most = ctypes.c_int16()
+            self.do("Reading full scale", "ps3000aMaximumValue", ctypes.byref(most))
+            self.full_scale = most.value
+        except Exception:
+            self.close()
+            raise
+
+    def call(self, name: str, *arguments: Any) -> int:
+        """Call a function with this handle and return its status.
+
+        Raises:
+            RefusedError: not open.
+        """
+        if self._calls is None or not self._handle:
+            raise RefusedError("The scope is not open; open it first.")
+        code = self._calls(name, self._handle, *arguments)
+        if code in status.POWER:
+            self._power = code
+        return code
+
+    def do(self, doing: str, name: str, *arguments: Any) -> None:
+        """Call a function with this handle.
+
+        Raises:
+            TactileLabError: any status but OK, with `doing` in the message.
+        """
+        code = self.call(name, *arguments)
+        if code != status.OK:
+            raise status.failure(code, doing)
+
+    def register(self, channel: Channel, memory: NDArray[np.int16]) -> None:
+        """Have the library write an input's samples to `memory`.
+
+        The memory is kept until replaced, because the library holds a pointer to it.
+
+        Raises:
+            TactileLabError: any status but OK.
+        """
+        number = INPUTS.index(channel.input)
+        assert memory.dtype == np.int16 and memory.flags.c_contiguous
+        self._memory[number] = memory
+        pointer = memory.ctypes.data_as(ctypes.POINTER(ctypes.c_int16))
+        self.do(
+            f"Registering memory for input {channel.input}", "ps3000aSetDataBuffer",
+            number, pointer, memory.size, 0, 0,
+        )  # fmt: skip
+
+    def restore_power(self) -> None:
+        """Acknowledge a change of power since the last time, where allowed.
+
+        Raises:
+            LimitError: a power state that was not allowed.
+        """
+        if self._power == status.OK or self._calls is None:
+            return
+        code, self._power = self._power, status.OK
+        self.accepted += acknowledge(
+            self._calls, self._handle, code, "Starting again", **self._allowed
+        )
+
+    def answers(self) -> bool:
+        """Ping the scope: whether it is still there."""
+        return self.call("ps3000aPingUnit") not in status.DEAD
+
+    def close(self) -> None:
+        """Let go of the handle; idempotent.
+
+        Raises:
+            TactileLabError: the unit is there but could not be closed.
+        """
+        if self._calls is None or not self._handle:
+            return
+        code = self._calls("ps3000aCloseUnit", self._handle)
+        self._handle = 0
+        self._memory.clear()
+        self._calls.released()
+        if code not in status.DEAD | {status.OK}:
+            raise status.failure(code, "Closing the scope")
+
+    def _read(self, item: str) -> str:
+        text = (ctypes.c_int8 * 64)()
+        needed = ctypes.c_int16()
+        self.do(
+            f"Reading the scope's {item}", "ps3000aGetUnitInfo",
+            text, len(text), ctypes.byref(needed), INFORMATION[item],
+        )  # fmt: skip
+        return bytes(text).split(b"\0", 1)[0].decode("ascii", "replace")

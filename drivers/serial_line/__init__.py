@@ -1,0 +1,1 @@
+"""The serial line: bytes out, answers back, and what was said."""

@@ -1,0 +1,184 @@
+"""A link and a dialect together: questions, verified commands, one careful retry."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+from drivers.dialect_row import CoilDialect, MeterDialect
+from drivers.serial_line.link import SerialLink
+from tactile_lab.errors import (
+    BadReplyError,
+    InstrumentError,
+    LinkLostError,
+    NoReplyError,
+    RefusedError,
+)
+
+RETRY = 0.1
+"""Time between two attempts to open a lost port again, s."""
+
+MOST_ERRORS = 25
+"""Answers of an error queue to read before giving up on emptying it."""
+
+
+class Conversation:
+    """Lines in one dialect over one link.
+
+    A question whose answer failed is asked once more after the link has resynchronised
+    (questions and set-points may be repeated without harm).
+
+    Args:
+        link: the wire.
+        dialect: the row.
+    """
+
+    def __init__(self, link: SerialLink, dialect: CoilDialect | MeterDialect) -> None:
+        self.link = link
+        self.dialect = dialect
+
+    def recognise(self) -> None:
+        """Refuse an instrument that is not of this row.
+
+        Raises:
+            BadReplyError: the name it gives does not match.
+        """
+        name = self.link.identity or ""
+        if re.search(self.dialect.match, name) is None:
+            raise BadReplyError(
+                f"At {self.link.port} {name!r} answers; the dialect "
+                f'"{self.dialect.id}" is for {self.dialect.title}. Name the right row '
+                "or port in the bench file."
+            )
+
+    def ask(self, line: str) -> str:
+        """The answer to `line`, asked once."""
+        return self.link.query(line)
+
+    def query(self, line: str) -> str:
+        """The answer to `line`, asked again once if it was lost or garbled."""
+        try:
+            return self.ask(line)
+        except (NoReplyError, BadReplyError):
+            self.link.resynchronise()
+            self.clear_errors()
+            return self.ask(line)
+
+    def number(self, line: str, pattern: str | None = None) -> float:
+        """The numeric answer to `line`: group 1 of `pattern`, or of the row's.
+
+        Raises:
+            BadReplyError: no finite number, twice.
+        """
+        answer = self.query(line)
+        value = self.parsed(answer, pattern)
+        if value is None:
+            self.link.resynchronise()
+            answer = self.ask(line)
+            value = self.parsed(answer, pattern)
+        if value is None:
+            raise BadReplyError(
+                f"The answer {answer!r} to {line!r} is no number in the dialect "
+                f'"{self.dialect.id}".'
+            )
+        return value
+
+    def command(self, line: str) -> None:
+        """Send a line that changes state and check that it was taken.
+
+        Raises:
+            RefusedError: the instrument reports an error.
+        """
+        error = self.dialect.error
+        if error is None:
+            self.link.write(line)
+            return
+        join = self.dialect.join if isinstance(self.dialect, CoilDialect) else ""
+        if not join:
+            self.link.write(line)
+            answer = self.query(error)
+        else:
+            answer = self.query(line + join + error)
+        if re.search(self.dialect.error_ok, answer) is None:
+            raise RefusedError(f"The instrument refused {line!r}: {answer}.")
+
+    def offer(self, lines: Iterable[str]) -> None:
+        """Send lines whose refusal is accepted."""
+        for line in lines:
+            try:
+                self.command(line)
+            except InstrumentError:
+                if not self.link.is_open:
+                    return
+
+    def insist(self, lines: Iterable[str], trouble: list[str]) -> bool:
+        """Send each line whatever happens; whether all were confirmed.
+
+        What went wrong is added to `trouble`.
+        """
+        before = len(trouble)
+        for line in lines:
+            try:
+                self.command(line)
+            except InstrumentError as reason:
+                trouble.append(f"{line}: {reason}")
+                self._blindly(line, trouble)
+        return len(trouble) == before
+
+    def clear_errors(self) -> None:
+        """Read the error queue until it is empty."""
+        if self.dialect.error is None:
+            return
+        for _ in range(MOST_ERRORS):
+            if re.search(self.dialect.error_ok, self.ask(self.dialect.error)):
+                return
+        raise RefusedError(
+            f"The instrument at {self.link.port} has no end of errors; switch it off "
+            "and on."
+        )
+
+    def reconnected(self, trouble: list[str], patience: float = 0.0) -> bool:
+        """Whether the link is open, after trying to open it for `patience` s."""
+        if self.link.is_open:
+            return True
+        known, until = self.link.identity, self.link.now + patience
+        while True:
+            try:
+                self.link.open()
+                self.recognise()
+                self._same_as(known)
+                return True
+            except InstrumentError as reason:
+                self.link.close()  # a stranger is not to be told anything
+                self.link.identity = known
+                if self.link.now + RETRY > until:
+                    trouble.append(f"reconnect: {reason}")
+                    return False
+            self.link.pause(RETRY)
+
+    def _same_as(self, known: str | None) -> None:
+        if known is not None and known != (found := self.link.identity):
+            raise BadReplyError(
+                f"At {self.link.port} {found!r} answers now, not {known!r} as before. "
+                "Connect the same instrument again."
+            )
+
+    def _blindly(self, line: str, trouble: list[str]) -> None:
+        """Send without waiting for anything; reopen a lost port once."""
+        try:
+            self.link.send_blindly(line)
+        except LinkLostError:
+            self.link.close()
+            if self.reconnected(trouble):
+                self.insist((line,), trouble)
+        except InstrumentError as reason:
+            trouble.append(f"{line}, sent blindly: {reason}")
+
+    def parsed(self, answer: str, pattern: str | None = None) -> float | None:
+        """The number in `answer`, or None."""
+        match = re.search(pattern or self.dialect.number, answer)
+        if match is None:
+            return None
+        value = float(match.group(1))
+        return value if math.isfinite(value) and abs(value) < 1e30 else None

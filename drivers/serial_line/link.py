@@ -1,0 +1,340 @@
+"""One serial wire: lines out, lines in, and every way it fails told in our words.
+
+Any address pyserial opens will do: `/dev/ttyUSB0`, `COM3`, `socket://host:port`,
+`spy://...`, and the simulated bench's `sim://`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import serial
+
+from drivers.dialect_row import Wire
+from drivers.serial_line.port import PORT_ERRORS, open_port, release
+from drivers.serial_line.transcript import Transcript
+from tactile_lab.clock import Clock
+from tactile_lab.errors import (
+    BadReplyError,
+    InstrumentError,
+    LinkLostError,
+    NoReplyError,
+)
+
+QUIET = 0.05
+"""Silence that ends a drain, s."""
+
+LONGEST_DRAIN = 1.0
+"""Longest time a far end may keep talking while the line is drained, s."""
+
+Spy = Callable[[str, bytes, float], None]
+"""Told of each (direction ">" or "<", bytes, clock time s)."""
+
+
+@dataclass
+class Tally:
+    """What a link has been through since it was made."""
+
+    exchanges: int = 0
+    timeouts: int = 0
+    bad_replies: int = 0
+    resynchronised: int = 0
+
+
+class SerialLink:
+    """Lines to and from one instrument, for one thread.
+
+    After an answer that came late, broken or not at all the next query first drains
+    the line and compares the answer to `identify`, so that no late answer is ever
+    taken for another question's.
+
+    Args:
+        port: address, as pyserial's `serial_for_url` takes it.
+        wire: settings and framing.
+        clock: time that gaps and drains are waited for in.
+        what: the instrument's role, for messages.
+        identify: harmless query whose answer never changes.
+        spy: told of every byte, or None.
+        beat: called while talking and waiting: the thread is alive.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        wire: Wire,
+        clock: Clock,
+        *,
+        what: str,
+        identify: str = "*IDN?",
+        spy: Spy | None = None,
+        beat: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.port = port
+        self.wire = wire
+        self.tally = Tally()
+        self.identity: str | None = None
+        self._clock = clock
+        self._what = what
+        self._identify = identify
+        self.spy = spy
+        self._beat = beat
+        self._transcript: Transcript | None = None
+        self._serial: serial.Serial | None = None
+        self._free_at = 0.0
+        self._doubtful = False
+        self._half_sent = False
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is held."""
+        return self._serial is not None
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether the next query must resynchronise first."""
+        return self._doubtful
+
+    def open(self) -> None:
+        """Take the port and identify the instrument.
+
+        Raises:
+            NotFoundError: no such port, or no right to use it.
+            InstrumentError: another program holds it.
+            NoReplyError: nothing answers there.
+            BadReplyError: it echoes, or talks nonsense.
+        """
+        if self._serial is not None:
+            return
+        self._serial = open_port(self.port, self.wire, self._what)
+        try:
+            with self._mapped():
+                self._serial.reset_input_buffer()
+            self._send_preamble()
+            answer = self._exchange(self._identify)
+        except BaseException:
+            self.close()
+            raise
+        self.identity = answer
+
+    def close(self) -> None:
+        """Let go of the port; idempotent, also after the link was lost."""
+        held, self._serial = self._serial, None
+        if held is not None:
+            release(held)
+
+    def end_record(self) -> None:
+        """Close the transcript, if there is one; idempotent."""
+        if self._transcript is not None:
+            self._transcript.close()
+            self.spy = self._transcript = None
+
+    def write(self, line: str) -> None:
+        """Send a line that has no answer.
+
+        Raises:
+            LinkLostError: unplugged.
+            NoReplyError: the far end takes nothing.
+        """
+        self._settle()
+        self._send(line)
+
+    def query(self, line: str) -> str:
+        """Send `line` and return its answer without terminator and flow control.
+
+        Raises:
+            LinkLostError: unplugged.
+            NoReplyError: no complete answer in time.
+            BadReplyError: bytes that are no text.
+        """
+        self._settle()
+        return self._exchange(line)
+
+    def record(self, path: Path) -> None:
+        """Write every byte from now on to a transcript at `path`, until closed.
+
+        Raises:
+            SceneError: the file cannot be written.
+        """
+        self.spy = self._transcript = Transcript(path, about=self._what)
+
+    def send_blindly(self, line: str) -> None:
+        """Send `line` behind a terminator that ends a half-sent one; expect nothing.
+
+        Raises:
+            LinkLostError: unplugged.
+            NoReplyError: the far end takes nothing.
+        """
+        self._doubtful = True
+        self._send("")
+        self._send(line)
+
+    @property
+    def now(self) -> float:
+        """Clock time, s."""
+        return self._clock.now()
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass, alive."""
+        self._clock.sleep_until(self._clock.now() + seconds)
+        self._beat()
+
+    def resynchronise(self) -> None:
+        """Drain the line and have the instrument say its name again.
+
+        Raises:
+            LinkLostError: unplugged.
+            NoReplyError: it does not answer.
+            BadReplyError: it keeps talking, or answers with another name.
+        """
+        self.tally.resynchronised += 1
+        self.drain()
+        self._send_preamble()
+        answer = ""
+        for _ in range(3):
+            try:
+                answer = self._exchange(self._identify)
+            except BadReplyError as reason:
+                answer = str(reason)
+            if answer == self.identity:
+                return
+            self._doubtful = True
+            self.drain()
+        raise BadReplyError(
+            f"The {self._what} at {self.port} answers {answer!r} to {self._identify}, "
+            f"not {self.identity!r} as before. Check what is connected there."
+        )
+
+    def drain(self) -> None:
+        """Read and drop until the line has been quiet for a while.
+
+        Raises:
+            LinkLostError: unplugged.
+            BadReplyError: it does not fall quiet.
+        """
+        quiet = max(QUIET, 2 * self.wire.character_time)
+        give_up = self._clock.now() + LONGEST_DRAIN
+        quiet_since = self._clock.now()
+        while self._clock.now() - quiet_since < quiet:
+            dropped = b""
+            with self._mapped() as port:
+                while waiting := port.in_waiting:
+                    dropped += port.read(waiting)
+                    if self._clock.now() > give_up:
+                        break
+            self._beat()
+            now = self._clock.now()
+            if dropped:
+                self._tell("<", dropped)
+                quiet_since = now
+            if now > give_up:
+                raise BadReplyError(
+                    f"The {self._what} at {self.port} does not stop talking; its "
+                    "baud rate or its model is probably not the one expected."
+                )
+            self._clock.sleep_until(now + quiet / 4)
+
+    def _settle(self) -> None:
+        if self._doubtful:
+            self.resynchronise()
+
+    def _exchange(self, line: str) -> str:
+        self._doubtful = True
+        self._send(line)
+        if self.wire.echo:
+            repeated = self._receive(line)
+            if repeated != line:
+                raise self._bad(line, repeated.encode())
+        answer = self._receive(line)
+        if answer == line:
+            self.tally.bad_replies += 1
+            raise BadReplyError(
+                f"The {self._what} at {self.port} echoes what it is sent. Switch its "
+                "echo off, or set echo = true in its dialect row."
+            )
+        self._doubtful = False
+        self.tally.exchanges += 1
+        return answer
+
+    def _send_preamble(self) -> None:
+        if self.wire.preamble or self._half_sent:
+            self._send(self.wire.preamble)
+            if self.wire.echo:
+                self.drain()
+
+    def _send(self, line: str) -> None:
+        data = (line + self.wire.send_end).encode("ascii")
+        if len(data) > self.wire.max_line:
+            raise InstrumentError(
+                f"{line!r} has {len(data)} characters; the {self._what} takes "
+                f"{self.wire.max_line} a line."
+            )
+        self._clock.sleep_until(self._free_at)
+        self._beat()
+        self._tell(">", data)
+        self._half_sent = True
+        with self._mapped() as port:
+            port.write(data)
+        self._half_sent = False
+        self._free_at = self._clock.now() + self.wire.min_gap
+
+    def _receive(self, asked: str) -> str:
+        """One line; blank ones, which flow control leaves behind, are passed over."""
+        end = self.wire.reply_end.encode("ascii")
+        while True:
+            with self._mapped() as port:
+                line = port.read_until(end)
+            self._beat()
+            self._free_at = self._clock.now() + self.wire.min_gap
+            if line:
+                self._tell("<", line)
+            if not line.endswith(end):
+                self.tally.timeouts += 1
+                got = f"only {line!r}" if line else "nothing"
+                raise NoReplyError(
+                    f"The {self._what} at {self.port} answered {got} to {asked!r} "
+                    f"within {self.wire.timeout:g} s. Check power, cable, baud rate "
+                    "and terminator."
+                )
+            text = line.translate(None, self.wire.strip.encode("ascii")).rstrip(b"\r\n")
+            if not text:
+                continue
+            if not all(0x20 <= byte < 0x7F for byte in text):
+                raise self._bad(asked, line)
+            return text.decode("ascii").strip()
+
+    def _bad(self, asked: str, line: bytes) -> BadReplyError:
+        self._doubtful = True
+        self.tally.bad_replies += 1
+        return BadReplyError(
+            f"The {self._what} at {self.port} answered {line!r} to {asked!r}, which is "
+            "no text of its dialect. Check baud rate, parity and cable."
+        )
+
+    @contextmanager
+    def _mapped(self) -> Iterator[serial.Serial]:
+        """The open port, with what pyserial raises told as our errors."""
+        if self._serial is None:
+            raise LinkLostError(f"The {self._what} at {self.port} is not connected.")
+        try:
+            yield self._serial
+        except serial.SerialTimeoutException as reason:
+            self._doubtful = True
+            self.tally.timeouts += 1
+            raise NoReplyError(
+                f"The {self._what} at {self.port} takes no more characters; it hangs, "
+                "or holds the line by flow control."
+            ) from reason
+        except PORT_ERRORS as reason:
+            self._doubtful = True
+            raise LinkLostError(
+                f"The link to the {self._what} at {self.port} was lost ({reason}). "
+                "Check cable and power; the state of its output is unknown until it "
+                "answers again."
+            ) from reason
+
+    def _tell(self, direction: str, data: bytes) -> None:
+        if self.spy is not None:
+            self.spy(direction, data, self._clock.now())

@@ -1,0 +1,1 @@
+"""Oscilloscopes that speak USBTMC, each model a row of data."""

@@ -1,0 +1,102 @@
+"""Reading one finished record out of a USBTMC oscilloscope, checked and centred."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.usbtmc.dialect import ScopeDialect
+from drivers.usbtmc.link import UsbtmcLink
+from tactile_lab.bench import Channel, Stream
+from tactile_lab.errors import BadReplyError
+
+SHIFT = 8
+"""Low bits of every code that are 0: bytes are put in the high half."""
+
+_MOST_CODE = 127
+
+
+class RecordReader:
+    """Asks for the samples of a record.
+
+    Args:
+        link: the wire.
+        dialect: the model's row.
+    """
+
+    def __init__(self, link: UsbtmcLink, dialect: ScopeDialect) -> None:
+        self._link = link
+        self._dialect = dialect
+
+    def read(
+        self, channel: Channel, stream: Stream, depth: int
+    ) -> tuple[NDArray[np.int16], bool, float]:
+        """Read one input of the finished record.
+
+        Returns:
+            Its codes, shape (depth,); whether it left its range; time of the first
+            sample against the trigger, s.
+
+        Raises:
+            BadReplyError: not what was asked for, or the scope was set otherwise.
+        """
+        row, say = self._dialect, self._dialect.commands
+        tell(self._link, say.select, input=channel.input)
+        reference, origin = self._reference(channel, stream)
+        parts = []
+        for first in range(1, depth + 1, row.read_at_once):
+            last = min(depth, first + row.read_at_once - 1)
+            tell(self._link, say.bounds, first=first, last=last)
+            part = self._link.ask_block(say.data)
+            if len(part) != last - first + 1:
+                raise BadReplyError(
+                    f"{len(part)} samples of {channel.signal} came instead of "
+                    f"{last - first + 1}."
+                )
+            parts.append(part)
+        raw = np.frombuffer(b"".join(parts), dtype=np.uint8).astype(np.int16)
+        level = raw - np.int16(reference)
+        left = bool(np.max(np.abs(level)) >= _MOST_CODE)
+        return np.clip(level, -_MOST_CODE, _MOST_CODE) << SHIFT, left, origin
+
+    def _reference(self, channel: Channel, stream: Stream) -> tuple[int, float]:
+        """Byte at mid-screen and start against trigger (s), scaling checked."""
+        row, question = self._dialect, self._dialect.commands.preamble
+        answer = self._link.ask(question).split(",")
+        if len(answer) != 10:
+            raise BadReplyError(f"{question} gave {len(answer)} numbers, not 10.")
+        interval, origin, step, reference = (
+            number(answer[k], question) for k in (4, 5, 7, 9)
+        )
+        wanted = channel.range / (row.divisions_high * row.codes_per_division)
+        for what, got, set_to, unit in (
+            ("V a code", step, wanted, "V"),
+            ("time between samples", interval, stream.interval, "s"),
+        ):
+            if abs(got - set_to) > 0.01 * set_to:
+                raise BadReplyError(
+                    f"{channel.signal} came with {what} {got:g} {unit} instead of "
+                    f"{set_to:g} {unit}: it was changed on the scope. Leave its knobs "
+                    "alone and start again."
+                )
+        return round(reference), origin
+
+
+def tell(link: UsbtmcLink, lines: Sequence[str], **values: object) -> None:
+    """Send lines with their names filled in."""
+    for line in lines:
+        link.write(line.format(**values))
+
+
+def number(text: str, question: str) -> float:
+    """The number in an answer.
+
+    Raises:
+        BadReplyError: it is none.
+    """
+    try:
+        return float(text)
+    except ValueError as error:
+        raise BadReplyError(f"{question} gave {text!r}, not a number.") from error

@@ -1,0 +1,132 @@
+"""Getting a USBTMC instrument back in step: abort, clear, un-halt (s. 4.2.1)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import usb.core
+
+from drivers.usbtmc.errors import is_stall, is_timeout
+from tactile_lab.errors import NoReplyError
+
+_INITIATE_ABORT_BULK_OUT, _CHECK_ABORT_BULK_OUT = 1, 2
+_INITIATE_ABORT_BULK_IN, _CHECK_ABORT_BULK_IN = 3, 4
+_INITIATE_CLEAR, _CHECK_CLEAR = 5, 6
+_SUCCESS, _PENDING = 0x01, 0x02
+_TO_INTERFACE, _TO_ENDPOINT = 0xA1, 0xA2
+_MOST_CHECKS = 100
+_FLUSH = 1 << 16
+_FLUSH_MILLISECONDS = 100
+
+
+class Recovery:
+    """Control requests and endpoints of one claimed USBTMC interface.
+
+    Args:
+        device: pyusb device.
+        interface: its number.
+        endpoints: bulk-out and bulk-in.
+    """
+
+    def __init__(self, device: Any, interface: int, endpoints: tuple[Any, Any]) -> None:
+        self._device = device
+        self._interface = interface
+        self.bulk_out = int(endpoints[0].bEndpointAddress)
+        self.bulk_in = int(endpoints[1].bEndpointAddress)
+        self.packet = int(endpoints[1].wMaxPacketSize)
+
+    def abort_out(self, tag: int, milliseconds: int) -> None:
+        """Abort what is being sent; clear everything where that is refused."""
+        self._abort(
+            (_INITIATE_ABORT_BULK_OUT, _CHECK_ABORT_BULK_OUT), self.bulk_out, tag,
+            milliseconds,
+        )  # fmt: skip
+        self._device.clear_halt(self.bulk_out)
+
+    def abort_in(self, tag: int, milliseconds: int) -> None:
+        """Abort what is being answered; clear everything where that is refused."""
+        self._abort(
+            (_INITIATE_ABORT_BULK_IN, _CHECK_ABORT_BULK_IN), self.bulk_in, tag,
+            milliseconds,
+        )  # fmt: skip
+
+    def _abort(
+        self, requests: tuple[int, int], endpoint: int, tag: int, milliseconds: int
+    ) -> None:
+        initiate, check = requests
+        try:
+            status = self._control(
+                _TO_ENDPOINT, initiate, tag, endpoint, 2, milliseconds
+            )[0]
+            if status == _SUCCESS:
+                if endpoint == self.bulk_in:
+                    self._flush()
+                self._until_done(
+                    _TO_ENDPOINT, check, endpoint, 8, milliseconds,
+                    flush=endpoint == self.bulk_in,
+                )  # fmt: skip
+                return
+        except usb.core.USBError as error:
+            if not is_stall(error):
+                raise
+        # nothing in progress, or aborting is not known: start afresh
+        self.clear(milliseconds)
+
+    def clear(self, milliseconds: int) -> None:
+        """Empty both directions and un-halt.
+
+        Raises:
+            NoReplyError: the instrument stays busy clearing.
+        """
+        try:
+            self._control(
+                _TO_INTERFACE, _INITIATE_CLEAR, 0, self._interface, 1, milliseconds
+            )
+            self._until_done(
+                _TO_INTERFACE,
+                _CHECK_CLEAR,
+                self._interface,
+                2,
+                milliseconds,
+                flush=True,
+            )
+        except usb.core.USBError as error:
+            if not is_stall(error):
+                raise
+        self._device.clear_halt(self.bulk_out)
+        self._device.clear_halt(self.bulk_in)
+
+    def _until_done(
+        self, kind: int, check: int, index: int, length: int, milliseconds: int, *,
+        flush: bool,
+    ) -> None:  # fmt: skip
+        for _ in range(_MOST_CHECKS):
+            reply = self._control(kind, check, 0, index, length, milliseconds)
+            if reply[0] != _PENDING:
+                return
+            if flush and reply[1] & 1:
+                self._flush()
+        raise NoReplyError(
+            "The USB instrument stays busy aborting a transfer; switch it off and on."
+        )
+
+    def _flush(self) -> None:
+        """Read the bulk-in endpoint until a packet is short."""
+        size = -(-_FLUSH // self.packet) * self.packet
+        try:
+            while (
+                len(self._device.read(self.bulk_in, size, _FLUSH_MILLISECONDS)) == size
+            ):
+                pass
+        except usb.core.USBError as error:
+            if not (is_timeout(error) or is_stall(error)):
+                raise
+
+    def _control(
+        self, kind: int, request: int, value: int, index: int, length: int,
+        milliseconds: int,
+    ) -> bytes:  # fmt: skip
+        reply = self._device.ctrl_transfer(
+            kind, request, value, index, length, milliseconds
+        )
+        return bytes(reply) or b"\0"

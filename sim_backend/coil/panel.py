@@ -1,0 +1,180 @@
+"""What every simulated current source has inside: set-point, compliance, output.
+
+The commands that move them differ by model: `sim_backend.coil.kepco` and others.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from sim_backend.coil.list_mode import ListPlayer
+from sim_backend.serial_line.scpi import Handler, ScpiError, no_argument, number
+from tactile_lab.clock import Clock
+
+
+class CoilPlant(Protocol):
+    """The physics a simulated source drives; times are the bench clock's, s."""
+
+    def set_current(self, time: float, amperes: float) -> None:
+        """From `time` on the source regulates to `amperes`, A."""
+
+    def output(self, time: float, on: bool) -> None:
+        """The output is switched at `time`."""
+
+    def coil_current(self, time: float) -> float:
+        """Current through the coil, A."""
+        ...
+
+    def coil_voltage(self, time: float) -> float:
+        """Voltage at the source's terminals, V."""
+        ...
+
+
+@dataclass(frozen=True)
+class Deed:
+    """One change of state, for tests: what (`set`, `limit`, `output`), when, value."""
+
+    what: str
+    time: float
+    value: float
+
+
+class CoilPanel:
+    """State of a simulated current source.
+
+    Args:
+        plant: the physics behind its terminals.
+        clock: the bench's time.
+        rating: largest current A and voltage V.
+        output_on: whether the output is on when first connected.
+    """
+
+    def __init__(
+        self,
+        plant: CoilPlant,
+        clock: Clock,
+        rating: tuple[float, float],
+        output_on: bool = False,
+    ) -> None:
+        self._plant = plant
+        self._clock = clock
+        self.rating = rating
+        self.deeds: list[Deed] = []
+        self.on_deed: Callable[[Deed], None] = self.deeds.append
+        self.setpoint = 0.0
+        self.compliance = 1.0
+        self.output_on = False
+        self.current_mode = True
+        self.remote = False
+        self.errors: deque[tuple[int, str]] = deque()
+        self.list = ListPlayer(clock, self.drive)
+        if output_on:
+            self.switch(True)
+
+    def set_current(self, current: float) -> None:
+        """Set-point from the panel or the wire, A."""
+        self.setpoint = current
+        if not self.list.playing:
+            self.drive(current)
+
+    def drive(self, current: float) -> None:
+        """Regulate to `current`, A, from now on."""
+        self._note("set", current)
+        if self.current_mode:
+            self._plant.set_current(self._clock.now(), current)
+
+    def play_list(self, yes: bool) -> None:
+        """Play the list, or go back to the set-point."""
+        if yes:
+            self.list.start()
+        elif self.list.stop():
+            self.drive(self.setpoint)
+
+    def set_compliance(self, voltage: float) -> None:
+        """Compliance from the panel or the wire, V."""
+        self.compliance = voltage
+        self._note("limit", voltage)
+
+    def switch(self, on: bool) -> None:
+        """Switch the output, from the panel or the wire."""
+        self.output_on = on
+        self._note("output", float(on))
+        self._plant.output(self._clock.now(), on)
+
+    def regulate_current(self, yes: bool) -> None:
+        """Choose what is regulated: current or voltage."""
+        self.current_mode = yes
+
+    def reset(self) -> None:
+        """`*RST`: output off, 0 A, voltage regulation."""
+        self.switch(False)
+        self.set_current(0.0)
+        self.current_mode = False
+        self.compliance = 1.0
+
+    def measured_current(self) -> float:
+        """Output current, A."""
+        return self._plant.coil_current(self._clock.now())
+
+    def measured_voltage(self) -> float:
+        """Output voltage, V."""
+        return self._plant.coil_voltage(self._clock.now())
+
+    def _note(self, what: str, value: float) -> None:
+        self.on_deed(Deed(what, self._clock.now(), value))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Personality:
+    """How one model differs from the others.
+
+    Attributes:
+        rating: largest current A and voltage V.
+        commands: makes the command table.
+        reply_end: terminator of answers.
+        clearing: characters that clear the input buffer.
+        max_line, max_queries: what one message may hold.
+        rewrite: what its number parser makes of a line.
+        standard: has SCPI's error queue.
+    """
+
+    rating: tuple[float, float]
+    commands: Callable[[CoilPanel], dict[str, Handler]]
+    reply_end: bytes = b"\n"
+    clearing: bytes = b""
+    max_line: int | None = None
+    max_queries: int | None = None
+    rewrite: Callable[[bytes], bytes] = bytes
+    standard: bool = True
+
+
+def bare(action: Callable[[], None]) -> Handler:
+    """A handler for a header without argument."""
+
+    def run(argument: str) -> None:
+        no_argument(argument)
+        action()
+
+    return run
+
+
+def numeric(action: Callable[[float], None], low: float, high: float) -> Handler:
+    """A handler for a number from `low` to `high`."""
+    return lambda argument: action(number(argument, low, high))
+
+
+def one_of(action: Callable[[str], None], *choices: str) -> Handler:
+    """A handler for one of some words, short or long form; given the short one."""
+
+    def run(argument: str) -> None:
+        for choice in choices:
+            short = "".join(c for c in choice if not c.islower())
+            if argument.upper() in (short, choice.upper()):
+                action(short)
+                return
+        raise ScpiError(-224, "Illegal parameter value")
+
+    return run

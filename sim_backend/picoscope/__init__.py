@@ -1,0 +1,1 @@
+"""The far end of a PicoScope: its vendor's functions."""

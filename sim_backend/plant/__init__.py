@@ -1,0 +1,1 @@
+"""The simulated physical world: coil, magnet, sensor, followers, codes."""

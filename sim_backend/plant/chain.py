@@ -1,0 +1,80 @@
+"""The voltage follower between a node of the circuit and the scope's input.
+
+A TL074 with a pole at 3 MHz and a slew rate of 13 V/us. Slow signals pass unchanged;
+what it does to a spike and to the edge of a reset is computed once, as a pulse. Its
+offset is added at the input, its input bias is part of the circuit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_backend.plant.pieces import FloatArray
+
+SETTLED = 14.0
+"""Time constants after which what remains is below a millionth."""
+CELLS = 1 << 13
+"""Values of a pulse; between them it is straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """A voltage against time since an event; nothing before and after.
+
+    Attributes:
+        step: time between two values, s.
+        value: shape (n,), V, at 0 s, step, 2 step, ...
+    """
+
+    step: float
+    value: FloatArray
+
+    @property
+    def length(self) -> float:
+        """Time after which nothing remains, s."""
+        return self.step * (self.value.size - 1)
+
+
+@dataclass(frozen=True)
+class Follower:
+    """A voltage follower's speed; a pole of 0 s and infinite slew are ideal.
+
+    Attributes:
+        pole: time constant, s.
+        slew: largest rate of the output, V/s.
+    """
+
+    pole: float
+    slew: float
+
+    def spike(self, amplitude: float, decay: float) -> Pulse | None:
+        """Output for an input that jumps to `amplitude` V and decays with `decay` s."""
+        if decay <= 0:
+            return None
+        length = SETTLED * (decay + self.pole) + abs(amplitude) / self.slew
+        step = length / CELLS
+        time = np.arange(CELLS + 1) * step
+        ideal = amplitude * np.exp(-time / decay)
+        return Pulse(step, ideal if self.pole == 0 else self._follow(ideal, step))
+
+    def edge(self, drop: float) -> Pulse | None:
+        """Output less input after the input fell by `drop` V at once."""
+        if self.pole == 0:
+            return None
+        length = SETTLED * self.pole + drop / self.slew
+        step = length / CELLS
+        fallen = np.full(CELLS + 1, -drop)
+        return Pulse(step, self._follow(fallen, step) + drop)
+
+    def _follow(self, wanted: FloatArray, step: float) -> FloatArray:
+        """Output from 0 V: y' = (x - y)/pole, limited to +-slew."""
+        output = np.empty(wanted.size)
+        y, most = 0.0, self.slew * step
+        share = -np.expm1(-step / self.pole)
+        output[0] = y
+        for i, x in enumerate(((wanted[1:] + wanted[:-1]) / 2).tolist(), start=1):
+            y += min(max((x - y) * share, -most), most)
+            output[i] = y
+        return output

@@ -1,0 +1,63 @@
+"""A coil that a current source drives: what every simulated world has in common."""
+
+from __future__ import annotations
+
+import math
+import threading
+from abc import ABC, abstractmethod
+
+from sim_backend.plant.electromagnet import Electromagnet
+from tactile_lab.errors import ParameterError
+
+
+class DrivenCoil(ABC):
+    """Set-points and output of the source, current and voltage of the coil.
+
+    Safe for all threads: one lock is around everything.
+
+    Args:
+        electromagnet: coil and core.
+    """
+
+    def __init__(self, electromagnet: Electromagnet) -> None:
+        self._lock = threading.Lock()
+        self._electromagnet = electromagnet
+        self._setpoint = 0.0
+        self._on = False
+
+    def set_current(self, time: float, amperes: float) -> None:
+        """Let the source's set-point be `amperes` from `time` s on.
+
+        Raises:
+            ParameterError: not finite.
+        """
+        if not math.isfinite(amperes):
+            raise ParameterError(f"The set-point {amperes} A must be finite.")
+        with self._lock:
+            self._setpoint = amperes
+            self._command(time)
+
+    def output(self, time: float, on: bool) -> None:
+        """Switch the source's output at `time` s; off, it drives 0 A."""
+        with self._lock:
+            self._on = on
+            self._command(time)
+
+    def coil_current(self, time: float) -> float:
+        """Current through the coil at `time` s, A."""
+        with self._lock:
+            return self._electromagnet.current(time)
+
+    def coil_voltage(self, time: float) -> float:
+        """Voltage at the coil's terminals at `time` s, V."""
+        with self._lock:
+            return self._electromagnet.voltage(time)
+
+    @property
+    def _driven(self) -> float:
+        """Current the source regulates to, A."""
+        return self._setpoint if self._on else 0.0
+
+    @abstractmethod
+    def _command(self, time: float) -> None:
+        """Set-point or output changed at `time` s; called with the lock held."""

@@ -1,0 +1,281 @@
+"""The plant: the one simulated physical world behind all simulated instruments.
+
+Set-points go in; current, field and force follow by physics; the circuit answers; and
+the scope's inputs see it through the measurement chain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim_backend.plant.chain import Pulse
+from sim_backend.plant.coupling import Capacitor
+from sim_backend.plant.driven_coil import DrivenCoil
+from sim_backend.plant.electromagnet import Electromagnet
+from sim_backend.plant.options import PlantOptions, passive_attraction
+from sim_backend.plant.pieces import FloatArray, Pieces
+from sim_backend.plant.render import noise_table
+from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
+from sim_backend.plant.sensor import NEEDS, Sensor
+from tactile_lab.bench import Channel
+from tactile_lab.errors import ParameterError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.waveform import Waveform
+
+__all__ = ["MagnetLike", "Plant", "PlantOptions", "passive_attraction"]
+
+MEMORY = 0.2
+"""How long the plant remembers what has been rendered, s."""
+BACKLOG = 4096
+"""Commands that may wait to be solved while nobody looks."""
+Coupled = tuple[ScopeInput, Capacitor | None]
+SIGNALS = (*NEEDS, "coil_current", "field", *PLACED)
+"""What may lie at a scope input."""
+
+
+class MagnetLike(Protocol):
+    """Field and force of the electromagnet; `tactile_lab.magnetics.Magnet` is one."""
+
+    def field(self, current: ArrayLike) -> FloatArray:
+        """Field, T, at `current` A."""
+        ...
+
+    def force(self, current: ArrayLike) -> FloatArray:
+        """Drive force, N, at `current` A."""
+        ...
+
+
+class _Drive:
+    """Force on the cantilever as the electromagnet gives it."""
+
+    def __init__(
+        self, electromagnet: Electromagnet, magnet: MagnetLike, options: PlantOptions
+    ) -> None:
+        self._electromagnet = electromagnet
+        self._magnet = magnet
+        self._attraction = options.attraction
+        self._sign = -1.0 if options.inverted_coil else 1.0
+        self.next_command = electromagnet.next_command
+        self.latest_command = electromagnet.latest_command
+
+    def force(self, start: float, end: float) -> Waveform:
+        time, current = self._electromagnet.foreseen(start, end)
+        drive = self._magnet.force(current * self._sign)
+        return Waveform(time, drive + self._attraction)
+
+
+class Plant(DrivenCoil):
+    """Coil, magnet, cantilever, circuit and measurement chain; safe for all threads.
+
+    Args:
+        circuit: the sensor circuit; the followers' bias is added to its own.
+        magnet: field and force per current.
+        options: which parts of the world there are.
+        seed: of all noise; the same seed and commands give the same codes.
+    """
+
+    def __init__(
+        self,
+        circuit: Circuit,
+        magnet: MagnetLike,
+        options: PlantOptions | None = None,
+        seed: int = 1,
+    ) -> None:
+        self.options = options = options or PlantOptions()
+        self.circuit = replace(circuit, I_bias=circuit.I_bias + options.bias)
+        self.magnet = magnet
+        self.seed = seed
+        super().__init__(options.electromagnet())
+        self._drive = _Drive(self._electromagnet, magnet, options)
+        self._sensor = Sensor(self.circuit, self._drive)
+        self._noise = noise_table(seed)
+        swing = self.circuit.fire_voltage - self.circuit.reset_voltage
+        self._spike = options.speed.spike(swing, self.circuit.tau_K)
+        self._edge = options.speed.edge(swing)
+        self._rendered = 0.0
+        self._acquisition: tuple[object, list[Coupled]] | None = None
+
+    def coil_temperature(self, time: float) -> float:
+        """Temperature of the winding above the room's at `time` s, K."""
+        with self._lock:
+            return self._electromagnet.temperature(time)
+
+    def field(self, time: float) -> float:
+        """Flux density of the electromagnet at `time` s, T."""
+        with self._lock:
+            return float(self.magnet.field(self._effective(time)))
+
+    def force(self, time: float) -> float:
+        """Force on the cantilever at `time` s, the constant attraction included, N."""
+        with self._lock:
+            drive = float(self.magnet.force(self._effective(time)))
+            return drive + self.options.attraction
+
+    def accuracy(self) -> str:
+        """How far the computed circuit is from its equations' exact solution."""
+        with self._lock:
+            time, volts = self._sensor.error_spike_time, self._sensor.error_V_C1
+        told = []
+        if time > 0:
+            told.append(f"spike times within {time:.1e} s")
+        if volts > 0:
+            told.append(f"V_C1 within {volts:.1e} V")
+        if not told:  # nothing of the circuit was computed
+            return ""
+        return (
+            f"Simulated circuit, by its own estimate: {' and '.join(told)} of the "
+            "exact solution; force between set-points within 1e-4 of a step."
+        )
+
+    def render(
+        self,
+        first_sample: int,
+        n: int,
+        interval: float,
+        started: float,
+        channels: Sequence[Channel],
+        full_scale: int,
+        shift: int,
+    ) -> tuple[NDArray[np.int16], tuple[bool, ...]]:
+        """Codes of samples `first_sample` to ``first_sample + n`` of each channel.
+
+        Sample k is taken at ``started + k * interval`` on the bench's clock, by a
+        scope clock without drift. Ask in order of time; at most `MEMORY` s back.
+
+        Args:
+            first_sample: from 0.
+            n: samples per channel, from 1.
+            interval: s.
+            started: s.
+            channels: what is wired where, and how it is digitised.
+            full_scale: code at the end of the range.
+            shift: low bits of every code that are 0.
+
+        Returns:
+            Codes, shape (channels, n), and whether each input left its range.
+
+        Raises:
+            ParameterError: an impossible request, or a time already forgotten.
+        """
+        _check(first_sample, n, interval, started, full_scale, shift)
+        interval *= 1 + self.options.drift
+        start = started + first_sample * interval
+        end = started + (first_sample + n) * interval
+        codes = np.empty((len(channels), n), dtype=np.int16)
+        with self._lock:
+            inputs = self._inputs(tuple(channels), started, full_scale, shift)
+            signals = [each.signal for each, _ in inputs]
+            self._sensor.need((s for s in signals if s in NEEDS), start)
+            over = tuple(
+                each.digitise(
+                    codes[row],
+                    first_sample,
+                    started,
+                    interval,
+                    self._noise,
+                    self._coupled(each.signal, capacitor, start, end),
+                    self._pulses(each.signal, start, end),
+                )
+                for row, (each, capacitor) in enumerate(inputs)
+            )
+            self._rendered = max(self._rendered, end)
+            self._sensor.forget(self._rendered - MEMORY)
+        return codes, over
+
+    def _command(self, time: float) -> None:
+        # what has been rendered stays: a later command takes effect after it
+        time = max(time, self._rendered, self._electromagnet.last_command)
+        if self._electromagnet.command(time, self._driven):
+            self._sensor.commanded(time)
+        if self._electromagnet.commands > BACKLOG:
+            # the model must have passed what the electromagnet forgets
+            old = self._electromagnet.time_of(BACKLOG // 2)
+            self._sensor.reach(old)
+            self._sensor.forget(old)
+            self._electromagnet.forget(BACKLOG // 2)
+
+    def _effective(self, time: float) -> float:
+        sign = -1.0 if self.options.inverted_coil else 1.0
+        return sign * self._electromagnet.effective(time)
+
+    def _inputs(
+        self, channels: tuple[Channel, ...], started: float, full_scale: int, shift: int
+    ) -> list[Coupled]:
+        """The inputs of an acquisition, worked out when it is first asked for."""
+        asked = (channels, started, full_scale, shift)
+        if self._acquisition is None or self._acquisition[0] != asked:
+            inputs = scope_inputs(
+                channels, self.options, self.seed, started, full_scale, shift
+            )
+            for channel, each in zip(channels, inputs, strict=True):
+                if each.signal not in SIGNALS:
+                    raise ParameterError(
+                        f"Input {channel.input} cannot carry {each.signal!r}; the "
+                        f"plant has {', '.join(SIGNALS)}."
+                    )
+            capacitors = [
+                Capacitor(started) if channel.coupling == "AC" else None
+                for channel in channels
+            ]
+            self._acquisition = asked, list(zip(inputs, capacitors, strict=True))
+        return self._acquisition[1]
+
+    def _coupled(
+        self, signal: str, capacitor: Capacitor | None, start: float, end: float
+    ) -> Pieces:
+        if capacitor is None:
+            return self._pieces(signal, start, end)
+        return capacitor.passed(
+            lambda low, high: self._pieces(signal, low, high), start, end
+        )
+
+    def _pieces(self, signal: str, start: float, end: float) -> Pieces:
+        if signal == "supply":
+            return Pieces.constant(self.circuit.V_S, start)
+        if signal in (*PLACED, "V_K"):
+            return Pieces.constant(0.0, start)
+        if signal == "coil_current":
+            return self._electromagnet.currents(start, end)
+        if signal == "field":
+            return self._field_pieces(start, end)
+        return self._sensor.pieces(signal, start, end)
+
+    def _field_pieces(self, start: float, end: float) -> Pieces:
+        current = self._electromagnet.effectives(start, end)
+        sign = -1.0 if self.options.inverted_coil else 1.0
+        field = self.magnet.field(current.value * sign)
+        ahead = 1e-6
+        later = self.magnet.field((current.value + current.slope * ahead) * sign)
+        return Pieces(current.start, field, (later - field) / ahead)
+
+    def _pulses(
+        self, signal: str, start: float, end: float
+    ) -> tuple[Pulse, FloatArray] | None:
+        """Fast transients of a signal and when they begin, s."""
+        if signal == "V_K" and self._spike is not None:
+            self._sensor.reach(end)
+            return self._spike, self._sensor.spikes(start - self._spike.length, end)
+        if signal == "V_C2" and self._edge is not None:
+            held = self.circuit.reset_time
+            spikes = self._sensor.spikes(start - held - self._edge.length, end)
+            return self._edge, spikes + held
+        return None
+
+
+def _check(
+    first: int, n: int, interval: float, started: float, full_scale: int, shift: int
+) -> None:
+    if not (first >= 0 and n >= 1 and interval > 0 and started >= 0):
+        raise ParameterError(
+            f"Cannot render {n} samples from number {first} every {interval} s "
+            f"from {started} s on; numbers and times count from 0."
+        )
+    if not (0 <= shift < 15 and 1 << shift <= full_scale <= 32767):
+        raise ParameterError(
+            f"full_scale = {full_scale} must fit int16 and {shift} zero bits."
+        )

@@ -1,0 +1,222 @@
+"""The circuit model as the plant runs it: solved ahead in chunks that can be cut off.
+
+What has been shown must not change when a command arrives, however the scope slices
+time. So each chunk is solved as if no further command came, from a state that depends
+on nothing but circuit and commands; a command cuts the chunk that it falls into and
+the model goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from sim_backend.plant.pieces import FloatArray, Pieces, join
+from tactile_lab.errors import ParameterError
+from tactile_lab.model.advance import Outputs, State, advance, rest
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest_V_C2
+from tactile_lab.waveform import Waveform
+
+SHORTEST, LONGEST = 10e-3, 60.0
+"""Length of a chunk just after a command, and long after one, s; it doubles between."""
+WINDOW = 0.5
+"""Part of a chunk that is sampled at once, s."""
+FINE, COARSE = 5e-5, 2.5e-4
+"""Distance of samples between which voltages are taken as straight, s."""
+LIVELY = 50e-3
+"""Time after a command for which the fine grid is used, s."""
+
+NEEDS = {
+    "V_C1": ("V_C1",),
+    "V_C2": ("V_C2", "spikes"),
+    "V_K": ("spikes",),
+    "I_DS": ("I_DS",),
+}
+"""What the model must keep for a scope channel."""
+
+
+class Drive(Protocol):
+    """Where the force on the cantilever comes from."""
+
+    def force(self, start: float, end: float) -> Waveform:
+        """Force, N, on [start, end] as foreseen at `start`, blind to later commands."""
+        ...
+
+    def next_command(self, time: float) -> float:
+        """Time of the first command after `time` s, infinite if there is none."""
+        ...
+
+    def latest_command(self, time: float) -> float:
+        """Time of the last command at or before `time` s."""
+        ...
+
+
+@dataclass(eq=False)
+class _Chunk:
+    """A stretch solved in one go; valid until `end`, which a command may pull in."""
+
+    state: State
+    end: float
+    spacing: float
+    outputs: Outputs
+    pieces: dict[tuple[str, int], Pieces] = field(default_factory=dict)
+
+    @property
+    def start(self) -> float:
+        return self.state.time
+
+
+class Sensor:
+    """V_C1, V_C2, I_DS and spike times of the driven circuit at any time asked for.
+
+    Only stages that something needed so far are solved. A stage first needed later
+    starts from its equilibrium. Not thread-safe; the plant's lock is around it.
+
+    Attributes:
+        error_spike_time, error_V_C1: largest estimated error so far, s and V.
+    """
+
+    def __init__(self, circuit: Circuit, drive: Drive) -> None:
+        self.circuit = circuit
+        self._drive = drive
+        self.error_spike_time = 0.0
+        self.error_V_C1 = 0.0
+        self._keep: tuple[str, ...] = ()
+        self._chunks: list[_Chunk] = []
+        self._frontier = rest(circuit, force=float(drive.force(0.0, 0.0).value[0]))
+
+    def need(self, signals: Iterable[str], time: float) -> None:
+        """Solve what `signals` (V_C1, V_C2, V_K, I_DS) depend on, from `time` s on."""
+        wanted = {name for signal in signals for name in NEEDS[signal]}
+        if wanted <= set(self._keep):
+            return
+        self._keep = tuple(sorted(wanted | set(self._keep)))
+        for i, chunk in enumerate(self._chunks):
+            if chunk.end > time:
+                self._frontier = chunk.state
+                del self._chunks[i:]
+                break
+        state = self._frontier
+        if state.left_out:
+            V_C2 = rest_V_C2(self.circuit, state.V_C1)
+            if V_C2 >= self.circuit.fire_voltage:
+                V_C2 = self.circuit.reset_voltage
+            self._frontier = replace(state, V_C2=V_C2, resume=None, left_out=())
+
+    def commanded(self, time: float) -> None:
+        """A command takes effect at `time` s: what was solved beyond is void."""
+        if time >= self._frontier.time:
+            return
+        for i, chunk in enumerate(self._chunks):
+            if chunk.end > time:
+                del self._chunks[i + (chunk.start < time) :]
+                self._frontier = chunk.state
+                if chunk.start < time:
+                    chunk.end = time
+                    self._frontier = self._advance(chunk.state, time)[0]
+                return
+        raise ParameterError(f"A command at {time:g} s lies before what is kept.")
+
+    def reach(self, time: float) -> None:
+        """Solve until `time` s is covered."""
+        while self._frontier.time <= time:
+            self._grow()
+
+    def pieces(self, signal: str, start: float, end: float) -> Pieces:
+        """V_C1, V_C2 (V) or I_DS (A) over [start, end)."""
+        parts = []
+        for chunk in self._covering(start, end):
+            begin, stop = max(start, chunk.start), min(end, chunk.end)
+            window = max(int((begin - chunk.start) / WINDOW) - 1, 0)
+            while (low := chunk.start + window * WINDOW) < stop:
+                high = chunk.start + (window + 1) * WINDOW
+                if high > begin:
+                    sampled = self._of(chunk, signal, window)
+                    parts.append(sampled.between(max(begin, low), min(stop, high)))
+                window += 1
+        return join(parts)
+
+    def spikes(self, start: float, end: float) -> FloatArray:
+        """Times of the spikes in [start, end), s; none from before what is kept."""
+        found = []
+        for chunk in self._chunks:
+            times = chunk.outputs.spike_times
+            if times is None or chunk.end <= start or chunk.start >= end:
+                continue
+            if times.size:
+                found.append(times[(times >= start) & (times < min(end, chunk.end))])
+        return np.concatenate(found) if found else np.empty(0)
+
+    def forget(self, before: float) -> None:
+        """Drop what nobody will ask for any more."""
+        keep = 0
+        while keep < len(self._chunks) and self._chunks[keep].end <= before:
+            keep += 1
+        del self._chunks[:keep]
+        for chunk in self._chunks[:1]:
+            old = int((before - chunk.start) / WINDOW)
+            for key in [key for key in chunk.pieces if key[1] < old]:
+                del chunk.pieces[key]
+
+    def _covering(self, start: float, end: float) -> list[_Chunk]:
+        self.reach(end)
+        chunks = [c for c in self._chunks if c.end > start and c.start < end]
+        if not chunks or chunks[0].start > start:
+            raise ParameterError(
+                f"The plant has forgotten what was at {start:g} s; ask in order."
+            )
+        return chunks
+
+    def _grow(self) -> None:
+        state = self._frontier
+        calm = state.time - self._drive.latest_command(state.time)
+        end = state.time + min(max(calm, SHORTEST), LONGEST)
+        after, outputs = self._advance(state, end)
+        spacing = FINE if calm < LIVELY else COARSE
+        chunk = _Chunk(state, end, spacing, outputs)
+        self._chunks.append(chunk)
+        command = self._drive.next_command(state.time)
+        if command < end:
+            chunk.end = command
+            after = self._advance(state, command)[0]
+        self._frontier = after
+
+    def _advance(self, state: State, until: float) -> tuple[State, Outputs]:
+        force = self._drive.force(state.time, until)
+        keep = self._keep or ("V_C1",)
+        after, outputs = advance(self.circuit, state, force, until, keep=keep)
+        solved = outputs.solution
+        self.error_V_C1 = max(self.error_V_C1, solved.error_V_C1)
+        self.error_spike_time = max(self.error_spike_time, solved.error_spike_time)
+        return after, outputs
+
+    def _of(self, chunk: _Chunk, signal: str, window: int) -> Pieces:
+        key = signal, window
+        if key not in chunk.pieces:
+            low = chunk.start + window * WINDOW
+            high = min(chunk.start + (window + 1) * WINDOW, chunk.outputs.end)
+            chunk.pieces[key] = self._sampled(chunk, signal, low, high)
+        return chunk.pieces[key]
+
+    def _sampled(self, chunk: _Chunk, signal: str, low: float, high: float) -> Pieces:
+        """Straight lines between samples, and both sides of each reset of V_C2."""
+        outputs = chunk.outputs
+        count = max(1, round((high - low) / chunk.spacing))
+        time = np.linspace(low, high, count + 1)
+        if signal != "V_C2":
+            return Pieces.through(time, outputs.sample(signal, time))
+        assert outputs.spike_times is not None
+        spikes = outputs.spike_times
+        resets = spikes + self.circuit.reset_time
+        if chunk.state.resume is not None:
+            resets = np.concatenate([[chunk.state.resume], resets])
+        resets = resets[(resets > low) & (resets <= high)]
+        spikes = spikes[(spikes > low) & (spikes <= high)]
+        time = np.sort(np.concatenate([time, spikes, resets, resets]))
+        value = outputs.sample(signal, time)
+        value[np.searchsorted(time, resets, side="left")] = self.circuit.fire_voltage
+        return Pieces.through(time, value)

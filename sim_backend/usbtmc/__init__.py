@@ -1,0 +1,1 @@
+"""Far ends on a simulated USB bus."""

@@ -1,1 +1,0 @@
-"""Our solver beside others: error against run time, and extreme cases."""

@@ -1,0 +1,1 @@
+"""The solver against other solvers, references and extremes."""
