@@ -11,7 +11,7 @@ from drivers.usbtmc.scope import UsbtmcScope
 from tactile_lab.bench import Bench, FieldMeter, Scope
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import SceneError
-from tactile_lab.plan.needs import needs
+from tactile_lab.planning.needs import needs
 from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
 from tactile_lab.scene.scene import Scene
 

@@ -22,7 +22,7 @@ from sim_backend.serial_line.wires import plug_in
 from tactile_lab.bench import Bench, Channel
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.errors import SceneError
-from tactile_lab.plan.needs import needs
+from tactile_lab.planning.needs import needs
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
 

@@ -7,7 +7,7 @@ import numpy as np
 from gui.lanes.expected import Hold, Preview
 from gui.session.expectation import Expectation
 from tactile_lab.acquisition.runner import BASELINE
-from tactile_lab.plan.plan import Plan, plan
+from tactile_lab.planning.plan import Plan, plan
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Trial
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gui.lanes.expected import Preview
-from tactile_lab.plan.estimate import Estimate
-from tactile_lab.plan.needs import Needs
+from tactile_lab.planning.estimate import Estimate
+from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.tables import Record
 
 

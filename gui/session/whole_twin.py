@@ -11,7 +11,7 @@ from gui.lanes.twinned import TwinSlice
 from gui.session.request import Request
 from tactile_lab.acquisition.live import Bins
 from tactile_lab.model.simulate import Result
-from tactile_lab.plan.preview import model
+from tactile_lab.planning.preview import model
 from tactile_lab.report.driven import applied_in, force_of
 from tactile_lab.store.run import Run
 

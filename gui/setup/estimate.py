@@ -11,7 +11,7 @@ from gui.state import minutes
 from tactile_lab.quantity import show
 
 if TYPE_CHECKING:
-    from tactile_lab.plan.estimate import Estimate
+    from tactile_lab.planning.estimate import Estimate
 
 
 def words_of(estimate: Estimate) -> tuple[str, str, str, str]:

@@ -33,9 +33,9 @@ from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import SceneError, TactileLabError
-from tactile_lab.plan.calibrated import check_coil
-from tactile_lab.plan.limited import limited
-from tactile_lab.plan.plan import plan
+from tactile_lab.planning.calibrated import check_coil
+from tactile_lab.planning.limited import limited
+from tactile_lab.planning.plan import plan
 from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol

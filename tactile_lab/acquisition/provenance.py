@@ -10,7 +10,7 @@ from typing import Any
 from tactile_lab.acquisition.environment import environment
 from tactile_lab.bench import Bench
 from tactile_lab.errors import RecordingError
-from tactile_lab.plan.plan import Plan
+from tactile_lab.planning.plan import Plan
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, RunFolder

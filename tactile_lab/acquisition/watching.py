@@ -25,7 +25,7 @@ from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import SceneError
-from tactile_lab.plan.plan import plan
+from tactile_lab.planning.plan import plan
 from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene

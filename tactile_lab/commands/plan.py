@@ -51,15 +51,15 @@ def command(
     Opens no instrument, and writes nothing but the preview if that is asked for.
     """
     with refusing():
-        from tactile_lab.plan.plan import plan
-        from tactile_lab.plan.text import text
+        from tactile_lab.planning.plan import plan
+        from tactile_lab.planning.text import text
         from tactile_lab.scene.load import load
 
         if picture is not None:
             check_target(picture)
         planned = plan(load(scene, overrides, bench))
         if picture is not None:
-            from tactile_lab.plan.figure import draw
+            from tactile_lab.planning.figure import draw
 
             draw(planned, picture)
     if as_json:

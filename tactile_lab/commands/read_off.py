@@ -50,8 +50,8 @@ def readings(path: Path, scene: Scene) -> Question:
             many as holds are planned, or nobody is to read the field.
     """
     from tactile_lab.acquisition.asked_field import read_off
-    from tactile_lab.plan.needs import needs
-    from tactile_lab.plan.timeline import timeline
+    from tactile_lab.planning.needs import needs
+    from tactile_lab.planning.timeline import timeline
 
     if not needs(scene).asked_field:
         raise SceneError(

@@ -44,8 +44,8 @@ def command(
     Opens no bench and writes nothing: no coil, calibration or limit applies.
     """
     with refusing():
-        from tactile_lab.plan.preview import model
-        from tactile_lab.plan.timeline import timeline
+        from tactile_lab.planning.preview import model
+        from tactile_lab.planning.timeline import timeline
         from tactile_lab.scene.load import load
         from tactile_lab.signals import BENCH_ONLY
 

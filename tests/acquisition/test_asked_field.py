@@ -8,7 +8,7 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
 from tactile_lab.commands.read_off import field_reader, readings
 from tactile_lab.errors import QuantityError, RefusedError, SceneError
-from tactile_lab.plan.needs import needs
+from tactile_lab.planning.needs import needs
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load

@@ -13,7 +13,7 @@ from tactile_lab.acquisition.execution import Execution
 from tactile_lab.acquisition.field_mean import AVERAGING, FieldMean
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.errors import LimitError, SceneError
-from tactile_lab.plan.plan import plan
+from tactile_lab.planning.plan import plan
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 

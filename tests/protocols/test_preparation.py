@@ -21,7 +21,7 @@ from tactile_lab.errors import LimitError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_V_C1
 from tactile_lab.model.simulate import simulate
-from tactile_lab.plan.needs import needs
+from tactile_lab.planning.needs import needs
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load

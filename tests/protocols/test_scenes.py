@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_lab.plan.timeline import timeline
+from tactile_lab.planning.timeline import timeline
 from tactile_lab.plugins import protocol_names, scene_names
 from tactile_lab.scene.load import load
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import SceneError
-from tactile_lab.plan.timeline import timeline
+from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 
 

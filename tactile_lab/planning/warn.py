@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from tactile_lab.acquisition.detection import DEVIATIONS
 from tactile_lab.magnetics import A2_PRINTED
-from tactile_lab.plan.estimate import resolution
-from tactile_lab.plan.needs import Needs
-from tactile_lab.plan.timeline import Timeline
+from tactile_lab.planning.estimate import resolution
+from tactile_lab.planning.needs import Needs
+from tactile_lab.planning.timeline import Timeline
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 

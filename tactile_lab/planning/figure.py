@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import SceneError
 from tactile_lab.model.simulate import Result
-from tactile_lab.plan.plan import Plan
+from tactile_lab.planning.plan import Plan
 from tactile_lab.waveform import Waveform
 
 POINTS = 4000

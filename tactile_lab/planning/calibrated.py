@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Mapping
 
-from tactile_lab.plan.timeline import Timeline
+from tactile_lab.planning.timeline import Timeline
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from tactile_lab.errors import LimitError, SceneError
-from tactile_lab.plan.needs import needs
-from tactile_lab.plan.plan import plan
-from tactile_lab.plan.text import text
+from tactile_lab.planning.needs import needs
+from tactile_lab.planning.plan import plan
+from tactile_lab.planning.text import text
 from tactile_lab.scene.load import load
 
 

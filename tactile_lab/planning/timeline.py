@@ -10,9 +10,9 @@ import numpy as np
 
 from tactile_lab.bench import CoilCapability
 from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
-from tactile_lab.plan.heat import heat_along
-from tactile_lab.plan.limited import limited
-from tactile_lab.plan.outcome import ModelOutcome, Step, joined
+from tactile_lab.planning.heat import heat_along
+from tactile_lab.planning.limited import limited
+from tactile_lab.planning.outcome import ModelOutcome, Step, joined
 from tactile_lab.plugins import coil_capability
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_lab.plan.calibrated import check_calibration
-from tactile_lab.plan.estimate import Estimate, estimate
-from tactile_lab.plan.needs import Needs, needs
-from tactile_lab.plan.reasons import Reasons, leaves_out, uses
-from tactile_lab.plan.timeline import Timeline, timeline
-from tactile_lab.plan.warn import assumptions, warnings
+from tactile_lab.planning.calibrated import check_calibration
+from tactile_lab.planning.estimate import Estimate, estimate
+from tactile_lab.planning.needs import Needs, needs
+from tactile_lab.planning.reasons import Reasons, leaves_out, uses
+from tactile_lab.planning.timeline import Timeline, timeline
+from tactile_lab.planning.warn import assumptions, warnings
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY
@@ -136,7 +136,7 @@ def _model(scene: Scene, drive: Timeline) -> Result | None:
     keep = [name for name in scene.record.signals if name not in BENCH_ONLY]
     if not keep:
         return None
-    from tactile_lab.plan.preview import model
+    from tactile_lab.planning.preview import model
 
     return model(scene, drive.force, drive.duration, keep)
 

@@ -12,7 +12,7 @@ from tactile_lab.analysis.field_calibration import (
     write_calibration,
 )
 from tactile_lab.errors import LimitError, SceneError
-from tactile_lab.plan.plan import plan
+from tactile_lab.planning.plan import plan
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load

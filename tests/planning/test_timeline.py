@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import LimitError, SceneError
-from tactile_lab.plan.timeline import timeline
+from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 
 HEAD = """
@@ -150,7 +150,7 @@ def test_rest_and_traces_come_from_the_model(protocol, tmp_path):
     ],
 )
 def test_a_faulty_protocol_is_refused_in_words(protocol, body, told, monkeypatch):
-    monkeypatch.setattr("tactile_lab.plan.timeline.MOST_TRIALS", 200)
+    monkeypatch.setattr("tactile_lab.planning.timeline.MOST_TRIALS", 200)
     with pytest.raises(SceneError, match=told):
         timeline(protocol(body), through_coil=True)
 

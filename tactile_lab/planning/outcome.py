@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import SceneError
-from tactile_lab.plan.asked import asked_signals
+from tactile_lab.planning.asked import asked_signals
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
@@ -105,7 +105,7 @@ class ModelOutcome(Outcome):
         return tuple(name for name in signals if name in self._scene.record.signals)
 
     def _model(self, *keep: str) -> Result:
-        from tactile_lab.plan.preview import model
+        from tactile_lab.planning.preview import model
 
         force = joined(
             [(step.start, step.force) for step in self._steps[: self.index + 1]]

@@ -5,7 +5,7 @@ import pytest
 
 from drivers.coil.supervision import HeatBudget
 from tactile_lab.bench import CoilLimits
-from tactile_lab.plan.heat import heat_along
+from tactile_lab.planning.heat import heat_along
 from tactile_lab.waveform import Waveform
 
 LIMITS = CoilLimits()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from tactile_lab.plan.plan import Plan
+from tactile_lab.planning.plan import Plan
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from tactile_lab.acquisition.field_mean import AVERAGING
-from tactile_lab.plan.needs import AVERAGED, Needs
-from tactile_lab.plan.timeline import Timeline
-from tactile_lab.plan.warn import threshold_of
+from tactile_lab.planning.needs import AVERAGED, Needs
+from tactile_lab.planning.timeline import Timeline
+from tactile_lab.planning.warn import threshold_of
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
