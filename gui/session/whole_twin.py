@@ -8,11 +8,9 @@ import numpy as np
 
 from gui.lanes.decimate import FloatArray
 from gui.lanes.twinned import TwinSlice
-from gui.session.request import Request
 from tactile_lab.acquisition.live import Bins
 from tactile_lab.model.simulate import Result
 from tactile_lab.planning.preview import model
-from tactile_lab.report.driven import applied_in, force_of
 from tactile_lab.store.run import Run
 
 MODELLED = ("V_C1", "V_C2", "V_K")
@@ -40,10 +38,8 @@ class WholeTwin:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        scene = Request(str(folder / "scene.toml"), (), None).load()
         with Run.load(folder) as run:
-            self._length = run.duration
-            force = force_of(scene, applied_in(run).steps, self._length)
+            self._length, scene, force = run.duration, run.scene, run.force
             kept = [signal for signal in MODELLED if signal in run.signals]
         self._result = model(scene, force, self._length, (*kept, "spikes"))
         self._kept = kept

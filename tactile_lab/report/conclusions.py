@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.analysis.decay import fit_decay
-from tactile_lab.analysis.drain_current import BOXCAR_3DB
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.rate_force import eq15_rate, mean_slope, onset
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.model.drain_current import BOXCAR_3DB
 from tactile_lab.quantity import show
 from tactile_lab.report.bench_conclusions import (
     calibrate_field,

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from tactile_lab.analysis.drain_current import drain_current
 from tactile_lab.analysis.twin import ELSEWHERE, Twin
 from tactile_lab.errors import TactileLabError
+from tactile_lab.model.drain_current import drain_current
 from tactile_lab.report.conclusion import Conclusion
 from tactile_lab.report.conclusions import conclude
 from tactile_lab.report.run_data import RunData, Trace, TrialData

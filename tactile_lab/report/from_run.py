@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.analysis.drain_current import Divider
 from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
+from tactile_lab.model.drain_current import Divider
 from tactile_lab.model.simulate import Start
 from tactile_lab.quantity import show
-from tactile_lab.report.driven import applied_in, force_of, told
+from tactile_lab.report.driven import told
 from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
-from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
@@ -37,11 +36,9 @@ def read(folder: Path) -> RunData:
         RunFolderError: not a run, or one without data.
         SceneError: its resolved scene cannot be read any more.
     """
-    scene = load(folder / "scene.toml")
     with Run.load(folder) as run:
-        info = run.info
-        applied = applied_in(run)
-        current = applied.steps
+        info, scene = run.info, run.scene
+        current = run.applied.steps
         spikes = run.spikes["time"]
         onset = stimulus_onset(scene)
         started = _for_people(str(info.get("started", "")))
@@ -61,7 +58,7 @@ def read(folder: Path) -> RunData:
             duration=run.duration,
             took=info.get("took_s"),
             trials=tuple(_trial(row, spikes, onset, segments) for row in run.trials),
-            force=force_of(scene, current, run.duration),
+            force=run.force,
             current=current,
             warming=_warming(run),
             field=_field(run),
@@ -76,7 +73,7 @@ def read(folder: Path) -> RunData:
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
             warnings=(*warnings, *_doubts(scene, started, settings, warnings)),
-            assumptions=(*(info.get("assumptions") or ()), *told(applied)),
+            assumptions=(*(info.get("assumptions") or ()), *told(run)),
             parameters=_texts(scene, "protocol"),
             sensor=_texts(scene, "sensor"),
             settings=settings,

@@ -12,13 +12,25 @@ from numpy.typing import NDArray
 
 from tactile_lab.acquisition.detection import Detection
 from tactile_lab.errors import RunFolderError
+from tactile_lab.store.applied import (
+    BIN_TIME,
+    AppliedCurrent,
+    Shunt,
+    applied_current,
+    held,
+)
 from tactile_lab.store.folder import DATA, is_live, read_info
+from tactile_lab.store.layout import BIN
 from tactile_lab.store.opening import open_data
 from tactile_lab.store.signal import Axis, StoredSignal
+from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
     import xarray
 
+    from tactile_lab.scene.scene import Scene
+
+FloatArray = NDArray[np.float64]
 Records = NDArray[Any]
 
 
@@ -218,6 +230,54 @@ class Run:
     def current(self) -> Records:
         """Applied current: time (s), setpoint and measured (A; NaN where not read)."""
         return self.records("current")
+
+    @property
+    def shunt(self) -> Shunt | None:
+        """Reads the recorded coil current between two times; None without one."""
+        if "coil_current" not in self.signals:
+            return None
+        signal = self.signal("coil_current")
+        # whole bins of the run's pyramid where they are fine enough
+        together = min(BIN, max(1, round(BIN_TIME / signal.interval)))
+
+        def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
+            part = signal.between(start, end)
+            cells = max(1, (part.stop - part.start) // together)
+            found = signal.envelope(part.start, part.stop, cells=cells)
+            step = np.diff(found.time[-2:]) if found.time.size > 1 else 0.0
+            return found.time[:-1] + step / 2, found.mean[:-1]  # the last may be short
+
+        return seen
+
+    @property
+    def applied(self) -> AppliedCurrent:
+        """The coil current: levels as read back, edges where the shunt saw them."""
+        rows = self.current
+        return applied_current(
+            rows["time"], rows["setpoint"], rows["measured"], self.shunt
+        )
+
+    @property
+    def scene(self) -> Scene:
+        """The resolved scene that was run.
+
+        Raises:
+            SceneError: it cannot be read any more.
+        """
+        from tactile_lab.scene.load import load
+
+        return load(self.path / "scene.toml")
+
+    @property
+    def force(self) -> Waveform:
+        """The force that the applied current gives by the run's calibration, N.
+
+        Raises:
+            SceneError: the run's scene cannot be read any more.
+        """
+        magnet = self.scene.bench.magnet
+        current = held(self.applied.steps, self.duration)
+        return magnet.force_for(current, beyond="hold")
 
     @property
     def field(self) -> Records:

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.applied import applied_current
+from tactile_lab.analysis.shunt_check import shunt_over_source
+from tactile_lab.store.applied import applied_current
 
 STEPS = np.array([0.0, 0.5, 1.0, 0.2])
 CAME = np.array([0.0, 1.0, 2.0, 3.0])
@@ -40,13 +41,14 @@ def test_without_a_shunt_the_host_s_times_stand():
     found = applied_current(*rows())
     assert found.steps[:, 0] == pytest.approx(CAME + 0.03)
     assert found.edges == 0
-    assert found.shunt_over_source is None
 
 
 def test_a_wrong_shunt_shows_in_the_averages():
-    found = applied_current(*rows(), shunt(scale=0.1, noise=1e-4))
-    assert found.shunt_over_source.value == pytest.approx(0.1, rel=0.01)
-    assert found.shunt_over_source.high < 0.11
+    seen = shunt(scale=0.1, noise=1e-4)
+    found = applied_current(*rows(), seen)
+    ratio = shunt_over_source(found, seen)
+    assert ratio.value == pytest.approx(0.1, rel=0.01)
+    assert ratio.high < 0.11
     assert found.edges == 0, "no edge of that size is believed"
 
 

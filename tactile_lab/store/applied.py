@@ -1,9 +1,8 @@
 """The current the coil really carried, from what the run recorded of it.
 
 Levels come from the source's read-back. The shunt tells when each step came, which the
-host only knows to lie between sending a set-point and hearing that it was taken; and,
-averaged over each level, whether source and shunt agree. One scope code of a 0.1 Ohm
-shunt is 16 mA, so it gives no level by itself.
+host only knows to lie between sending a set-point and hearing that it was taken. One
+scope code of a 0.1 Ohm shunt is 16 mA, so it gives no level by itself.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
@@ -28,10 +27,8 @@ ENOUGH = 5
 """So many edges seen tell how early the others came."""
 BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s."""
-LEVEL = 0.2
-"""Levels that last so long are averaged over the shunt, s."""
-SETTLING = 0.02
-"""Beginning of a level that is left out of the average: the coil's lag, s."""
+BIN_TIME = 5e-4
+"""Bins of the shunt that edges are looked for in, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,17 +37,16 @@ class AppliedCurrent:
 
     Attributes:
         steps: shape (n, 2): from that time on, s, this current, A.
+        ends: shape (n,): when the host heard of what came after each step, s.
         edges: number of steps whose time the shunt gave.
         lead: by how much those came before the host heard of them, s (median): all
             others were moved by as much; 0 where there were too few.
-        shunt_over_source: slope of the averaged shunt over the read-back; None where
-            fewer than 3 levels were held long enough.
     """
 
     steps: FloatArray
+    ends: FloatArray
     edges: int
     lead: float
-    shunt_over_source: Estimate | None
 
 
 def applied_current(
@@ -69,7 +65,7 @@ def applied_current(
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
-        return AppliedCurrent(np.empty((0, 2)), 0, 0.0, None)
+        return AppliedCurrent(np.empty((0, 2)), np.empty(0), 0, 0.0)
     first = np.flatnonzero(np.abs(np.diff(sent, prepend=np.inf)) > SAME)
     last = np.append(first[1:], t.size)
     level = np.array(
@@ -88,8 +84,24 @@ def applied_current(
         begin[1:] -= lead
         begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     steps = np.column_stack([begin, level])
-    ratio = None if shunt is None else _ratio(shunt, begin, ends, level)
-    return AppliedCurrent(steps, edges, lead, ratio)
+    return AppliedCurrent(steps, ends, edges, lead)
+
+
+def held(steps: FloatArray, end: float) -> Waveform:
+    """The current of `steps`, A, each held until the next, the last until `end` s.
+
+    Before the first one the coil carries nothing: a run begins with the coil off.
+    """
+    if len(steps) == 0:
+        return Waveform.constant(0.0)
+    if steps[0, 0] > 0:  # the first may come late, and be no small one
+        steps = np.concatenate([[[0.0, 0.0]], steps])
+    time = np.repeat(steps[:, 0], 2)[1:]
+    value = np.repeat(steps[:, 1], 2)[:-1]
+    time, value = np.append(time, max(end, time[-1])), np.append(value, value[-1])
+    distinct = np.ones(time.size, dtype=bool)
+    distinct[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
+    return Waveform(time[distinct], value[distinct])
 
 
 def _level(sent: float, read: FloatArray) -> float:
@@ -113,27 +125,3 @@ def _edge(
     i = int(past[0])
     part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
     return float(time[i - 1] + part * (time[i] - time[i - 1]))
-
-
-def _ratio(
-    shunt: Shunt, begin: FloatArray, ends: FloatArray, level: FloatArray
-) -> Estimate | None:
-    """Slope of the averaged shunt over the source's level; an offset is allowed for."""
-    held = np.flatnonzero(ends - begin >= LEVEL)
-    seen = []
-    for i in held:
-        _, value = shunt(float(begin[i]) + SETTLING, float(ends[i]) - BEFORE)
-        if value.size:
-            seen.append((level[i], float(value.mean())))
-    if len(seen) < 3:
-        return None
-    source, mean = np.array(seen).T
-    apart = source - source.mean()
-    spread = float(np.sum(apart**2))
-    if spread < VISIBLE**2:
-        return None
-    slope = float(np.sum(apart * mean) / spread)
-    left = mean - mean.mean() - slope * apart
-    freedom = source.size - 2
-    error = float(np.sqrt(np.sum(left**2) / freedom / spread))
-    return Estimate.of(slope, error, freedom)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.drain_current import Divider, drain_current
 from tactile_lab.errors import ParameterError
+from tactile_lab.model.drain_current import Divider, drain_current
 
 
 def integrate(i_ds, step=1e-5, duration=1.0, parts=None):
