@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from tactile_lab.columns import read_columns
 from tactile_lab.errors import SceneError
 from tactile_lab.quantity import Duration
-from tactile_lab.scene.columns import read_columns
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform

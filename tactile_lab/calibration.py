@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_lab.columns import read_columns, read_text
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.quantity import show
-from tactile_lab.scene.columns import read_columns, read_text
 
 COIL, VALID_UNTIL, HASH = "coil", "valid until", "sha256"
 UNCERTAINTY = {"T": "uncertainty T (95 %)", "N": "uncertainty N (95 %)"}

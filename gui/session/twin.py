@@ -6,7 +6,7 @@ import numpy as np
 
 from gui.lanes.twinned import TwinSlice
 from tactile_lab.acquisition.live import Bins
-from tactile_lab.analysis.follow import Follower
+from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.scene import Scene
 
@@ -27,19 +27,19 @@ class LiveTwin:
     """The scene's circuit under the force that the applied current gives."""
 
     def __init__(self, scene: Scene) -> None:
-        self._follower = Follower.of(scene)
+        self._model = LiveModel.of(scene)
 
     def add(self, at: float, amperes: float) -> None:
         """A set-point was applied at run time `at` s."""
-        self._follower.add(at, amperes)
+        self._model.add(at, amperes)
 
     def until(self, end: float) -> TwinSlice | None:
         """Advance to `end` s; None where there is nothing new or no answer."""
-        begin = self._follower.reached
+        begin = self._model.reached
         if end - begin < 2 * STEP:
             return None
         try:
-            out = self._follower.until(end)
+            out = self._model.until(end)
         except TactileLabError:
             return None
         count = max(2, round((end - begin) / STEP))

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.columns import read_text
 from tactile_lab.errors import SceneError
-from tactile_lab.scene.columns import read_text
 
 FloatArray = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
     from tactile_lab.acquisition.events import Event
     from tactile_lab.acquisition.execution import Execution
-    from tactile_lab.analysis.beside import Beside
+    from tactile_lab.acquisition.model_comparison import ModelComparison
     from tactile_lab.bench import Bench
     from tactile_lab.report.write import Report
     from tactile_lab.scene.scene import Scene
@@ -169,19 +169,19 @@ class Narrator:
         self._trial = ""
         self._spikes = 0
         self._rate = 0.0
-        self._model: Beside | None = None
+        self._model: ModelComparison | None = None
 
     def expect(self, execution: Execution) -> None:
         """This is about to run; the model will run beside it."""
         self._progress = Progress(execution.plan.estimate.duration, self._label)
         searched = execution.needs.detect_on is not None
         if searched or "V_C1" in execution.needs.stored:
-            from tactile_lab.analysis.beside import Beside
+            from tactile_lab.acquisition.model_comparison import ModelComparison
             from tactile_lab.analysis.twin import ELSEWHERE
 
             if execution.scene.protocol.name in ELSEWHERE:
                 return
-            self._model = Beside(execution.scene, searched=searched)
+            self._model = ModelComparison(execution.scene, searched=searched)
 
     def __call__(self, event: Event) -> None:
         """Take an event of the run."""

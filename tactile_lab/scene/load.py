@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from tactile_lab.columns import read_text
 from tactile_lab.errors import ParameterError, SceneError
 from tactile_lab.plugins import (
     nearest,
@@ -19,7 +20,6 @@ from tactile_lab.plugins import (
 )
 from tactile_lab.scene import overrides as options
 from tactile_lab.scene.bench_file import BenchSpec, BenchTable
-from tactile_lab.scene.columns import read_text
 from tactile_lab.scene.complaint import Blame, complaint, validated, written
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.sensor import SensorTable

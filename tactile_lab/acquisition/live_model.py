@@ -18,7 +18,7 @@ TOLERANCE = 1e-6
 """Error of spike times aimed at, s: far below what clocks and coil leave open."""
 
 
-class Follower:
+class LiveModel:
     """A circuit under the force that set-points give; each holds until the next.
 
     `add` may be called from another thread than `until`.
@@ -40,7 +40,7 @@ class Follower:
         self._amperes = 0.0
 
     @classmethod
-    def of(cls, scene: Scene) -> Follower:
+    def of(cls, scene: Scene) -> LiveModel:
         """That of a scene's sensor on its bench."""
         start = scene.start
         state = None

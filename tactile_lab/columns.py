@@ -1,4 +1,4 @@
-"""Reading files a scene names: text with clear refusals, and numeric columns."""
+"""Reading files that scenes and benches name: text, and numeric columns."""
 
 from __future__ import annotations
 

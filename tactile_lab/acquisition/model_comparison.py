@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_lab.analysis.follow import Follower
+from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome
 
 
-class Beside:
+class ModelComparison:
     """Compares each outcome with the model under the current that was applied.
 
     The host's times of set-points are used as they are; the report puts each edge where
@@ -23,27 +23,27 @@ class Beside:
     """
 
     def __init__(self, scene: Scene, *, searched: bool) -> None:
-        self._follower: Follower | None = Follower.of(scene)
+        self._model: LiveModel | None = LiveModel.of(scene)
         self._searched = searched
-        self._follower.until(0.0)  # compiles, before the coil waits for anything
+        self._model.until(0.0)  # compiles, before the coil waits for anything
 
     def add(self, at: float, amperes: float) -> None:
         """The current `amperes` A was applied at run time `at` s."""
-        if self._follower is not None:
-            self._follower.add(at, amperes)
+        if self._model is not None:
+            self._model.add(at, amperes)
 
     def ended(self, outcome: Outcome) -> str:
         """One sentence on a trial; "" where there is nothing to compare.
 
         After a force the model cannot follow it says so, once, and is silent then.
         """
-        if self._follower is None:
+        if self._model is None:
             return ""
         trial, start = outcome.trial, outcome.start
-        end = max(start + trial.length, self._follower.reached)
+        end = max(start + trial.length, self._model.reached)
         try:
-            begin = self._follower.reached
-            out = self._follower.until(end)
+            begin = self._model.reached
+            out = self._model.until(end)
             # a look at the rest between trials is no result either
             if trial.pause or (trial.level is None and trial.force.peak == 0):
                 return ""
@@ -62,7 +62,7 @@ class Beside:
                     f"({1e3 * float(np.sqrt(np.mean(off**2))):.2g} mV rms)"
                 )
         except TactileLabError as reason:
-            self._follower = None
+            self._model = None
             return f"the model cannot follow any more: {reason}"
         if not told:
             return ""

@@ -3,8 +3,8 @@ import re
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.beside import Beside
-from tactile_lab.analysis.follow import Follower
+from tactile_lab.acquisition.live_model import LiveModel
+from tactile_lab.acquisition.model_comparison import ModelComparison
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.scene.load import load
@@ -40,7 +40,7 @@ def follow(beside, start=1.0):
 
 
 def test_a_trial_like_the_model_s_has_nothing_to_tell_but_that():
-    beside = Beside(SCENE, searched=True)
+    beside = ModelComparison(SCENE, searched=True)
     follow(beside)
     told = beside.ended(outcome(Circuit()))
     assert re.match(r"150 mN: measured less model: (\d+) spikes \(model \1\)", told)
@@ -48,7 +48,7 @@ def test_a_trial_like_the_model_s_has_nothing_to_tell_but_that():
 
 
 def test_a_sensor_that_differs_shows_at_once():
-    beside = Beside(SCENE, searched=True)
+    beside = ModelComparison(SCENE, searched=True)
     follow(beside)
     told = beside.ended(outcome(Circuit(V_GS=1.42)))
     spikes, model = map(int, re.search(r"(\d+) spikes \(model (\d+)\)", told).groups())
@@ -57,7 +57,7 @@ def test_a_sensor_that_differs_shows_at_once():
 
 
 def test_pauses_are_followed_in_silence():
-    beside = Beside(SCENE, searched=True)
+    beside = ModelComparison(SCENE, searched=True)
     follow(beside)
     pause = Trial(force=PUSH.force, label="recovery", pause=True)
     quiet = Outcome(
@@ -71,7 +71,7 @@ def test_pauses_are_followed_in_silence():
 @pytest.mark.parametrize("ahead", [0.0, 0.5, 9.0])
 def test_slices_of_any_size_give_the_same_model(ahead):
     points = [(0.0, 0.0), (0.3, 0.6), (0.9, 0.9), (2.0, 0.0)]
-    whole, parts = Follower.of(SCENE), Follower.of(SCENE)
+    whole, parts = LiveModel.of(SCENE), LiveModel.of(SCENE)
     for point in points:
         whole.add(*point)
     expected = whole.until(3.0).spike_times
