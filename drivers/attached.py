@@ -12,14 +12,19 @@ from typing import Any
 from serial.tools import list_ports
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import dialect_ids, load_dialect
-from drivers.dialect_row import CoilDialect, Dialect, Wire
 from drivers.serial_line.link import SerialLink
 from drivers.teslameter import Teslameter
 from drivers.usb_presence import present
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, NoReplyError, NotFoundError
+from tactile_lab.instruments.dialects import (
+    coil_dialect,
+    dialect_ids,
+    load_dialect,
+    meter_dialect,
+)
+from tactile_lab.instruments.serial_dialect import SerialDialect, Wire
 
 DIALOUT = (
     "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
@@ -84,13 +89,13 @@ def try_out(
         InstrumentError: it does not answer as the row says.
         UnsafeError: a source's output could not be verified off.
     """
-    row = load_dialect(dialect)
     clock = RealClock()
     device: CoilSource | Teslameter
-    if isinstance(row, CoilDialect):
+    if load_dialect(dialect).role == "coil":
+        row = coil_dialect(dialect)
         device = CoilSource(row, address, CoilLimits(), clock, baud=baud, guarded=False)
     else:
-        device = Teslameter(row, address, clock, baud=baud)
+        device = Teslameter(meter_dialect(dialect), address, clock, baud=baud)
     if transcript is not None:
         device.record(transcript)
     try:
@@ -104,7 +109,7 @@ def ask_name(address: str) -> tuple[str | None, str | None]:
     """(name, problem) of what answers at `address`, asked in every shipped framing."""
     tried = set()
     problem: str | None = "nothing answered *IDN? in any framing of the shipped rows"
-    for row in map(load_dialect, dialect_ids()):
+    for row in _serial_dialects():
         if row.serial in tried or row.identify != "*IDN?":
             continue
         tried.add(row.serial)
@@ -126,11 +131,15 @@ def ask_name(address: str) -> tuple[str | None, str | None]:
 
 def fitting(identity: str) -> tuple[str, ...]:
     """Ids of the rows for an instrument of that name; a plain one if no other fits."""
-    rows: list[Dialect] = [load_dialect(name) for name in dialect_ids()]
-    fits = [row for row in rows if re.search(row.match, identity)]
+    fits = [row for row in _serial_dialects() if re.search(row.match, identity)]
     special = [row.id for row in fits if row.match != "."]
     plain = [row.id for row in fits if row.match == "." and not special]
     return tuple(special + plain)
+
+
+def _serial_dialects() -> list[SerialDialect]:
+    every = map(load_dialect, dialect_ids())
+    return [dialect for dialect in every if isinstance(dialect, SerialDialect)]
 
 
 def _quick(wire: Wire) -> Wire:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect, meter_dialect
 from drivers.picoscope.scope import PicoScope
 from drivers.teslameter import Teslameter
-from drivers.usbtmc.dialect import load_scope_dialect
 from drivers.usbtmc.scope import UsbtmcScope
 from tactile_lab.bench import Bench, FieldMeter, Scope
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect, scope_dialect
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
 from tactile_lab.scene.scene import Scene
@@ -51,7 +50,7 @@ def _scope(spec: ScopeSpec | None, clock: Clock) -> Scope:
     if spec is None:
         raise SceneError("The scene records scope channels; the bench has no [scope].")
     if spec.driver == "usbtmc":
-        row = load_scope_dialect(spec.dialect or "rigol-ds1000z")
+        row = scope_dialect(spec.dialect or "rigol-ds1000z")
         return UsbtmcScope(row, clock=clock, serial=spec.serial)
     return PicoScope(
         clock=clock,

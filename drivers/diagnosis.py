@@ -15,9 +15,9 @@ from typing import Any, Literal
 
 from drivers.attached import attached
 from drivers.coil.guard import Guard
-from drivers.dialect import coil_dialect
 from drivers.picoscope.sdk import load
 from tactile_lab.errors import InstrumentError
+from tactile_lab.instruments.dialects import coil_dialect
 
 NEEDED = ("numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb")
 DISK_TRIAL = 64 * 1024 * 1024

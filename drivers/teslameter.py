@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drivers.dialect_row import MeterDialect
 from drivers.serial_line.conversation import Conversation
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import BadReplyError, LimitError
+from tactile_lab.instruments.serial_dialect import MeterDialect
 
 MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
 """Meaning of the prefix letters some meters answer separately."""

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect, meter_dialect
 from drivers.picoscope.scope import PicoScope
 from drivers.teslameter import Teslameter
 from sim_backend.picoscope.faults import Fault
@@ -22,6 +21,7 @@ from sim_backend.serial_line.wires import plug_in
 from tactile_lab.bench import Bench, Channel
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from drivers.dialect import coil_dialect, meter_dialect
-from drivers.dialect_row import Wire
 from sim_backend.coil.panel import Deed
 from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.plant.options import PlantOptions
@@ -18,6 +16,8 @@ from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
 from sim_backend.serial_line.wires import FarEnd, LineInstrument
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+from tactile_lab.instruments.serial_dialect import Wire
 from tactile_lab.magnetics import Magnet
 
 BACKLOG = 1000

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 import click
 
+from tactile_lab.errors import nearest
+
 VERBS = {
     "gui": "Open the bench window.",
     "run": "Run a scene on its bench and store every sample; the demo unless given.",
@@ -54,12 +56,11 @@ class LazyVerbs(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The verb called, or an error that names the nearest."""
         if args and args[0] not in VERBS and not args[0].startswith("-"):
-            import difflib
-
-            near = difflib.get_close_matches(args[0], VERBS, n=1)
-            hint = f' Did you mean "{near[0]}"?' if near else ""
+            hint = nearest(args[0], VERBS).capitalize()
             raise click.UsageError(
-                f'There is no verb "{args[0]}".{hint} Verbs: {", ".join(VERBS)}.', ctx
+                f'There is no verb "{args[0]}". {hint + " " if hint else ""}'
+                f"Verbs: {', '.join(VERBS)}.",
+                ctx,
             )
         return super().resolve_command(ctx, args)
 

@@ -22,6 +22,19 @@ TactileLabError
 A message says what, value, unit, limit, and what to do.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """A hint such as ``did you mean "hold"?``, or an empty text if nothing is near."""
+    import difflib
+
+    folded = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.55)
+    return f'did you mean "{folded[near[0]]}"?' if near else ""
+
 
 class TactileLabError(Exception):
     """Root of every error this program raises on purpose."""

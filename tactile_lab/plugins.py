@@ -7,17 +7,16 @@ when it is asked for.
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import importlib
 import importlib.util
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import SceneError, nearest
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -26,13 +25,6 @@ if TYPE_CHECKING:
     from tactile_lab.scene.bench_file import CoilSpec, ScopeSpec
     from tactile_lab.scene.scene import Scene
     from tactile_lab.trial import Protocol
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """A hint such as ``did you mean "hold"?``, or an empty text if nothing is near."""
-    folded = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.55)
-    return f'did you mean "{folded[near[0]]}"?' if near else ""
 
 
 def protocol_names() -> tuple[str, ...]:
@@ -153,8 +145,9 @@ def coil_capability(coil: CoilSpec) -> CoilCapability:
         SceneError: there is no such dialect, or a limit is beyond the source's rating.
     """
     from tactile_lab.bench import CoilCapability
+    from tactile_lab.instruments.dialects import coil_dialect
 
-    row: Any = importlib.import_module("drivers.dialect").coil_dialect(coil.dialect)
+    row = coil_dialect(coil.dialect)
     row.check_limits(coil.limits)
     return CoilCapability(
         title=row.title,
@@ -172,8 +165,9 @@ def scope_capability(scope: ScopeSpec) -> ScopeCapability:
     from tactile_lab.bench import ScopeCapability
 
     if scope.driver == "usbtmc":
-        rows: Any = importlib.import_module("drivers.usbtmc.dialect")
-        row = rows.load_scope_dialect(scope.dialect or "rigol-ds1000z")
+        from tactile_lab.instruments.dialects import scope_dialect
+
+        row = scope_dialect(scope.dialect or "rigol-ds1000z")
         return ScopeCapability(
             gapless=False,
             inputs=row.inputs,

@@ -5,10 +5,9 @@ import sys
 
 import pytest
 
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import SceneError, nearest
 from tactile_lab.plugins import (
     coil_capability,
-    nearest,
     protocol_class,
     protocol_from_file,
     protocol_names,

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Protocol
 
 from drivers.coil import guard_process
-from drivers.dialect_row import CoilDialect, Wire
 from drivers.serial_line.port import port_settings
 from tactile_lab.errors import InstrumentError
+from tactile_lab.instruments.serial_dialect import CoilDialect, Wire
 
 SILENCE = 0.5
 """Time without heartbeat after which an armed guard acts, s."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from drivers.dialect_row import CoilDialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments.serial_dialect import CoilDialect
 from tactile_lab.quantity import show
 
 

@@ -10,9 +10,9 @@ from itertools import pairwise
 
 from drivers.coil.limits import check_current
 from drivers.coil.wire import CoilWire
-from drivers.dialect_row import CoilDialect, ListMode
 from tactile_lab.bench import CoilLimits
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments.serial_dialect import CoilDialect, ListMode
 from tactile_lab.quantity import show
 
 

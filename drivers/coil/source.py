@@ -15,12 +15,12 @@ from drivers.coil.limits import check_current, narrowed
 from drivers.coil.list_mode import check_list, upload
 from drivers.coil.off import switch_off
 from drivers.coil.wire import CoilWire
-from drivers.dialect_row import MARGIN, CoilDialect
 from drivers.serial_line.conversation import Conversation
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError, InterlockError, LimitError, UnsafeError
+from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
 
 CATCH_UP = 0.05

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 import statistics
 
-from drivers.dialect_row import MARGIN, CoilDialect
 from drivers.serial_line.conversation import Conversation
 from tactile_lab.clock import Clock
 from tactile_lab.errors import BadReplyError, RefusedError
+from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 
 CONNECT_QUERIES = 20
 """Harmless queries that measure the update interval."""

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Iterable
 
-from drivers.dialect_row import CoilDialect, MeterDialect
 from drivers.serial_line.link import SerialLink
 from tactile_lab.errors import (
     BadReplyError,
@@ -15,6 +14,7 @@ from tactile_lab.errors import (
     NoReplyError,
     RefusedError,
 )
+from tactile_lab.instruments.serial_dialect import CoilDialect, MeterDialect
 
 RETRY = 0.1
 """Time between two attempts to open a lost port again, s."""

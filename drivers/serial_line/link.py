@@ -13,7 +13,6 @@ from pathlib import Path
 
 import serial
 
-from drivers.dialect_row import Wire
 from drivers.serial_line.port import PORT_ERRORS, open_port, release
 from drivers.serial_line.transcript import Transcript
 from tactile_lab.clock import Clock
@@ -23,6 +22,7 @@ from tactile_lab.errors import (
     LinkLostError,
     NoReplyError,
 )
+from tactile_lab.instruments.serial_dialect import Wire
 
 QUIET = 0.05
 """Silence that ends a drain, s."""

@@ -10,8 +10,8 @@ from typing import Any
 import serial
 from serial.urlhandler import protocol_socket
 
-from drivers.dialect_row import Wire
 from tactile_lab.errors import InstrumentError, NotFoundError
+from tactile_lab.instruments.serial_dialect import Wire
 
 TermiosError: type[Exception] = OSError
 with suppress(ImportError):  # Windows has no termios

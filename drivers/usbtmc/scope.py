@@ -10,7 +10,6 @@ import numpy as np
 
 from drivers.opened import Opened
 from drivers.scope_wiring import check_channels, described
-from drivers.usbtmc.dialect import ScopeDialect
 from drivers.usbtmc.link import UsbtmcLink
 from drivers.usbtmc.record import SHIFT, RecordReader, number, tell
 from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
@@ -22,6 +21,7 @@ from tactile_lab.errors import (
     NoReplyError,
     RefusedError,
 )
+from tactile_lab.instruments.scope_dialect import ScopeDialect
 
 _MOST_ERRORS = 20
 _SETTLING, _PATIENCE = 0.2, 3.0

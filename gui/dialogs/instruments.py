@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any
 
 from PySide6.QtCore import Signal
@@ -15,18 +14,11 @@ from gui.look.theme import Theme
 from gui.parts import column, label, line, push, set_role
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
+from tactile_lab.instruments.dialects import dialect_ids
 from tactile_lab.plugins import attached, try_out_device
 from tactile_lab.quantity import show
 
 SCOPES = (("ps3000a", "PicoScope 3000"), ("usbtmc", "USBTMC (SCPI)"), ("", "none"))
-
-
-def rows_of(kind: str) -> list[str]:
-    """Dialect rows for a "coil" or a "meter"."""
-    meters = ("lakeshore",)
-    folder = resources.files("drivers") / "dialects"
-    names = sorted(f.name.removesuffix(".toml") for f in folder.iterdir())
-    return [n for n in names if n.startswith(meters) == (kind == "meter")]
 
 
 class Instruments(QWidget):
@@ -49,8 +41,8 @@ class Instruments(QWidget):
         self.attached = Attached(theme)
         self.coil_port, self.coil_row = self._ports("Coil source port"), QComboBox()
         self.meter_port, self.meter_row = self._ports("Teslameter port"), QComboBox()
-        self.coil_row.addItems(rows_of("coil"))
-        self.meter_row.addItems([*rows_of("meter"), BY_PERSON])
+        self.coil_row.addItems(dialect_ids("coil"))
+        self.meter_row.addItems([*dialect_ids("field meter"), BY_PERSON])
         self.scope = QComboBox()
         for driver, title in SCOPES:
             self.scope.addItem(title, driver)

@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable
 from string import Formatter
 
-from drivers.dialect_row import CoilDialect, Dialect, MeterDialect
 from drivers.teslameter import MULTIPLIERS
 from sim_backend.coil.panel import CoilPanel, CoilPlant
 from sim_backend.coil.source import MODELS as SOURCES
@@ -21,6 +20,11 @@ from sim_backend.teslameter import MODELS as METERS
 from sim_backend.teslameter import FieldPlant, SimTeslameter
 from tactile_lab.clock import Clock
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.serial_dialect import (
+    CoilDialect,
+    MeterDialect,
+    SerialDialect,
+)
 
 UNKNOWN = '-113,"Undefined header"'
 TOO_MUCH = '-222,"Data out of range"'
@@ -75,7 +79,7 @@ class Talk:
 
     def __init__(
         self,
-        row: Dialect,
+        row: SerialDialect,
         answers: dict[str, Answer],
         acts: Callable[[str], bool],
         errors: deque[str],

@@ -16,7 +16,6 @@ from weakref import WeakValueDictionary
 
 import serial
 
-from drivers.dialect_row import Wire
 from sim_backend.serial_line.faults import (
     ANSWER_KINDS,
     REFUSAL,
@@ -27,6 +26,7 @@ from sim_backend.serial_line.faults import (
     spoilt,
 )
 from tactile_lab.clock import Clock
+from tactile_lab.instruments.serial_dialect import Wire
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer

@@ -14,8 +14,8 @@ from pydantic import Field, field_validator, model_validator
 
 from tactile_lab.bench import Channel, CoilLimits
 from tactile_lab.calibration import read_calibration
+from tactile_lab.errors import nearest
 from tactile_lab.magnetics import Magnet
-from tactile_lab.plugins import nearest
 from tactile_lab.quantity import Unit
 from tactile_lab.scene.tables import Table
 
@@ -53,7 +53,7 @@ class CoilSpec(Table):
     """``[coil]`` of a bench: the current source.
 
     Attributes:
-        dialect: id of a row in drivers/dialects, or path of a TOML file with one.
+        dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
         limits: see `CoilLimits`.
@@ -198,7 +198,7 @@ class FieldMeterSpec(Table):
 
     Attributes:
         driver: "serial", or "manual": a person is asked what it shows.
-        dialect: id of a row in drivers/dialects, or path of a TOML file with one.
+        dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
         interval: time between two readings, s.

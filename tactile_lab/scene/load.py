@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.columns import read_text
-from tactile_lab.errors import ParameterError, SceneError
+from tactile_lab.complaint import Blame, complaint, validated, written
+from tactile_lab.errors import ParameterError, SceneError, nearest
 from tactile_lab.plugins import (
-    nearest,
     protocol_class,
     protocol_from_file,
     scene_names,
@@ -20,7 +20,6 @@ from tactile_lab.plugins import (
 )
 from tactile_lab.scene import overrides as options
 from tactile_lab.scene.bench_file import BenchSpec, BenchTable
-from tactile_lab.scene.complaint import Blame, complaint, validated, written
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.sensor import SensorTable
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated

@@ -15,7 +15,7 @@ from pydantic import (
     model_validator,
 )
 
-from tactile_lab.plugins import nearest
+from tactile_lab.errors import nearest
 from tactile_lab.quantity import (
     Current,
     Duration,

@@ -22,19 +22,19 @@ from pathlib import Path
 from provenance import provenance
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
 from sim_backend.serial_line.wires import FarEnd
 from sim_backend.serve import CoilOnly
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
+from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.magnetics import Magnet
 
 OWNER = """
 import sys
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
+from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 clock = RealClock()

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from fault_rows import Row  # beside this file
 
-from drivers.usbtmc.dialect import load_scope_dialect
 from drivers.usbtmc.scope import UsbtmcScope
 from sim_backend.plant.scope_source import Voltages
 from sim_backend.usbtmc.bus import SimulatedBus
@@ -19,6 +18,7 @@ from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import InstrumentError
+from tactile_lab.instruments.dialects import scope_dialect
 
 RECORDS = 6
 WIRED = (Channel(signal="V_K", input="1", range=4.0),)
@@ -65,7 +65,7 @@ def session(cause: Any, seed: str) -> tuple[str, str]:
         packet=64, faults=(fault,),
     )  # fmt: skip
     scope = UsbtmcScope(
-        load_scope_dialect("rigol-ds1000z"),
+        scope_dialect("rigol-ds1000z"),
         clock=clock,
         backend=SimulatedBus([device], clock),
     )

@@ -42,7 +42,9 @@ class Served:
         )
         port = json.loads(self.process.stdout.readline())["coil"]
         (folder / "scene.toml").write_text(SCENE)
-        row = resources.files("drivers").joinpath("dialects", "kepco-bop.toml")
+        row = resources.files("tactile_lab.instruments").joinpath(
+            "rows", "coil", "kepco-bop.toml"
+        )
         (folder / "patient.toml").write_text(
             row.read_text().replace("[serial]", '[serial]\ntimeout = "400 ms"')
         )

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 import pytest
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.wires import FarEnd, plug_in, unplug
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
+from tactile_lab.instruments.dialects import coil_dialect
 
 
 class Resistor:

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from drivers.dialect import dialect_ids, load_dialect
+from tactile_lab.instruments.dialects import dialect_ids, load_dialect
 
 DOCS = Path(__file__).parents[2] / "docs"
 HARDWARE = Path(__file__).parents[1] / "hardware"

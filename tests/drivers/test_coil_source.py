@@ -4,7 +4,6 @@ import math
 import pytest
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect, meter_dialect
 from drivers.teslameter import Teslameter
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import SimTeslameter
@@ -16,6 +15,7 @@ from tactile_lab.errors import (
     LimitError,
     NoReplyError,
 )
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
 
 KEPCO = coil_dialect("kepco-bop")
 

@@ -1,24 +1,24 @@
+from importlib import resources
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import (
+from sim_backend.coil.source import MODELS, SimCoilSource
+from sim_backend.serial_line.wires import plug_in
+from tactile_lab.bench import CoilLimits
+from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.instruments.dialects import (
     coil_dialect,
     dialect_ids,
     load_dialect,
     meter_dialect,
     parse_dialect,
 )
-from drivers.dialect_row import CoilDialect
-from sim_backend.coil.source import MODELS, SimCoilSource
-from sim_backend.serial_line.wires import plug_in
-from tactile_lab.bench import CoilLimits
-from tactile_lab.clock import SimulatedClock
-from tactile_lab.errors import LimitError, SceneError
 
-COILS = [i for i in dialect_ids() if isinstance(load_dialect(i), CoilDialect)]
-METERS = [i for i in dialect_ids() if i not in COILS]
+COILS = dialect_ids("coil")
 
 
 def test_every_coil_row_has_a_far_end():
@@ -91,9 +91,8 @@ def test_a_row_of_the_wrong_role():
 
 
 def text_of(name="kepco-bop"):
-    from importlib import resources
-
-    return resources.files("drivers").joinpath(f"dialects/{name}.toml").read_text()
+    folder = resources.files("tactile_lab.instruments") / "rows" / "coil"
+    return folder.joinpath(f"{name}.toml").read_text()
 
 
 @pytest.mark.parametrize(
@@ -145,3 +144,41 @@ def test_limits_beyond_the_rating_are_refused():
         row.check_limits(CoilLimits(current=2.0))
     with pytest.raises(SceneError, match="compliance = 40 V"):
         row.check_limits(CoilLimits(current=1.0, compliance=40.0))
+
+
+def test_dialects_are_listed_by_role():
+    coils, meters = dialect_ids("coil"), dialect_ids("field meter")
+    assert "kepco-bop" in coils and "lakeshore-425" in meters
+    assert sorted((*coils, *meters, *dialect_ids("scope"))) == list(dialect_ids())
+
+
+@pytest.mark.parametrize("name", dialect_ids())
+def test_a_dialects_file_bears_its_id(name):
+    assert load_dialect(name).id == name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            'set = "CURR {i:.5f}"',
+            'sett = "CURR {i:.5f}"',
+            'mine.toml: the file has no key "sett"; did you mean "set"? Known: id, ',
+        ),
+        (
+            "baud = 9600",
+            "baud = 9600\nspeed = 1",
+            'mine.toml: [serial] has no key "speed"; Known: baud, ',
+        ),
+        ("baud = 9600", 'baud = "fast"', 'mine.toml: [serial] baud = "fast": a whole'),
+        ('current = "5 A"', "current = 5", "mine.toml: current: 5 has no unit"),
+        ('role = "coil"', 'role = "pump"', 'role = "pump" is not known; write one of'),
+        ("{v:.3f}", "{volts:.3f}", "mine.toml: a template cannot be filled in"),
+    ],
+)
+def test_a_mistake_is_told_with_file_key_and_what_is_allowed(old, new, told):
+    assert old in text_of()
+    with pytest.raises(SceneError) as refused:
+        parse_dialect(text_of().replace(old, new), "mine.toml")
+    assert told in str(refused.value)
+    assert "http" not in str(refused.value)

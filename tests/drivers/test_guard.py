@@ -11,7 +11,6 @@ from patient import patient
 
 from drivers.coil.guard import SILENCE, Guard
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.servers import PtyServer, TcpServer
@@ -19,6 +18,7 @@ from sim_backend.serial_line.wires import FarEnd
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InterlockError
+from tactile_lab.instruments.dialects import coil_dialect
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.usbtmc.dialect import load_scope_dialect
 from drivers.usbtmc.scope import UsbtmcScope
 from sim_backend.plant.scope_source import Voltages
 from sim_backend.usbtmc.bus import SimulatedBus
@@ -18,6 +17,7 @@ from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
 from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
+from tactile_lab.instruments.dialects import scope_dialect
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "add-a-driver.md"
 
@@ -55,7 +55,7 @@ def test_the_row(tmp_path: Path) -> None:
         interface=INTERFACE,
     )  # fmt: skip
     scope = UsbtmcScope(
-        load_scope_dialect(str(file)), clock=clock, backend=SimulatedBus([device])
+        scope_dialect(str(file)), clock=clock, backend=SimulatedBus([device])
     )
     with clock.taking_part("scope"), scope:
         stream = scope.start([Channel(signal="V_K", input="2", range=4.0)], 1e-6)

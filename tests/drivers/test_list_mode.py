@@ -6,10 +6,10 @@ import math
 import pytest
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.bench import CoilLimits
 from tactile_lab.errors import LimitError, LinkLostError, RefusedError
+from tactile_lab.instruments.dialects import coil_dialect
 
 SINE = [round(0.3 * math.sin(2 * math.pi * k / 100), 6) for k in range(100)] + [0.0]
 

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import ANSWER_KINDS, SerialFault
 from sim_backend.serial_line.wires import plug_in, unplug
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import TactileLabError
+from tactile_lab.instruments.dialects import coil_dialect
 
 KINDS = (*ANSWER_KINDS, "refused", "deaf", "stuck", "unplug")
 LINES = ("", "CURR", "MEAS", "OUTP", "IDN", "VOLT", "ERR")

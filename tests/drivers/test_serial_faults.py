@@ -7,7 +7,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import FarEnd
@@ -22,6 +21,7 @@ from tactile_lab.errors import (
     RefusedError,
     UnsafeError,
 )
+from tactile_lab.instruments.dialects import coil_dialect
 
 PASSING = [
     SerialFault(kind="late", amount=0.3),

@@ -1,15 +1,14 @@
 import pytest
 
-from drivers.dialect import dialect_ids, load_dialect
-from drivers.dialect_row import MeterDialect
 from drivers.teslameter import Teslameter
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import MODELS, SimTeslameter
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import BadReplyError, LimitError
+from tactile_lab.instruments.dialects import dialect_ids, load_dialect
 
-METERS = [i for i in dialect_ids() if isinstance(load_dialect(i), MeterDialect)]
+METERS = dialect_ids("field meter")
 
 
 def test_every_row_has_a_far_end():

@@ -5,8 +5,6 @@ from pathlib import Path
 import pytest
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import dialect_ids, load_dialect
-from drivers.dialect_row import CoilDialect
 from drivers.serial_line.transcript import Transcript, read_transcript
 from drivers.teslameter import Teslameter
 from sim_backend.coil.source import SimCoilSource
@@ -16,6 +14,8 @@ from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.dialects import dialect_ids, load_dialect
+from tactile_lab.instruments.serial_dialect import CoilDialect
 
 FOLDER = Path(__file__).parent / "transcripts"
 
@@ -55,7 +55,7 @@ def far_end(name, plant, clock):
     return SimTeslameter(plant, name, clock)
 
 
-@pytest.mark.parametrize("name", dialect_ids())
+@pytest.mark.parametrize("name", [*dialect_ids("coil"), *dialect_ids("field meter")])
 def test_the_row_says_exactly_this(name):
     replay = Replay(FOLDER / f"{name}.txt")
     reading = converse(name, replay, SimulatedClock())

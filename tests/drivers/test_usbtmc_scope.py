@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.usbtmc.dialect import load_scope_dialect, parse, scope_dialect_ids
 from drivers.usbtmc.scope import UsbtmcScope
 from sim_backend.plant.scope_source import Voltages
 from sim_backend.usbtmc.bus import SimulatedBus
@@ -27,8 +26,9 @@ from tactile_lab.errors import (
     RefusedError,
     SceneError,
 )
+from tactile_lab.instruments.dialects import dialect_ids, parse_dialect, scope_dialect
 
-ROW = load_scope_dialect("rigol-ds1000z")
+ROW = scope_dialect("rigol-ds1000z")
 TRIO = (
     Channel(signal="V_K", input="3", range=4.0, offset=-1.0),
     Channel(signal="V_C1", input="1", range=0.8),
@@ -203,12 +203,12 @@ def test_timebases_sample_at_least_as_fast_as_asked() -> None:
 
 
 def test_rows_are_found_and_checked(tmp_path: Path) -> None:
-    assert "rigol-ds1000z" in scope_dialect_ids()
+    assert "rigol-ds1000z" in dialect_ids("scope")
     with pytest.raises(SceneError, match='did you mean "rigol-ds1000z"'):
-        load_scope_dialect("rigol-ds1000")
+        scope_dialect("rigol-ds1000")
     with pytest.raises(SceneError, match="not TOML"):
-        parse("row = ", "my.toml")
-    with pytest.raises(SceneError, match=r"my\.toml has mistakes: row\.id"):
-        parse("[row]\ntitle = 'x'", "my.toml")
+        parse_dialect("id = ", "my.toml")
+    with pytest.raises(SceneError, match=r"my\.toml: id is missing"):
+        parse_dialect("role = 'scope'\ntitle = 'x'", "my.toml")
     with pytest.raises(SceneError, match="cannot be read"):
-        load_scope_dialect(str(tmp_path / "none.toml"))
+        scope_dialect(str(tmp_path / "none.toml"))

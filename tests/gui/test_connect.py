@@ -20,7 +20,7 @@ from gui.dialogs.bench_text import (
     start_choice,
 )
 from gui.dialogs.connect import Connect
-from gui.dialogs.instruments import Instruments, rows_of
+from gui.dialogs.instruments import Instruments
 from gui.review.conclusion import conclusion_of
 from gui.session.link import RunAfar
 from gui.session.messages import Errand
@@ -76,11 +76,6 @@ def test_wrong_range_is_refused_and_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="mN"):
         save_bench(choice, tmp_path / "bench.toml")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_rows_are_offered_by_role() -> None:
-    assert "kepco-bop" in rows_of("coil") and "lakeshore-425" in rows_of("meter")
-    assert not set(rows_of("coil")) & set(rows_of("meter"))
 
 
 def test_look_does_not_block_and_tells_what_it_found(lab) -> None:

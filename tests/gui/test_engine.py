@@ -119,7 +119,9 @@ class Source:
         self.log = folder / "deeds.jsonl"
         self.served = ServedBench(coil="pty", log=self.log)
         self.served.start()
-        row = resources.files("drivers").joinpath("dialects", "kepco-bop.toml")
+        row = resources.files("tactile_lab.instruments").joinpath(
+            "rows", "coil", "kepco-bop.toml"
+        )
         (folder / "patient.toml").write_text(
             row.read_text().replace("[serial]", '[serial]\ntimeout = "2 s"')
         )

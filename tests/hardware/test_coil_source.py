@@ -18,12 +18,12 @@ from pathlib import Path
 import pytest
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
-from drivers.dialect_row import CoilDialect
 from drivers.serial_line.link import SerialLink
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError
+from tactile_lab.instruments.dialects import coil_dialect
+from tactile_lab.instruments.serial_dialect import CoilDialect
 
 pytestmark = [
     pytest.mark.hardware,
@@ -116,7 +116,7 @@ def test_remote(link: SerialLink) -> None:
 OWNER = """
 import sys, time
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect
+from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 limits = CoilLimits(current=0.3, slew=2.0, compliance=5.0)

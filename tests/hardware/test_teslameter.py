@@ -14,9 +14,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.dialect import meter_dialect
 from drivers.teslameter import Teslameter
 from tactile_lab.clock import RealClock
+from tactile_lab.instruments.dialects import meter_dialect
 
 pytestmark = [
     pytest.mark.hardware,

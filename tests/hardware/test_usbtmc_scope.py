@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from drivers.usb_presence import present
-from drivers.usbtmc.dialect import load_scope_dialect
 from drivers.usbtmc.scope import UsbtmcScope
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import RealClock
+from tactile_lab.instruments.dialects import scope_dialect
 
 pytestmark = [
     pytest.mark.hardware,
@@ -36,7 +36,7 @@ def fact(name: str, value: object) -> None:
 
 @pytest.fixture
 def scope() -> Iterator[UsbtmcScope]:
-    row = load_scope_dialect(os.environ.get("TACTILE_LAB_DIALECT", "rigol-ds1000z"))
+    row = scope_dialect(os.environ.get("TACTILE_LAB_DIALECT", "rigol-ds1000z"))
     scope = UsbtmcScope(row, clock=RealClock(), timeout=5.0)
     yield scope
     scope.close()

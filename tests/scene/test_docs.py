@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.cli import main
+from tactile_lab.complaint import known_keys
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.scene.bench_file import BenchTable
-from tactile_lab.scene.complaint import known_keys
 from tactile_lab.scene.load import load, load_bench
 from tactile_lab.scene.sensor import SensorTable, StartTable
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated

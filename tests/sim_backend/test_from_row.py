@@ -7,8 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import dialect_ids, load_dialect
-from drivers.dialect_row import CoilDialect
 from drivers.teslameter import Teslameter
 from sim_backend.serial_line.from_row import (
     RowCoil,
@@ -22,8 +20,11 @@ from sim_backend.serve import ServedBench
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.dialects import dialect_ids, load_dialect
+from tactile_lab.instruments.serial_dialect import CoilDialect
 
-ROWS = [load_dialect(name) for name in dialect_ids()]
+SERIAL = (*dialect_ids("coil"), *dialect_ids("field meter"))
+ROWS = [load_dialect(name) for name in SERIAL]
 COILS = [row for row in ROWS if isinstance(row, CoilDialect)]
 METERS = [row for row in ROWS if not isinstance(row, CoilDialect)]
 

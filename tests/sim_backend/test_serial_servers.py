@@ -8,7 +8,6 @@ import pytest
 import serial
 
 from drivers.coil.source import CoilSource
-from drivers.dialect import coil_dialect, meter_dialect
 from drivers.teslameter import Teslameter
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
@@ -18,6 +17,7 @@ from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LinkLostError, NotFoundError
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
 
 KEPCO = coil_dialect("kepco-bop")
 FAST = KEPCO.serial.model_copy(update={"latency": 0.0, "timeout": 0.3})

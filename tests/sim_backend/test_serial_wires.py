@@ -6,11 +6,11 @@ import weakref
 import pytest
 import serial
 
-from drivers.dialect import coil_dialect
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.wires import plug_in, unplug
 from sim_backend.serve import CoilOnly
 from tactile_lab.clock import SimulatedClock
+from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.magnetics import Magnet
 
 WIRE = coil_dialect("kepco-bop").serial

@@ -1,6 +1,6 @@
 """Rows that wait long for an answer, for real wires on a machine busy with others."""
 
-from drivers.dialect import load_dialect
+from tactile_lab.instruments.dialects import load_dialect
 
 
 def patient(name, timeout=5.0, **wire):

@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from tactile_lab.errors import SceneError
-from tactile_lab.plugins import nearest
+from tactile_lab.errors import SceneError, nearest
 
 M = TypeVar("M", bound=BaseModel)
 Blame = Callable[[tuple[str, ...]], str]

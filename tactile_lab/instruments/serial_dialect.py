@@ -1,7 +1,7 @@
-"""Dialects: how one model of instrument speaks, as a row of data.
+"""Dialects: how one model of serial instrument speaks, as a row of data.
 
-A row is everything the generic serial drivers know of a model; `drivers.dialect`
-reads rows from TOML files.
+A dialect is everything the generic serial drivers know of a model; `dialects` reads
+it from a TOML file.
 """
 
 from __future__ import annotations
@@ -30,19 +30,21 @@ def _pattern(text: str) -> str:
 Pattern = Annotated[str, AfterValidator(_pattern)]
 
 
-def _frozen(value: object) -> object:
+def frozen(value: object) -> object:
     """TOML arrays as tuples."""
     return tuple(value) if isinstance(value, list) else value
 
 
-Lines = Annotated[tuple[str, ...], BeforeValidator(_frozen)]
+Lines = Annotated[tuple[str, ...], BeforeValidator(frozen)]
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """A table of a dialect: frozen, unknown keys refused."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
-class Wire(_Strict):
+class Wire(Strict):
     """Serial settings and framing of a model.
 
     Attributes:
@@ -84,7 +86,7 @@ class Wire(_Strict):
         return bits / self.baud
 
 
-class ListMode(_Strict):
+class ListMode(Strict):
     """Lines with which a model plays a list of currents by its own clock.
 
     Attributes:
@@ -110,14 +112,37 @@ class ListMode(_Strict):
     longest: Duration
 
 
-class Dialect(_Strict):
-    """What every row has.
+class Dialect(Strict):
+    """What every dialect has.
 
     Attributes:
         id: name used in bench files.
+        role: what it is for.
         title: for people.
-        match: pattern the answer to `identify` must match.
-        unverified: facts of this row that no one has checked on an instrument yet.
+        match: pattern the answer to the query of its name must match.
+        unverified: facts that no one has checked on an instrument yet.
+    """
+
+    id: str
+    role: str
+    title: str
+    match: Pattern
+    unverified: Lines = ()
+
+    def try_templates(self, where: str) -> None:
+        """Fill in every template: a mistake must not reach a bench.
+
+        Raises:
+            SceneError: one cannot be filled in; `where` names the file.
+        """
+
+
+class SerialDialect(Dialect):
+    """What the dialect of every serial instrument has.
+
+    Attributes:
+        serial: settings and framing of the wire.
+        identify: harmless query of its name.
         init: lines after identification.
         optional: lines before `init` whose refusal is accepted.
         release: lines before the port is closed.
@@ -126,10 +151,6 @@ class Dialect(_Strict):
         number: pattern whose group 1 is a numeric answer.
     """
 
-    id: str
-    title: str
-    match: Pattern
-    unverified: Lines = ()
     serial: Wire = Wire()
     identify: str = "*IDN?"
     optional: Lines = ()
@@ -140,7 +161,7 @@ class Dialect(_Strict):
     number: Pattern = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[A-Za-z]*$"
 
 
-class CoilDialect(Dialect):
+class CoilDialect(SerialDialect):
     """How a current source speaks. Templates use `{i}` A and `{v}` V, fixed-point.
 
     Attributes:
@@ -181,6 +202,34 @@ class CoilDialect(Dialect):
     measures_when_off: bool = True
     join: str = ";:"
     list: ListMode | None = None
+
+    def try_templates(self, where: str) -> None:
+        """Fill in every template with extremes.
+
+        Raises:
+            SceneError: a placeholder that is not known, or a line that is too long.
+        """
+        try:
+            for value in (-self.current, 0.0, self.current):
+                for line in self.verified(self.set_line(value)):
+                    if len(line) + len(self.serial.send_end) > self.serial.max_line:
+                        raise SceneError(
+                            f"Dialect {where}: {line!r} with its terminator is longer "
+                            f"than max_line = {self.serial.max_line}."
+                        )
+            self.limit_line(self.voltage)
+            if self.list is not None:
+                self.list.points.format(values="0.1,0.2")
+                self.list.dwell.format(t=self.list.shortest)
+                self.list.count.format(n=1)
+        except (KeyError, IndexError, ValueError) as reason:
+            if isinstance(reason, SceneError):
+                raise
+            raise SceneError(
+                f"Dialect {where}: a template cannot be filled in ({reason!r}); it "
+                "takes {i} for the current and {v} for the voltage, in a list "
+                "{values}, {t} and {n}."
+            ) from reason
 
     def check_limits(self, limits: CoilLimits) -> None:
         """Refuse limits beyond what the model can do.
@@ -230,7 +279,7 @@ class CoilDialect(Dialect):
         return MARGIN * (typical + len(lines) * (wire.latency + wire.min_gap))
 
 
-class MeterDialect(Dialect):
+class MeterDialect(SerialDialect):
     """How a teslameter speaks.
 
     Attributes:

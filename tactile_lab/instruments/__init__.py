@@ -1,0 +1,1 @@
+"""What instruments can, said before any is opened: dialects as data, the registry."""

@@ -1,0 +1,109 @@
+"""How one model of USBTMC oscilloscope speaks, as a row of data (TOML)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from tactile_lab.instruments.serial_dialect import Dialect, Lines, Strict, frozen
+
+Numbers = Annotated[tuple[float, ...], BeforeValidator(frozen)]
+
+
+def _numbered(table: Any) -> Any:
+    """TOML's keys are texts; these are numbers of inputs."""
+    if not isinstance(table, dict):
+        return table
+    return {int(k) if str(k).isdecimal() else k: v for k, v in table.items()}
+
+
+class Timebases(Strict):
+    """Horizontal scales, s a division, in steps of 1, 2, 5."""
+
+    shortest: float = Field(gt=0)
+    longest: float = Field(gt=0)
+
+
+class Commands(Strict):
+    """Lines and questions; names in braces are filled in.
+
+    `{input}` is an input's name, `{scale}` V a division, `{offset}` V, `{coupling}` DC
+    or AC, `{depth}` samples, `{timebase}` s a division, `{first}` and `{last}` sample
+    numbers from 1. `rate` answers S/s, `status` a word of which `waiting` and `done`
+    matter, `preamble` the ten numbers of a Rigol, `data` a block of bytes.
+    """
+
+    identify: str
+    error: str
+    input_off: Lines
+    input_on: Lines
+    acquire: Lines
+    rate: str
+    arm: Lines
+    status: str
+    waiting: str
+    done: str
+    force: str
+    stop: Lines
+    select: Lines
+    preamble: str
+    bounds: Lines
+    data: str
+
+
+class ScopeDialect(Dialect):
+    """One model.
+
+    Attributes:
+        vendor, product: USB ids.
+        header_once: see `UsbtmcLink`.
+        inputs: names of its inputs.
+        fastest: highest rate for 1, 2, ... enabled inputs, S/s.
+        bits: of its converter.
+        divisions_wide: of the screen.
+        divisions_high: from the middle of the screen to its edge: the full scale.
+        codes_per_division: steps of the converter.
+        scales: V a division.
+        timebases: s a division.
+        depth: samples of a record for 1, 2, ... enabled inputs.
+        read_at_once: most samples of one answer.
+        commands: what to say.
+    """
+
+    role: Literal["scope"]
+    vendor: int = Field(ge=0, le=0xFFFF)
+    product: int = Field(ge=0, le=0xFFFF)
+    header_once: bool = False
+    inputs: Lines
+    fastest: Numbers
+    bits: int = Field(ge=1, le=8)
+    divisions_wide: int = Field(ge=1)
+    divisions_high: int = Field(ge=1)
+    codes_per_division: int = Field(ge=1)
+    scales: Numbers
+    timebases: Timebases
+    depth: Annotated[dict[int, int], BeforeValidator(_numbered)]
+    read_at_once: int = Field(ge=1)
+    commands: Commands
+
+    @property
+    def ranges(self) -> tuple[float, ...]:
+        """Full scale of each vertical scale, V."""
+        return tuple(float(f"{s * self.divisions_high:.6g}") for s in self.scales)
+
+    def timebase(self, interval: float, inputs: int) -> float:
+        """The longest s a division that samples at least as often as wanted.
+
+        Args:
+            interval: wanted time between samples, s.
+            inputs: how many are enabled.
+        """
+        wanted = self.depth[inputs] * interval / self.divisions_wide
+        step = self.timebases.shortest
+        for exponent in range(-12, 4):
+            for mantissa in (1, 2, 5):
+                candidate = float(f"{mantissa}e{exponent}")
+                if step <= candidate <= wanted * (1 + 1e-9):
+                    step = candidate
+        return min(step, self.timebases.longest)
