@@ -1,1 +1,1 @@
-"""One run in progress: the deciding loop, its threads, spikes on line."""
+"""One run in progress: the deciding loop and its threads."""

@@ -15,7 +15,7 @@ from tactile_lab.errors import SamplesLostError
 
 
 class OnlineDetector(Protocol):
-    """Finds spikes in one channel's consecutive codes; see `acquisition.spikes`."""
+    """Finds spikes in one channel's consecutive codes; see `spikes.detector`."""
 
     def feed(self, first: int, codes: NDArray[np.int16]) -> NDArray[np.void]:
         """Spikes completed by these codes: fields sample, amplitude, width."""

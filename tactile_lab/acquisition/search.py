@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tactile_lab.acquisition.crossings import Codes
-from tactile_lab.acquisition.detection import Detection
-from tactile_lab.acquisition.spikes import (
-    Detector,
-    ResetDetector,
-    detector_of,
-    estimate,
-)
 from tactile_lab.bench import Stream
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
+from tactile_lab.spikes.crossings import Codes
+from tactile_lab.spikes.detection import Detection
+from tactile_lab.spikes.detector import (
+    Detector,
+    ResetDetector,
+    detector_of,
+    estimate,
+)
 
 RESET_EDGE = 0.5e-6
 """Longest a reset of V_C2 takes at the follower's output, s: 4 V at 13 V/us."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from tactile_lab.acquisition.detection import DEVIATIONS
 from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.estimate import resolution
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
+from tactile_lab.spikes.detection import DEVIATIONS
 
 SAMPLES_PER_DECAY = 6
 """Samples per time constant of a spike from which its amplitude can be read."""

@@ -129,12 +129,12 @@ def searched_is_stored(run: Run) -> bool:
 
 
 def redetect(run: Run) -> NDArray[Any]:
-    """Spikes found again in the stored samples, dtype `acquisition.spikes.SPIKE`.
+    """Spikes found again in the stored samples, dtype `spikes.detector.SPIKE`.
 
     Each stretch without a gap is searched by itself, as on line.
     """
     # compiled code is loaded only where it is needed
-    from tactile_lab.acquisition.spikes import SPIKE, detector_of
+    from tactile_lab.spikes.detector import SPIKE, detector_of
 
     found = [np.empty(0, SPIKE)]
     if run.detection is not None and searched_is_stored(run):

@@ -106,7 +106,7 @@ class Recorder:
 
         Args:
             times: shape (k,), s on the run's axis.
-            found: shape (k,), dtype `acquisition.spikes.SPIKE`, sample indices
+            found: shape (k,), dtype `spikes.detector.SPIKE`, sample indices
                 counted from the start of the stream.
         """
         samples = self._pieces.stored(found["sample"])

@@ -10,8 +10,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.detection import Detection
 from tactile_lab.errors import RunFolderError
+from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.applied import (
     BIN_TIME,
     AppliedCurrent,

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from provenance import provenance
 
-from tactile_lab.acquisition.detection import Detection
-from tactile_lab.acquisition.spikes import detect, detector_of
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.errors import RunFolderError
+from tactile_lab.spikes.detection import Detection
+from tactile_lab.spikes.detector import detect, detector_of
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from provenance import provenance
 from scipy.signal import find_peaks
 
-from tactile_lab.acquisition.detection import Detection
-from tactile_lab.acquisition.spikes import detect, detector_of
+from tactile_lab.spikes.detection import Detection
+from tactile_lab.spikes.detector import detect, detector_of
 
 SPIKES = (1_000, 10_000, 100_000)
 PER = 200_000_000

@@ -23,8 +23,8 @@ THRESHOLD = 3000
 
 def write(file: str) -> None:
     """Codes with spikes at random places, and what our detector finds in them."""
-    from tactile_lab.acquisition.detection import Detection
-    from tactile_lab.acquisition.spikes import detect
+    from tactile_lab.spikes.detection import Detection
+    from tactile_lab.spikes.detector import detect
 
     rng = np.random.default_rng(11)
     codes = rng.integers(-1, 2, SAMPLES, dtype=np.int16) * np.int16(256)

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tactile_lab.acquisition.detection import Detection
-from tactile_lab.acquisition.spikes import detector_of
 from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.spikes.detection import Detection
+from tactile_lab.spikes.detector import detector_of
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder

@@ -7,7 +7,7 @@ import runpy
 import sys
 from pathlib import Path
 
-from tactile_lab.acquisition.spikes import detector_of
+from tactile_lab.spikes.detector import detector_of
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tactile_lab.acquisition.detection import Detection
 from tactile_lab.acquisition.rate import Rate
-from tactile_lab.acquisition.spikes import (
+from tactile_lab.errors import ParameterError
+from tactile_lab.spikes.detection import Detection
+from tactile_lab.spikes.detector import (
     SPIKE,
     Detector,
     ResetDetector,
@@ -18,7 +19,6 @@ from tactile_lab.acquisition.spikes import (
     detector_of,
     estimate,
 )
-from tactile_lab.errors import ParameterError
 
 
 def reference(codes, threshold, hysteresis, refractory, polarity):

@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from tactile_lab.acquisition.crossings import (
+from tactile_lab.errors import ParameterError
+from tactile_lab.spikes.crossings import (
     INSIDE,
     MODE,
     PEAK,
@@ -19,8 +20,7 @@ from tactile_lab.acquisition.crossings import (
     Spikes,
     scan,
 )
-from tactile_lab.acquisition.detection import DEVIATIONS, Detection
-from tactile_lab.errors import ParameterError
+from tactile_lab.spikes.detection import DEVIATIONS, Detection
 
 SPIKE = np.dtype([("sample", "f8"), ("amplitude", "i2"), ("width", "f4")])
 """One spike: interpolated sample index of the crossing, peak code, width in samples.

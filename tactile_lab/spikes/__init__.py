@@ -1,0 +1,1 @@
+"""Spike detection on streamed codes: settings, detectors and their compiled loop."""
