@@ -10,23 +10,24 @@ from tactile_lab.bench import Bench, FieldMeter, Scope
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.dialects import coil_dialect, meter_dialect, scope_dialect
-from tactile_lab.planning.needs import needs
+from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
 from tactile_lab.scene.scene import Scene
 
 
-def open_bench(scene: Scene, *, realtime: bool = True) -> Bench:
+def open_bench(scene: Scene, needed: Needs, *, realtime: bool = True) -> Bench:
     """Drivers for the instruments `scene` needs, on this computer's time.
 
     Args:
         scene: its bench file names addresses and limits.
+        needed: which instruments that is, as its plan has it.
         realtime: without meaning here: real instruments know no other time.
 
     Raises:
         SceneError: the bench file lacks an instrument the scene needs.
     """
     clock = RealClock()
-    spec, needed = scene.bench, needs(scene)
+    spec = scene.bench
     return Bench(
         name=spec.name,
         simulated=False,

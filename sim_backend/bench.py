@@ -22,7 +22,7 @@ from tactile_lab.bench import Bench, Channel
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
-from tactile_lab.planning.needs import needs
+from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
 
@@ -146,6 +146,7 @@ def _mistakes(simulated: Simulated) -> tuple[SerialFault, ...]:
 
 def open_bench(
     scene: Scene,
+    needed: Needs,
     *,
     realtime: bool = False,
     scope_faults: Sequence[Fault] = (),
@@ -157,7 +158,8 @@ def open_bench(
     """Drivers and far ends of the instruments `scene` needs; nothing is opened.
 
     Args:
-        scene: physics, wiring, dialects and what is needed of them.
+        scene: physics, wiring, dialects.
+        needed: which instruments are needed, as its plan has it.
         realtime: live in this computer's time instead of a computed one.
         scope_faults: what goes wrong with the scope, and when.
         coil_faults: the same for the current source.
@@ -169,7 +171,7 @@ def open_bench(
         SceneError: the bench file lacks an instrument the scene needs.
     """
     clock: Clock = RealClock() if realtime else SimulatedClock()
-    plant, spec, needed = plant_of(scene, world), scene.bench, needs(scene)
+    plant, spec = plant_of(scene, world), scene.bench
     coil = scope = meter = wired = None
     if needed.coil:
         if spec.coil is None:

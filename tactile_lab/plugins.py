@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from tactile_lab.bench import Bench, Channel, CoilCapability, ScopeCapability
+    from tactile_lab.planning.needs import Needs
     from tactile_lab.scene.bench_file import CoilSpec, ScopeSpec
     from tactile_lab.scene.scene import Scene
     from tactile_lab.trial import Protocol
@@ -87,15 +88,17 @@ def protocol_from_file(path: Path) -> type[Protocol]:
     return _only_protocol(module, path.stem)
 
 
-def open_bench(scene: Scene, *, realtime: bool = False) -> Bench:
+def open_bench(scene: Scene, needed: Needs, *, realtime: bool = False) -> Bench:
     """The bench `scene` names, with the instruments it needs; opens no instrument.
 
     Args:
         scene: its `bench` says whether physics is real or computed.
+        needed: which instruments are needed, as the scene's plan has it.
         realtime: let a simulated bench keep pace with the wall clock.
     """
     room = "sim_backend.bench" if scene.bench.simulated else "drivers.bench"
-    bench: Bench = importlib.import_module(room).open_bench(scene, realtime=realtime)
+    opening: Any = importlib.import_module(room)
+    bench: Bench = opening.open_bench(scene, needed, realtime=realtime)
     return bench
 
 

@@ -7,6 +7,7 @@ from gui.session.request import Request
 from gui.state import Fault
 from tactile_lab.bench import Bench, OffReport
 from tactile_lab.errors import TactileLabError
+from tactile_lab.planning.needs import needs
 from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
 
@@ -20,7 +21,7 @@ def check_bench(request: Request, *, realtime: bool = True) -> Checked | Refused
     """
     try:
         scene = request.load()
-        return check(scene, open_bench(scene, realtime=realtime))
+        return check(scene, open_bench(scene, needs(scene), realtime=realtime))
     except (TactileLabError, OSError) as error:
         return Refused(Fault("The bench cannot be used.", str(error)))
     except Exception as error:  # a driver of the user's own may raise anything

@@ -11,6 +11,7 @@ from gui.session.messages import CoilByHand, FieldByHand, HandOff, Told
 from gui.session.request import Request
 from gui.session.task import Task
 from tactile_lab.errors import TactileLabError
+from tactile_lab.planning.needs import needs
 from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
 
@@ -68,7 +69,8 @@ class Hand(Task):
         from tactile_lab.acquisition.by_hand import ManualCoil
 
         try:
-            bench = open_bench(self._asked.request.load(), realtime=True)
+            scene = self._asked.request.load()
+            bench = open_bench(scene, needs(scene), realtime=True)
             coil = ManualCoil(bench)
         except (TactileLabError, OSError) as error:
             return HandOff(None, str(error), opened=False)
@@ -100,7 +102,10 @@ def read_field(request: Request, hand: Hand | None) -> FieldByHand:
 
     try:
         bench = hand.bench if hand is not None else None
-        found = by_hand.read_field(bench or open_bench(request.load(), realtime=True))
+        if bench is None:
+            scene = request.load()
+            bench = open_bench(scene, needs(scene), realtime=True)
+        found = by_hand.read_field(bench)
     except (TactileLabError, OSError) as error:
         return FieldByHand(None, f"The field was not read: {error}")
     text = f"{show(found.mean, 'T', 4)} ± {show(found.spread, 'T', 2)}"

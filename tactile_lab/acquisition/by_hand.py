@@ -2,7 +2,8 @@
 
 The coil has the same thread, limits and safe ending as in a run::
 
-    bench = open_bench(load("demo", bench="my bench.toml"), realtime=True)
+    scene = load("demo", bench="my bench.toml")
+    bench = open_bench(scene, needs(scene), realtime=True)
     coil = ManualCoil(bench)
     coil.start()
     coil.hold(0.1)

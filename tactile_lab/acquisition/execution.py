@@ -89,7 +89,7 @@ class Execution:
         self.scene = scene
         self.plan = plan(scene, preview=False)
         self.needs = self.plan.needs
-        self.bench = bench or open_bench(scene, realtime=realtime)
+        self.bench = bench or open_bench(scene, self.needs, realtime=realtime)
         self._ask = ask
         self._asked_field = asked_field
         self._check_somebody_is_there()

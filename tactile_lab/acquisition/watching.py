@@ -110,7 +110,7 @@ class Watching:
                 f"Holding {show(keep, 's')} takes {size / 1e9:.1f} GB of memory; "
                 f"{MOST / 1e9:g} GB is the limit. Lower record.sample_rate."
             )
-        self.bench = bench or open_bench(scene, realtime=realtime)
+        self.bench = bench or open_bench(scene, needed, realtime=realtime)
         self.stop = StopRequest(self.bench.clock)
         self.live = Live()
         self._emit = emit

@@ -53,7 +53,8 @@ def readings(path: Path, scene: Scene) -> Question:
     from tactile_lab.planning.needs import needs
     from tactile_lab.planning.timeline import timeline
 
-    if not needs(scene).asked_field:
+    drive = timeline(scene, through_coil=True)
+    if not needs(scene, drive).asked_field:
         raise SceneError(
             f"--field {path}: {scene.name} has nobody read the field. Give the bench a "
             'teslameter with [field_meter] driver = "manual", or leave --field out.'
@@ -71,8 +72,9 @@ def readings(path: Path, scene: Scene) -> Question:
         except QuantityError as reason:
             raise SceneError(f"{path}, line {number}: {reason}") from reason
         lines.append(told)
-    steps = timeline(scene, through_coil=True).steps
-    holds = sum(1 for s in steps if s.trial.hold is not None and not s.trial.pause)
+    holds = sum(
+        1 for s in drive.steps if s.trial.hold is not None and not s.trial.pause
+    )
     if len(lines) != holds:
         raise SceneError(
             f"{path} has {len(lines)} readings; {scene.name} asks for {holds}, one at "

@@ -6,13 +6,13 @@ opened, enabled, streamed, stored or computed by any of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from tactile_lab.bench import Channel
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.asked import asked_signals
-from tactile_lab.planning.timeline import timeline
+from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.plugins import check_scope, scope_capability
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import SIGNALS
@@ -55,62 +55,39 @@ class Needs:
     guaranteed_rate: float
 
 
-def needs(scene: Scene) -> Needs:
+def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
     """The closure of `scene`.
+
+    Args:
+        scene: what is to be run.
+        drive: its trials through the coil; driven here unless given.
 
     Raises:
         SceneError: something asked for is not wired or not there on this bench, or the
             threshold lies outside the range of the channel it is looked for on.
         LimitError: the scope cannot stream so, or the coil cannot play it.
     """
-    asked = asked_signals(scene)
-    scope = scene.bench.scope
+    drive = drive or timeline(scene, through_coil=True)
+    asked, recorded = asked_signals(scene), set(scene.record.signals)
+    scope, meter = scene.bench.scope, scene.bench.field_meter
     wired = {c.signal: c for c in scope.channels} if scope is not None else {}
-    wanted = {name for name in SAMPLED if name in asked}
-    if "I_DS" in asked:
-        # derived from V_C1 by Eq. (16) where no channel measures it
-        wanted.add("I_DS" if "I_DS" in wired else "V_C1")
-    detect_on = None
-    if asked & {"spikes", "rate"}:
-        detect_on = "V_K" if "V_K" in wired or "V_C2" not in wired else "V_C2"
-    streamed = wanted | ({detect_on} if detect_on else set())
-    for name in sorted(streamed - set(wired)):
-        raise SceneError(
-            f"{scene.name} needs {name}, but bench {scene.bench.name} wires it to no "
-            f"scope channel (wired: {', '.join(wired) or 'nothing'}). Add it to "
-            "[[scope.channels]] or record less."
-        )
-    if "field" in asked:
-        if "field" in wired:
-            streamed.add("field")
-        elif scene.bench.field_meter is None:
-            raise SceneError(
-                f"{scene.name} records the field, but bench {scene.bench.name} has "
-                "neither [field_meter] nor a scope channel with the signal field."
-            )
-    channels = tuple(c for name, c in wired.items() if name in streamed)
-    if scene.protocol.sees_supply and scope is not None:
-        ranges = scope_capability(scope).ranges
-        channels = tuple(_widened(c, scene.circuit.V_S, ranges) for c in channels)
+    derives_I_DS = "I_DS" not in wired  # from V_C1 by Eq. (16)
+    detect_on = _detected_on(asked, wired)
+    streamed = _streamed(scene, asked, wired) | ({detect_on} if detect_on else set())
+    _check_wired(scene, streamed, wired)
     if detect_on == "V_K":
         _check_threshold(scene, wired["V_K"])
-    rate = float("inf")
-    if channels:
-        assert scope is not None
-        rate = check_scope(scope, channels, scene.record.sample_rate)
-        if detect_on is not None and not scope_capability(scope).gapless:
-            raise SceneError(
-                f"{scene.name} looks for spikes on {detect_on}, but scope "
-                f"{scope.driver} of bench {scene.bench.name} has gaps between its "
-                "records and would miss some. Use a streaming scope or record "
-                "neither spikes nor rate."
-            )
-    recorded = set(scene.record.signals)
-    metered = "field" in asked and "field" not in wired
-    meter = scene.bench.field_meter
+    channels = tuple(c for name, c in wired.items() if name in streamed)
+    metered = AVERAGED in asked and AVERAGED not in wired
+    if metered and meter is None:
+        raise SceneError(
+            f"{scene.name} records the field, but bench {scene.bench.name} has "
+            "neither [field_meter] nor a scope channel with the signal field."
+        )
     by_hand = meter is not None and meter.driver == "manual"
+    channels, rate = _as_the_scope_can(scene, channels, detect_on)
     return Needs(
-        coil=timeline(scene, through_coil=True).drives,
+        coil=drive.drives,
         field_meter=metered and not by_hand,
         asked_field=metered and by_hand,
         channels=channels,
@@ -118,7 +95,7 @@ def needs(scene: Scene) -> Needs:
             name
             for name in wired
             if (name in recorded and name != AVERAGED)
-            or (name == "V_C1" and "I_DS" in recorded and "I_DS" not in wired)
+            or (name == "V_C1" and "I_DS" in recorded and derives_I_DS)
         ),
         detect_on=detect_on,
         model=tuple(
@@ -128,6 +105,57 @@ def needs(scene: Scene) -> Needs:
         ),
         guaranteed_rate=rate,
     )
+
+
+def _detected_on(asked: Set[str], wired: Mapping[str, Channel]) -> str | None:
+    """Signal that spikes are detected on, None where nobody asks for them."""
+    if not asked & {"spikes", "rate"}:
+        return None
+    return "V_K" if "V_K" in wired or "V_C2" not in wired else "V_C2"
+
+
+def _streamed(scene: Scene, asked: Set[str], wired: Mapping[str, Channel]) -> set[str]:
+    """Signals that must come from the scope, detection apart."""
+    names = {name for name in SAMPLED if name in asked}
+    if "I_DS" in asked:
+        names.add("I_DS" if "I_DS" in wired else "V_C1")
+    if AVERAGED in asked and AVERAGED in wired:
+        names.add(AVERAGED)
+    return names
+
+
+def _check_wired(
+    scene: Scene, streamed: Set[str], wired: Mapping[str, Channel]
+) -> None:
+    for name in sorted(streamed - set(wired)):
+        raise SceneError(
+            f"{scene.name} needs {name}, but bench {scene.bench.name} wires it to no "
+            f"scope channel (wired: {', '.join(wired) or 'nothing'}). Add it to "
+            "[[scope.channels]] or record less."
+        )
+
+
+def _as_the_scope_can(
+    scene: Scene, channels: tuple[Channel, ...], detect_on: str | None
+) -> tuple[tuple[Channel, ...], float]:
+    """The channels as they will be set, and the rate the scope is sure to keep, S/s."""
+    scope = scene.bench.scope
+    if scope is None or not channels:
+        return channels, float("inf")
+    capability = scope_capability(scope)
+    if scene.protocol.sees_supply:
+        channels = tuple(
+            _widened(c, scene.circuit.V_S, capability.ranges) for c in channels
+        )
+    rate = check_scope(scope, channels, scene.record.sample_rate)
+    if detect_on is not None and not capability.gapless:
+        raise SceneError(
+            f"{scene.name} looks for spikes on {detect_on}, but scope "
+            f"{scope.driver} of bench {scene.bench.name} has gaps between its "
+            "records and would miss some. Use a streaming scope or record "
+            "neither spikes nor rate."
+        )
+    return channels, rate
 
 
 def _widened(channel: Channel, supply: float, ranges: Sequence[float]) -> Channel:

@@ -114,7 +114,7 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
         LimitError: a force, the coil's heat or the sample rate lies beyond a limit.
     """
     drive = timeline(scene, through_coil=True)
-    needed = needs(scene)
+    needed = needs(scene, drive)
     told = (*check_calibration(scene, drive), *warnings(scene, needed, drive))
     result = _model(scene, drive) if preview else None
     if result is not None:

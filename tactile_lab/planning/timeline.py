@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -70,11 +69,8 @@ class Timeline:
         return joined(played) if len(played) == len(self.steps) else None
 
 
-@lru_cache(maxsize=8)
 def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
     """All trials of `scene`, each outcome computed by the model if it is looked at.
-
-    Driven once per scene: asking again gives the same object.
 
     Args:
         scene: what to drive.

@@ -1,13 +1,15 @@
 """The coil's thread, driven without a run."""
 
 from tactile_lab.acquisition.by_hand import ManualCoil
+from tactile_lab.planning.needs import needs
 from tactile_lab.plugins import open_bench
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
 
 
 def test_an_idle_coil_is_set_as_soon_as_it_is_asked_to():
-    bench = open_bench(load("demo"))
+    scene = load("demo")
+    bench = open_bench(scene, needs(scene))
     clock, hand = bench.clock, ManualCoil(bench)
     with clock.taking_part("test"):
         hand.start()

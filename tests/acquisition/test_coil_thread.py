@@ -5,6 +5,7 @@ import pytest
 
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.planning.needs import needs
 from tactile_lab.plugins import open_bench
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
@@ -17,7 +18,8 @@ LONGEST = 5.0
 @pytest.fixture(scope="module")
 def playing():
     """A coil that is live and plays what it is asked, and its clock."""
-    bench = open_bench(load("demo"))
+    scene = load("demo")
+    bench = open_bench(scene, needs(scene))
     clock = bench.clock
     lease = Lease(clock)
     lease.end()

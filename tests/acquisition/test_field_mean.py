@@ -13,6 +13,7 @@ from tactile_lab.acquisition.execution import Execution
 from tactile_lab.acquisition.field_mean import AVERAGING, FieldMean
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
@@ -68,7 +69,8 @@ def test_a_calibration_reads_the_field_from_the_scope(tmp_path):
 def test_the_meter_s_range_is_watched(tmp_path):
     loaded = scene(tmp_path, range="200 mV")
     assert "expected to reach" in " ".join(plan(loaded, preview=False).warnings)
-    done = Execution(loaded, tmp_path / "runs", bench=open_bench(loaded)).run()
+    bench = open_bench(loaded, needs(loaded))
+    done = Execution(loaded, tmp_path / "runs", bench=bench).run()
     assert done.ending.exit_code == 3
     assert "scope input B" in done.ending.reason
 

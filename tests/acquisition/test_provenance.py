@@ -8,6 +8,7 @@ import pytest
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.provenance import temperature
+from tactile_lab.planning.needs import needs
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
 from tactile_lab.store.compare import differences
@@ -127,7 +128,7 @@ def test_settings_are_read_before_and_after_and_a_turned_knob_is_told(run_scene,
     turned = {}
 
     def bench(scene):
-        made = open_bench(scene)
+        made = open_bench(scene, needs(scene))
         read_back = made.coil.settings
         made.coil.settings = lambda: {**read_back(), **turned}
         return made

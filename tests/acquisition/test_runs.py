@@ -10,6 +10,7 @@ from tactile_lab.acquisition import events
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.store.columns import SampleColumn
 from tactile_lab.store.verify import verify
@@ -191,7 +192,7 @@ def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(
     ran = run_scene(
         *short,
         bench=lambda scene: open_bench(
-            scene, scope_faults=[Fault(kind="unplug", sample=700_000)]
+            scene, needs(scene), scope_faults=[Fault(kind="unplug", sample=700_000)]
         ),
     )
     assert ran.done.ending.state is RunState.FAULTED

@@ -28,6 +28,7 @@ from sim_backend.bench import open_bench
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Executed, Execution
 from tactile_lab.errors import TactileLabError
+from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.run import Run
@@ -52,6 +53,7 @@ def outcome(scene: Scene, injection: Injection, folder: Path) -> tuple[str, str]
     """What became of one run, and what it said."""
     bench = open_bench(
         scene,
+        needs(scene),
         coil_faults=injection.coil,
         scope_faults=injection.scope,
         meter_faults=injection.meter,

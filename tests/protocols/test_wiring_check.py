@@ -9,6 +9,7 @@ from sim_backend.bench import open_bench, options
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
 from tactile_lab.errors import SceneError
+from tactile_lab.planning.needs import needs
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.results import results
@@ -21,7 +22,9 @@ def checked(folder, *overrides, **faults):
     """The conclusion of a wiring check of a bench with those faults."""
     scene = load("wiring_check", (*SHORT, *overrides))
     world = replace(options(scene.simulated), **faults)
-    done = Execution(scene, folder, bench=open_bench(scene, world=world)).run()
+    done = Execution(
+        scene, folder, bench=open_bench(scene, needs(scene), world=world)
+    ).run()
     assert done.ending.state is RunState.COMPLETE, done.ending.reason
     findings = find(read(done.folder))
     values = json.loads(json.dumps(results(findings)))["conclusion"]
@@ -156,7 +159,7 @@ def test_without_calibration_swapped_channels_are_still_named(tmp_path):
 
 
 def without_hands(scene):
-    return replace(open_bench(scene), place_probes=None)
+    return replace(open_bench(scene, needs(scene)), place_probes=None)
 
 
 def test_where_nobody_can_move_the_probes_it_is_refused_at_once(tmp_path):
@@ -168,7 +171,7 @@ def test_where_nobody_can_move_the_probes_it_is_refused_at_once(tmp_path):
 
 def test_a_person_is_asked_for_each_place_in_turn(tmp_path):
     scene = load("wiring_check", ("protocol.hold=0.2 s", "record.sample_rate=10 kS/s"))
-    bench = open_bench(scene)
+    bench = open_bench(scene, needs(scene))
     move, asked = bench.place_probes, []
 
     def ask(text):
@@ -185,7 +188,7 @@ def test_a_person_is_asked_for_each_place_in_turn(tmp_path):
 
 def test_a_person_who_goes_away_ends_the_run_safely(tmp_path):
     scene = load("wiring_check", ("protocol.hold=0.2 s", "record.sample_rate=10 kS/s"))
-    bench = replace(open_bench(scene), place_probes=None)
+    bench = replace(open_bench(scene, needs(scene)), place_probes=None)
 
     def gone(text):
         raise EOFError("the terminal was closed")

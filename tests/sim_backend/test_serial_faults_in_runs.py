@@ -11,6 +11,7 @@ from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.execution import Execution
+from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 
@@ -28,7 +29,7 @@ PULSE = r"^CURR 0\.[1-9]"
 def run(folder: Path, fault: SerialFault) -> tuple[Executed, int]:
     """The finished run, and samples of V_K in its folder."""
     scene = load("demo", OVERRIDES)
-    bench = open_bench(scene, coil_faults=[fault])
+    bench = open_bench(scene, needs(scene), coil_faults=[fault])
     done = Execution(scene, folder, bench=bench).run()
     if not (done.folder / "data.h5").exists():
         return done, 0  # it ended before the first sample
