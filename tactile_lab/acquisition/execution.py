@@ -34,7 +34,7 @@ from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
-from tactile_lab.planning.limited import limited
+from tactile_lab.planning.current import current_for
 from tactile_lab.planning.plan import plan
 from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
@@ -263,8 +263,5 @@ class Execution:
     ) -> Waveform:
         coil = self.scene.bench.coil
         assert coil is not None
-        wanted = trial.current
-        if wanted is None:
-            magnet = self.scene.bench.magnet
-            wanted = magnet.current_for(trial.force, coil.limits.current)
-        return limited(wanted, coil.limits.slew, update_interval, before)[0]
+        magnet = self.scene.bench.magnet
+        return current_for(trial, magnet, coil, before, update_interval)[0]

@@ -7,19 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_lab.bench import CoilCapability
 from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
+from tactile_lab.planning.current import current_for, cut
 from tactile_lab.planning.heat import heat_along
-from tactile_lab.planning.limited import limited
 from tactile_lab.planning.outcome import ModelOutcome, Step, joined
-from tactile_lab.plugins import coil_capability
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
-
-SMALLEST = 1e-9
-"""Current that counts as reversed, A."""
 
 MOST_TRIALS = 10_000
 """A protocol that asks for more never ends, as far as planning is concerned."""
@@ -122,7 +117,6 @@ class _Driver:
         self._time = 0.0
         self._amperes = 0.0
         self._heat = 0.0
-        self._source: CoilCapability | None = None
 
     def take(self, trial: Trial) -> Outcome:
         length = trial.length
@@ -133,55 +127,35 @@ class _Driver:
         force, current = trial.force, trial.current
         magnet = self.scene.bench.magnet
         if self.through_coil:
-            force, current = self._played(trial, length)
+            force, current = self._played(trial)
         elif current is not None:
-            force = _cut(magnet.force_for(current, beyond="hold"), length)
+            force = cut(magnet.force_for(current, beyond="hold"), length)
         else:
-            force = _cut(force, length)
+            force = cut(force, length)
         step = Step(trial, self._time, force, current)
         self.steps.append(step)
         self._time += length
         return ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)
 
-    def _played(self, trial: Trial, length: float) -> tuple[Waveform, Waveform]:
-        coil, magnet = self.scene.bench.coil, self.scene.bench.magnet
-        if coil is None:
-            asked = trial.current or trial.force
-            if asked.peak == 0:
-                return Waveform.through([(0, 0), (length, 0)]), Waveform.through(
-                    [(0, 0), (length, 0)]
+    def _played(self, trial: Trial) -> tuple[Waveform, Waveform]:
+        """Force and current as the coil plays them."""
+        bench, length = self.scene.bench, trial.length
+        if bench.coil is None:
+            if (trial.current or trial.force).peak > 0:
+                raise SceneError(
+                    f"bench {bench.name} has no [coil], but the protocol asks for a "
+                    "force."
                 )
-            raise SceneError(
-                f"bench {self.scene.bench.name} has no [coil], but the protocol asks "
-                "for a force."
-            )
-        limits = coil.limits
-        if trial.current is None:
-            asked = _cut(trial.force, length)
-            try:
-                wanted = magnet.current_for(asked, limits.current)
-            except LimitError as reason:
-                raise LimitError(f'trial "{trial.label}": {reason}') from reason
-        else:
-            wanted = _cut(trial.current, length)
-            if wanted.peak > limits.current * (1 + 1e-12):
-                raise LimitError(
-                    f'trial "{trial.label}": current {show(wanted.peak, "A")} is '
-                    f"beyond the coil's limit of {show(limits.current, 'A')}."
-                )
-        if self._source is None:
-            self._source = coil_capability(coil)
-        if not self._source.bipolar and wanted.value.min() < -SMALLEST:
-            raise LimitError(f'trial "{trial.label}": {self._one_sign(wanted)}')
-        interval = self._source.update_interval
-        current, warning = limited(wanted, limits.slew, interval, self._amperes)
+            still = Waveform.through([(0, 0), (length, 0)])
+            return still, still
+        current, warning = current_for(trial, bench.magnet, bench.coil, self._amperes)
         if warning is not None:
             text = f'the coil cannot follow trial "{trial.label}": {warning}'
             if self.scene.coil.strict:
                 raise SceneError(f"{text} (coil.strict = true refuses that).")
             self._limited.append((trial.label, warning))
-        current = _cut(current, length)
         self._amperes = float(current.value[-1])
+        limits = bench.coil.limits
         self._heat, _, spent = heat_along(current, limits, self._heat)
         if spent is not None:
             raise LimitError(
@@ -190,20 +164,7 @@ class _Driver:
                 f"{show(spent, 's')} after its start. Ask for less force, a shorter "
                 "hold, or a longer rest before it."
             )
-        return magnet.force_for(current, beyond="hold"), current
-
-    def _one_sign(self, wanted: Waveform) -> str:
-        """Why a source that cannot reverse does not play `wanted`, A."""
-        bench = self.scene.bench
-        assert bench.coil is not None and self._source is not None
-        least = float(wanted.value.min())
-        reach = sorted((0.0, *bench.magnet.force([bench.coil.limits.current])))
-        return (
-            f"{show(float(bench.magnet.force([least])[0]), 'N')} needs "
-            f"{show(least, 'A')}, and {self._source.title} gives current of one sign "
-            f"only: forces from {show(reach[0], 'N')} to {show(reach[-1], 'N')}. "
-            "Ask for those, or use a four-quadrant source."
-        )
+        return bench.magnet.force_for(current, beyond="hold"), current
 
     def timeline(self) -> Timeline:
         force = joined([(step.start, step.force) for step in self.steps])
@@ -218,14 +179,3 @@ class _Driver:
                 f'the coil cannot follow trial "{label}"{others}: {warning}; the '
                 "limited waveform is used"
             )
-
-
-def _cut(wave: Waveform, length: float) -> Waveform:
-    """`wave` from 0 to `length` s: held outside its points, jumps at both ends kept."""
-    inside = (wave.time >= 0) & (wave.time <= length)
-    time, value = wave.time[inside], wave.value[inside]
-    if not time.size or time[0] > 0:
-        time, value = np.r_[0.0, time], np.r_[wave.at(0.0), value]
-    if time[-1] < length:
-        time, value = np.r_[time, length], np.r_[value, wave.at(length)]
-    return Waveform(time, value)

@@ -1,4 +1,8 @@
-"""What the coil makes of a current waveform it cannot follow."""
+"""The current that plays a trial's force: one rule, for the plan and for the run.
+
+The force becomes a current by the magnet's calibration, within what coil and source
+can; that is then limited to what the coil can follow.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,88 @@ import math
 
 import numpy as np
 
+from tactile_lab.errors import LimitError
+from tactile_lab.magnetics import Magnet
+from tactile_lab.plugins import coil_capability
 from tactile_lab.quantity import show
+from tactile_lab.scene.bench_file import CoilSpec
+from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
 
 SHORT_OF = 0.01
 """Part of the peak by which the update grid may miss the waveform unmentioned."""
+
+REVERSED = 1e-9
+"""Current that counts as reversed, A."""
+
+
+def current_for(
+    trial: Trial,
+    magnet: Magnet,
+    coil: CoilSpec,
+    before: float,
+    update_interval: float | None = None,
+) -> tuple[Waveform, str | None]:
+    """The current that plays `trial`, A against s from 0 to its length.
+
+    Args:
+        trial: its force, or its current where it asks for one.
+        magnet: what force a current gives.
+        coil: limits, and the source that plays it.
+        before: current just before the trial, A.
+        update_interval: time between two set-points, s; what the source promises
+            unless given.
+
+    Returns:
+        The current, and a warning where the coil cannot follow what is asked.
+
+    Raises:
+        LimitError: beyond the coil's limit, the calibration, or a source that gives
+            current of one sign.
+        SceneError: there is no such source.
+    """
+    length, limit = trial.length, coil.limits.current
+    source = coil_capability(coil)
+    if trial.current is None:
+        try:
+            wanted = magnet.current_for(cut(trial.force, length), limit)
+        except LimitError as reason:
+            raise LimitError(f'trial "{trial.label}": {reason}') from reason
+    else:
+        wanted = cut(trial.current, length)
+        if wanted.peak > limit * (1 + 1e-12):
+            raise LimitError(
+                f'trial "{trial.label}": current {show(wanted.peak, "A")} is '
+                f"beyond the coil's limit of {show(limit, 'A')}."
+            )
+    if not source.bipolar and wanted.value.min() < -REVERSED:
+        told = _one_sign(wanted, magnet, limit, source.title)
+        raise LimitError(f'trial "{trial.label}": {told}')
+    interval = update_interval or source.update_interval
+    played, warning = limited(wanted, coil.limits.slew, interval, before)
+    return cut(played, length), warning
+
+
+def _one_sign(wanted: Waveform, magnet: Magnet, limit: float, title: str) -> str:
+    """Why a source that cannot reverse does not play `wanted`, A."""
+    least = float(wanted.value.min())
+    reach = sorted((0.0, *magnet.force([limit])))
+    return (
+        f"{show(float(magnet.force([least])[0]), 'N')} needs {show(least, 'A')}, and "
+        f"{title} gives current of one sign only: forces from {show(reach[0], 'N')} to "
+        f"{show(reach[-1], 'N')}. Ask for those, or use a four-quadrant source."
+    )
+
+
+def cut(wave: Waveform, length: float) -> Waveform:
+    """`wave` from 0 to `length` s: held outside its points, jumps at both ends kept."""
+    inside = (wave.time >= 0) & (wave.time <= length)
+    time, value = wave.time[inside], wave.value[inside]
+    if not time.size or time[0] > 0:
+        time, value = np.r_[0.0, time], np.r_[wave.at(0.0), value]
+    if time[-1] < length:
+        time, value = np.r_[time, length], np.r_[value, wave.at(length)]
+    return Waveform(time, value)
 
 
 def limited(

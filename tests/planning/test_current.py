@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactile_lab.planning.limited import limited
+from tactile_lab.planning.current import limited
 from tactile_lab.waveform import Waveform
 
 amperes = st.floats(-2, 2, allow_nan=False)
