@@ -20,13 +20,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.decay import fit_decay
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.identify import identify
 from tactile_lab.analysis.transfer import fit_transfer
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1, rest_V_C2

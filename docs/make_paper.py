@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from paper_page import page
 
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.analysis.transfer import Transfer, fit_transfer
 from tactile_lab.analysis.transfer_file import read_transfer
+from tactile_lab.engine.execution import Execution
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.report.canvas import save
@@ -83,8 +83,8 @@ def run(name: str, scratch: Path) -> dict[str, Any]:
     print(f"{name} ...", file=sys.stderr, flush=True)
     scene, overrides = SCENES[name]
     done = Execution(load(scene, overrides), scratch).run()
-    if done.ending.exit_code:
-        raise SystemExit(f"{name} ended {done.ending.state}: {done.ending.reason}")
+    if done.exit_code:
+        raise SystemExit(f"{name} ended {done.state}: {done.reason}")
     report = write(done.folder, read(done.folder))
     for stem in ("figure", "summary"):
         picture = done.folder / f"{stem}.png"

@@ -192,7 +192,7 @@ class Opening(QObject):
 
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
-        self.ending = f"{done.ending.state} · {done.folder.name} · {done.spikes} spikes"
+        self.ending = f"{done.state} · {done.folder.name} · {done.spikes} spikes"
         source = self._panels.session.source
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)

@@ -7,9 +7,9 @@ is docs/tutorial/adaptation.md. The tests execute this file as it stands.
 import sys
 from pathlib import Path
 
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.spike_train import rate, respond
+from tactile_lab.engine.execution import Execution
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
@@ -27,7 +27,7 @@ scene = load(
 # 2. Run it. The simulated bench takes about a second; on a real one, name its bench
 #    file: load("hold_10s", bench="my_bench.toml").
 done = Execution(scene, out).run()
-print(f"{done.ending.state}: {done.spikes} spikes, stored in {done.folder}")
+print(f"{done.state}: {done.spikes} spikes, stored in {done.folder}")
 
 # 3. Read it back as plain numbers.
 run = read(done.folder)

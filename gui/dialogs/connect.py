@@ -167,10 +167,10 @@ class Connect(Overlay):
     def _run_ended(self, done: Executed) -> None:
         if not self._running:
             return
-        if done.ending.state is RunState.COMPLETE:
+        if done.state is RunState.COMPLETE:
             self._say_progress("Judging what was recorded …", busy=True)
         else:
-            self._end(f"Not completed: {done.ending.reason or done.ending.state}.")
+            self._end(f"Not completed: {done.reason or done.state}.")
 
     def _reported(self, folder: Path) -> None:
         """Show what a wiring check or a field calibration found, whoever ran it."""

@@ -71,12 +71,12 @@ class Gathering(QObject):
     def end(self, done: Executed, source: LiveSource | None) -> None:
         """The run is on disk now."""
         self.folder = done.folder
-        self._whole = done.ending.state is RunState.COMPLETE
+        self._whole = done.state is RunState.COMPLETE
         self._show(running=False)
         self._fit(source)
         facts = [
             f"<b>{done.folder.name}</b>",
-            done.ending.off.text.partition(" | ")[0],
+            done.off.text.partition(" | ")[0],
             loss_text(done.loss),
         ]
         self._view.show_facts("<br>".join(filter(None, facts)), report=False)

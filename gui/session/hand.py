@@ -16,8 +16,8 @@ from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.by_hand import ManualCoil
     from tactile_lab.bench import Bench
+    from tactile_lab.engine.manual import ManualControl
 
 EVERY = 0.02
 """Seconds between two looks at the coil."""
@@ -41,7 +41,7 @@ class Hand(Task):
     def __init__(self, asked: TakeCoil, tell: Callable[[Told], None]) -> None:
         super().__init__("coil by hand", tell)
         self._asked = asked
-        self._coil: ManualCoil | None = None
+        self._coil: ManualControl | None = None
         self._current: float | None = None
 
     def hold(self, current: float) -> None:
@@ -55,7 +55,7 @@ class Hand(Task):
     def renew(self) -> None:
         """The window lives."""
         if self._coil is not None:
-            self._coil.alive()
+            self._coil.renew()
 
     @property
     def bench(self) -> Bench | None:
@@ -66,29 +66,28 @@ class Hand(Task):
         self._tell(self._drive())
 
     def _drive(self) -> HandOff:
-        from tactile_lab.acquisition.by_hand import ManualCoil
+        from tactile_lab.engine.manual import ManualControl
 
         try:
-            scene = self._asked.request.load()
-            bench = open_bench(scene, needs(scene), realtime=True)
-            coil = ManualCoil(bench)
+            coil = ManualControl(self._asked.request.load(), realtime=True)
         except (TactileLabError, OSError) as error:
             return HandOff(None, str(error), opened=False)
-        coil.start()
+        coil.renew()
+        coil.thread.start()
         with self._lock:
             self._coil = coil
             current = self._current
         if not self._stopped_by(coil) and current is not None:
             coil.hold(current)
         self._watch(coil)
-        return HandOff(coil.off, coil.failure)
+        return HandOff(coil.thread.off, str(coil.thread.failure or ""))
 
-    def _watch(self, coil: ManualCoil) -> None:
+    def _watch(self, coil: ManualControl) -> None:
         """Tell the coil's state as it changes, to the very last."""
         last, said = None, 0.0
-        while not coil.ended:
+        while not coil.thread.ended:
             applied = coil.thread.take_applied()
-            known = coil.state, coil.thread.opened
+            known = coil.coil_state, coil.thread.opened
             if applied or known != last or time.monotonic() - said > AT_LEAST:
                 read = any(one.measured is not None for one in applied)
                 self._tell(CoilByHand(*known, acted=bool(applied), read_back=read))
@@ -98,14 +97,14 @@ class Hand(Task):
 
 def read_field(request: Request, hand: Hand | None) -> FieldByHand:
     """Read the field a few times; of the bench in `hand`, if there is one."""
-    from tactile_lab.acquisition import by_hand
+    from tactile_lab.engine import manual
 
     try:
         bench = hand.bench if hand is not None else None
         if bench is None:
             scene = request.load()
             bench = open_bench(scene, needs(scene), realtime=True)
-        found = by_hand.read_field(bench)
+        found = manual.read_field(bench)
     except (TactileLabError, OSError) as error:
         return FieldByHand(None, f"The field was not read: {error}")
     text = f"{show(found.mean, 'T', 4)} ± {show(found.spread, 'T', 2)}"

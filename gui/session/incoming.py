@@ -205,7 +205,7 @@ class Incoming(Core):
             )
 
     def _ended(self, done: Executed) -> None:
-        ending = done.ending
+        ending = done
         self.coil.left(ending.off)
         self._stop_source()
         self.elapsed = done.duration

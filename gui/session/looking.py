@@ -16,7 +16,7 @@ from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.errors import TactileLabError
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.watching import Watching
+    from tactile_lab.engine.monitor import Monitor
 
 NO_COIL = CoilState(live=False, setpoint=None, measured=None, off=None)
 
@@ -32,7 +32,7 @@ class Looking(Task):
     def __init__(self, asked: StartWatch, tell: Callable[[Told], None]) -> None:
         super().__init__("watch", tell)
         self._asked = asked
-        self._watching: Watching | None = None
+        self._watching: Monitor | None = None
 
     def record(self, asked: RecordWatch) -> None:
         """Keep the last minute as a run, in a thread of its own."""
@@ -61,10 +61,10 @@ class Looking(Task):
             self._tell(Broken(Fault(title, str(error)), None))
 
     def _watch(self) -> None:
-        from tactile_lab.acquisition.watching import Watching
+        from tactile_lab.engine.monitor import Monitor
 
         scene = self._asked.request.load()
-        watching = Watching(scene, realtime=True, emit=self._tell)
+        watching = Monitor(scene, realtime=True, emit=self._tell)
         self._watching = watching
         self._stopped_by(watching)
         gain = scene.bench.magnet.newtons_per_ampere

@@ -30,7 +30,7 @@ from tactile_lab.errors import RefusedError, TactileLabError
 if TYPE_CHECKING:
     from gui.session.twin import LiveTwin
     from tactile_lab.acquisition.ending import Executed
-    from tactile_lab.acquisition.execution import Execution
+    from tactile_lab.engine.execution import Execution
 
 TWINNED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
 """Signals beside which the twin runs."""
@@ -70,7 +70,7 @@ class Running(Task):
 
     def _prepare(self) -> Execution | None:
         from tactile_lab.acquisition.asked_field import AskedField
-        from tactile_lab.acquisition.execution import Execution
+        from tactile_lab.engine.execution import Execution
 
         try:
             scene = self._asked.request.load()
@@ -135,7 +135,7 @@ class Running(Task):
             self._tell(Broken(Fault(title, str(done)), off))
             return
         # an error may hold anything; its words are in the ending's reason
-        self._tell(Ended(replace(done, ending=replace(done.ending, failure=None))))
+        self._tell(Ended(replace(done, failure=None)))
         if self._asked.report:
             start(lambda: self._report(done.folder), "report")
 

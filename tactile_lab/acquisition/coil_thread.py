@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.instrument_thread import InstrumentThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Coil, OffReport
@@ -71,6 +72,12 @@ class CoilThread(InstrumentThread):
         self._waveform: Waveform | None = None
         self._until = 0.0
         self._next = 0.0
+
+    @property
+    def state(self) -> CoilState:
+        """What is known of the coil now."""
+        sent = None if self.last is None else self.last.setpoint
+        return CoilState(self.live, sent, self.measured, self.off)
 
     def energise(self) -> None:
         """Ask for the output to be switched on at 0 A; `live` tells when it is."""

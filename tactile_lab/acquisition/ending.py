@@ -13,7 +13,7 @@ from tactile_lab.errors import TactileLabError
 
 @dataclass(frozen=True)
 class CoilState:
-    """What is known of the coil now.
+    """What is known of the coil now; nothing where there is none.
 
     Attributes:
         live: the output is on.
@@ -22,10 +22,10 @@ class CoilState:
         off: how it was left; None while the run lasts.
     """
 
-    live: bool
-    setpoint: float | None
-    measured: float | None
-    off: OffReport | None
+    live: bool = False
+    setpoint: float | None = None
+    measured: float | None = None
+    off: OffReport | None = None
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,13 @@ class Ending:
     failure: BaseException | None = None
     signal: int | None = None
 
-    def faulted_by(self, failure: TactileLabError) -> Ending:
+    def faulted_by(self, failure: Exception) -> Ending:
         """The same end where something failed after it; an earlier fault stays."""
         if self.state is RunState.FAULTED:
             return self
-        return replace(
-            self, state=RunState.FAULTED, reason=str(failure), failure=failure
-        )
+        known = isinstance(failure, TactileLabError)
+        reason = str(failure) if known else f"{type(failure).__name__}: {failure}"
+        return replace(self, state=RunState.FAULTED, reason=reason, failure=failure)
 
     @property
     def exit_code(self) -> int:
@@ -67,12 +67,11 @@ class Ending:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Executed:
-    """A run that has ended.
+class Executed(Ending):
+    """How a run ended, and what it left.
 
     Attributes:
         folder: where it lies.
-        ending: state, reason, exit code, how the coil was left.
         spikes: detected on line.
         loss: samples and spikes lost; None where it cannot be told.
         duration: of the experiment, s.
@@ -80,7 +79,6 @@ class Executed:
     """
 
     folder: Path
-    ending: Ending
     spikes: int
     loss: Mapping[str, int | None]
     duration: float

@@ -15,7 +15,11 @@ from tactile_lab.bench import Bench, OffReport
 CLOSING = 10.0
 """Seconds an instrument thread gets to close before it is given up."""
 
-Serve = Callable[[Callable[[], bool]], None]
+MOVED = frozenset({"output", "setpoint_A", "range"})
+"""Settings that a run itself moves: the recorded current tells of the coil's, and a
+teslameter picks its range as the field needs it."""
+
+Wait = Callable[[Callable[[], bool]], None]
 
 
 @dataclass
@@ -42,11 +46,11 @@ class Instruments:
         every = (self.coil, self.scope, self.meter)
         return [thread for thread in every if thread is not None]
 
-    def open(self, serve: Serve) -> None:
-        """Open all side by side; `serve(done)` waits and raises what goes wrong."""
+    def open(self, until: Wait) -> None:
+        """Open all side by side; `until(done)` waits and raises what goes wrong."""
         for thread in self.threads:
             thread.start()
-        serve(lambda: all(thread.settled for thread in self.threads))
+        until(lambda: all(thread.settled for thread in self.threads))
         self.raise_failure()
 
     def raise_failure(self) -> None:
@@ -63,6 +67,19 @@ class Instruments:
     def settings_after(self) -> dict[str, dict[str, str]]:
         """Settings read back as the run ended, by instrument."""
         return {thread.name: thread.settings_after for thread in self.threads}
+
+    @property
+    def changes(self) -> list[str]:
+        """Settings that are at the end not as they were at the beginning, one a line.
+
+        What was not read at both times is passed over, and so is what the run moves.
+        """
+        return [
+            f"{thread.name}: {name} was {was} at the start, {value} at the end"
+            for thread in self.threads
+            for name, value in thread.settings_after.items()
+            if (was := thread.settings.get(name, value)) != value and name not in MOVED
+        ]
 
     @property
     def failed(self) -> bool:

@@ -23,7 +23,7 @@ Question = Callable[[str], str]
 T = TypeVar("T")
 
 
-class Errand(Generic[T]):
+class Prompt(Generic[T]):
     """One thing a person is asked for, in a thread of its own.
 
     Args:

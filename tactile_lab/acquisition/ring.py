@@ -82,7 +82,7 @@ class Ring:
     """
 
     def __init__(self, length: float) -> None:
-        self._length = length
+        self.length = length
         self._lock = threading.Lock()
         self._stream: Stream | None = None
         self._zero = 0.0
@@ -120,7 +120,7 @@ class Ring:
         """Hold a block, and forget those that are older than the ring is long."""
         with self._lock:
             self._blocks.append(block)
-            oldest = self._time(block.first + block.samples) - self._length
+            oldest = self._time(block.first + block.samples) - self.length
             while self._time(self._blocks[0].first + self._blocks[0].samples) <= oldest:
                 self._blocks.popleft()
             while self._spikes and self._spikes[0][0][-1] < oldest:

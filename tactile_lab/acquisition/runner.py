@@ -21,9 +21,9 @@ from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import PLACES
-from tactile_lab.acquisition.serving import GRACE, Serving, StopAskedError
+from tactile_lab.acquisition.program import Program
+from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
-from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
 from tactile_lab.trial import Outcome, Trial
@@ -36,10 +36,10 @@ LATE = 0.75
 
 
 class Runner:
-    """Executes one task on one bench, once.
+    """Carries out one program on one bench, once.
 
     Args:
-        task: what to do.
+        program: what to do.
         bench: with what; nothing of it is open.
         journal: starts the record, told how the samples are scaled (None: no scope).
         stop: asks for the end.
@@ -49,7 +49,7 @@ class Runner:
 
     def __init__(
         self,
-        task: Task,
+        program: Program,
         bench: Bench,
         journal: Callable[[Stream | None], Journal],
         stop: StopRequest,
@@ -58,15 +58,15 @@ class Runner:
     ) -> None:
         self.intake = Intake(live)
         self._live = live
-        self._task = task
+        self._program = program
         self._clock = bench.clock
         self._account = Account(bench.clock, journal, emit)
         self._stop = stop
         self._emit = emit
         self._lease = Lease(bench.clock)
         self.instruments = Instruments.of(bench, stop, self._lease)
-        self._serving = Serving(
-            task,
+        self._pump = Pump(
+            program,
             bench.clock,
             self.instruments,
             self.intake,
@@ -103,25 +103,25 @@ class Runner:
             finally:  # whatever a watcher does
                 self._lease.end()
                 off = self.instruments.close()
-            self._serving.last_words()
+            self._pump.last_words()
             self._account.state(state, reason or off.text)
         return Ending(state, off, reason, failure, self._stop.signal)
 
     def _connect(self) -> None:
         self._account.state(events.RunState.CONNECTING, "opening instruments")
-        self.instruments.open(self._serving.serve)
-        for text in self._task.doubts(self.instruments.settings):
+        self.instruments.open(self._pump.until)
+        for text in self._program.doubts(self.instruments.settings):
             self._account.warn(text)
-        self._serving.start_stream()
+        self._pump.start_stream()
         coil = self.instruments.coil
         if coil is not None:
             coil.energise()
-            self._serving.serve(lambda: coil.live)
+            self._pump.until(lambda: coil.live)
         self._account.state(events.RunState.RUNNING, "running")
 
     def _play_all(self) -> None:
-        self._serving.rest_until(self._clock.now() + BASELINE)
-        trials = self._task.trials()
+        self._pump.rest_until(self._clock.now() + BASELINE)
+        trials = self._program.trials()
         outcome: Outcome | None = None
         try:
             while True:
@@ -134,7 +134,7 @@ class Runner:
             pass
         finally:
             trials.close()
-        self._serving.stop_stream()
+        self._pump.stop_stream()
 
     def _play(self, index: int, trial: Trial) -> Outcome:
         """Play one trial while everything streams."""
@@ -144,16 +144,16 @@ class Runner:
         drift = self._drifted(rest)
         begin, start = self._begin(index, trial)
         end = begin + trial.length
-        asked = self._task.asked_field if trial.hold is not None else None
+        asked = self._program.asked_field if trial.hold is not None else None
         # a current that waits for a person is watched as long as that takes
         skipped = self._play_current(trial, begin, math.inf if asked else end)
         scope = self.instruments.scope
         if scope is None:
-            self._serving.rest_until(end)
+            self._pump.rest_until(end)
         else:
             scope.poll_at(end)
-            target = start + trial.length - 2 * self._task.interval
-            self._serving.serve(lambda: self.intake.reached >= target, end + GRACE)
+            target = start + trial.length - 2 * self._program.interval
+            self._pump.until(lambda: self.intake.reached >= target, end + GRACE)
             if self.intake.reached < target:
                 raise InstrumentError(
                     f"The scope is {target - self.intake.reached:.3g} s of samples "
@@ -193,7 +193,7 @@ class Runner:
         """Have a person read the field of the trial that began at `start` s."""
         coil = self.instruments.coil
         current = 0.0 if coil is None or coil.last is None else coil.last.setpoint
-        field, doubt = self._serving.errand(lambda: asked.read(current))
+        field, doubt = self._pump.ask(lambda: asked.read(current))
         if doubt is not None:
             self._account.warn(doubt)
         held_from, held_to = trial.hold or (0.0, trial.length)
@@ -205,7 +205,7 @@ class Runner:
         Raises:
             LimitError: beyond the protocol's limit.
         """
-        watch = self._task.drift
+        watch = self._program.drift
         if watch is None or "V_C1" not in rest:
             return None
         return watch.before(rest["V_C1"], self._account.now)
@@ -213,12 +213,12 @@ class Runner:
     def _pause(self, index: int, trial: Trial) -> Outcome:
         """A planned recovery: the coil holds, nothing is streamed or stored."""
         begin, start = self._begin(index, trial)
-        self._serving.stop_stream()
+        self._pump.stop_stream()
         self._play_current(trial, begin, begin + trial.length)
-        self._serving.rest_until(begin + trial.length)
+        self._pump.rest_until(begin + trial.length)
         self._account.pause(start, self._account.now)
-        self._serving.start_stream()
-        self._serving.rest_until(self._clock.now() + BASELINE)
+        self._pump.start_stream()
+        self._pump.rest_until(self._clock.now() + BASELINE)
         return Outcome(
             trial=trial,
             index=index,
@@ -230,19 +230,19 @@ class Runner:
     def _move_probes(self, where: str) -> None:
         """Have the probes put elsewhere; nothing is streamed meanwhile."""
         start = self._account.now
-        self._serving.stop_stream()
+        self._pump.stop_stream()
         if self._place_probes is not None:
             self._place_probes(where)
-        elif self._task.ask is not None:
-            ask = self._task.ask
-            self._serving.errand(lambda: ask(PLACES[where]))
+        elif self._program.ask is not None:
+            ask = self._program.ask
+            self._pump.ask(lambda: ask(PLACES[where]))
         else:
             raise RefusedError(f"Nobody is there to ask: {PLACES[where]}")
         self._probes = where
         self._account.pause(start, self._account.now)
-        self._serving.start_stream()
+        self._pump.start_stream()
         # the newest samples lag by a poll: none from before the move count as rest
-        self._serving.rest_until(self._clock.now() + 2 * BASELINE)
+        self._pump.rest_until(self._clock.now() + 2 * BASELINE)
 
     def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
         """Begin a trial now: its start in clock time and in run time, s."""
@@ -258,9 +258,9 @@ class Runner:
             return 0
         before = coil.last.setpoint if coil.last is not None else 0.0
         interval = coil.coil.update_interval
-        current = self._task.current_for(trial, interval, before)
-        if self._task.drift is not None:
-            self._task.drift.plays(current, self._account.axis(begin))
+        current = self._program.current_for(trial, interval, before)
+        if self._program.drift is not None:
+            self._program.drift.plays(current, self._account.axis(begin))
         coil.play(current.shifted(begin), end)
         return coil.skipped
 

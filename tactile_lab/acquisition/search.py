@@ -39,6 +39,11 @@ class SpikeSearch:
         self.signal = signal
         self._learnt: tuple[int, int] | None = None
 
+    @classmethod
+    def of(cls, scene: Scene, signal: str | None) -> SpikeSearch | None:
+        """The search on a channel; None where no spikes are looked for."""
+        return None if signal is None else cls(scene, signal)
+
     @property
     def must_learn(self) -> bool:
         """Whether the threshold is still to be estimated from noise."""

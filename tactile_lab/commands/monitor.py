@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 import time
@@ -12,12 +11,12 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from tactile_lab.commands.run import SIGNALS, caught_signals, noted
+from tactile_lab.commands.attended import run_attended
+from tactile_lab.commands.run import noted
 from tactile_lab.commands.terminal import fail, refusing, scene_options, warn
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.ending import Ending
-    from tactile_lab.acquisition.watching import Watching
+    from tactile_lab.engine.monitor import Monitor
 
 ENDLESS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')
 """Until stopped; what the user sets comes after and wins."""
@@ -60,56 +59,34 @@ def command(
     pace with the clock.
     """
     with refusing():
-        from tactile_lab.acquisition.watching import Watching
+        from tactile_lab.engine.monitor import Monitor
         from tactile_lab.scene.load import load
 
         loaded = load(scene or "monitor", (*ENDLESS, *overrides), bench)
         kept = noted(notes)
-        watching = Watching(loaded, realtime=True, keep=keep)
-    ending = _watch(watching, out, kept)
-    if ending is None:
-        fail("watching ended with an error of the program", 3)
-    elif ending.exit_code and ending.signal is None:
+        monitor = Monitor(loaded, realtime=True, keep=keep)
+    asked = _entered(sys.stdin)
+    sight = Sight(sys.stderr)
+
+    def look() -> None:
+        sight.show(str(monitor.sensor))
+        if _any(asked):
+            sight.wipe()
+            _record(monitor, out, kept)
+
+    ending = run_attended(monitor, look, {RECORD: lambda: asked.put(RECORD)})
+    sight.wipe()
+    if ending.exit_code and ending.signal is None:
         fail(f"{ending.state}: {ending.reason} {ending.off.text}", ending.exit_code)
 
 
-def _watch(watching: Watching, out: Path, notes: dict[str, str]) -> Ending | None:
-    """Watch until it ends, recording on demand."""
-    ended: list[Ending] = []
-
-    def work() -> None:
-        ended.append(watching.run())
-
-    worker = threading.Thread(target=work, name="runner")
-    asked = _entered(sys.stdin)
-    sight = Sight(sys.stderr)
-    with caught_signals((*SIGNALS, RECORD)) as caught:
-        worker.start()
-        told = 0
-        while worker.is_alive():
-            worker.join(0.05)
-            for number in caught[told:]:
-                name = signal.Signals(number).name
-                if name == RECORD:
-                    asked.put(name)
-                else:
-                    watching.stop(f"stopped by {name}", signal=number)
-            told = len(caught)
-            sight.show(str(watching.standing))
-            if _any(asked):
-                sight.wipe()
-                _record(watching, out, notes)
-    sight.wipe()
-    return ended[0] if ended else None
-
-
-def _record(watching: Watching, out: Path, notes: dict[str, str]) -> None:
+def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:
     from tactile_lab.errors import TactileLabError
     from tactile_lab.report.from_run import read
     from tactile_lab.report.write import write
 
     try:
-        folder = watching.record(out, notes)
+        folder = monitor.record(out, notes)
         click.echo(f"run     {folder}")
         write(folder, read(folder))
     except (TactileLabError, OSError) as reason:
@@ -117,7 +94,7 @@ def _record(watching: Watching, out: Path, notes: dict[str, str]) -> None:
 
 
 class Sight:
-    """The standing on stderr: one line that changes on a terminal, lines elsewhere."""
+    """The sensor's state on stderr: one changing line on a terminal, else lines."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactile_lab.commands.attended import run_attended
 from tactile_lab.commands.read_off import field_reader
 from tactile_lab.commands.terminal import (
     Progress,
@@ -27,14 +24,12 @@ from tactile_lab.commands.terminal import (
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
     from tactile_lab.acquisition.events import Event
-    from tactile_lab.acquisition.execution import Execution
     from tactile_lab.acquisition.model_comparison import ModelComparison
     from tactile_lab.bench import Bench
+    from tactile_lab.engine.execution import Execution
     from tactile_lab.report.write import Report
     from tactile_lab.scene.scene import Scene
     from tactile_lab.store.compare import Differences
-
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 @click.command()
@@ -103,7 +98,7 @@ def command(
     """
     began = time.monotonic()
     with refusing():
-        from tactile_lab.acquisition.execution import Execution
+        from tactile_lab.engine.execution import Execution
 
         if temperature is not None:
             overrides = (*overrides, f"conditions.temperature={temperature}")
@@ -123,11 +118,14 @@ def command(
         for text in execution.plan.warnings:
             warn(text)
     narrator.expect(execution)
-    done, error = run_guarded(execution)
-    narrator.close()
-    if done is None:
-        fail(str(error), 3)
+    try:
+        done = run_attended(execution)
+    except Exception as error:
+        narrator.close()
+        off = execution.coil_state.off
+        fail(str(error), 3 if off is None or off.verified else 4)
         return
+    narrator.close()
     report = None if no_report else _report(done)
     changed = None if again is None else _differences(again, done)
     if as_json:
@@ -136,8 +134,8 @@ def command(
         _print(done, report, time.monotonic() - began)
         if changed is not None:
             click.echo(f"against {again}\n{changed}")
-    if done.ending.exit_code:
-        fail(_why(done), done.ending.exit_code)
+    if done.exit_code:
+        fail(_why(done), done.exit_code)
 
 
 def record(bench: Bench, folder: Path) -> None:
@@ -223,61 +221,20 @@ class Narrator:
             self._progress.close()
 
 
-def run_guarded(execution: Execution) -> tuple[Executed | None, Exception | None]:
-    """Run in a thread of its own while this one minds the signals.
-
-    The first signal asks for a safe end, a second for one without ramp; no number of
-    them ends the program before the coil's state has been verified or given up.
-    """
-    done: list[Executed] = []
-    failed: list[Exception] = []
-
-    def work() -> None:
-        try:
-            done.append(execution.run())
-        except Exception as error:
-            failed.append(error)
-
-    worker = threading.Thread(target=work, name="runner")
-    with caught_signals() as caught:
-        worker.start()
-        told = 0
-        while worker.is_alive():
-            worker.join(0.05)
-            for number in caught[told:]:
-                name = signal.Signals(number).name
-                execution.stop(f"stopped by {name}", signal=number)
-            told = len(caught)
-    return (done[0] if done else None, failed[0] if failed else None)
-
-
-@contextmanager
-def caught_signals(names: Sequence[str] = SIGNALS) -> Iterator[list[int]]:
-    """The numbers of the signals of those names, as they come."""
-    caught: list[int] = []
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    before = {n: signal.signal(n, lambda got, _: caught.append(got)) for n in numbers}
-    try:
-        yield caught
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def answer(
     done: Executed, report: Report | None, changed: Differences | None = None
 ) -> dict[str, Any]:
     """The documented object (docs/json.md)."""
     return {
         "run": str(done.folder),
-        "status": str(done.ending.state),
+        "status": str(done.state),
         "spikes": done.spikes,
         "loss": dict(done.loss),
         "duration_s": done.duration,
         "run_time_s": done.took,
-        "reason": done.ending.reason,
-        "coil": done.ending.off.text,
-        "coil_verified_off": done.ending.off.verified,
+        "reason": done.reason,
+        "coil": done.off.text,
+        "coil_verified_off": done.off.verified,
         "report": None if report is None else str(report.html),
         "differences": None if changed is None else asdict(changed),
     }
@@ -364,4 +321,4 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
 
 
 def _why(done: Executed) -> str:
-    return f"{done.ending.state}: {done.ending.reason} {done.ending.off.text}"
+    return f"{done.state}: {done.reason} {done.off.text}"

@@ -5,8 +5,8 @@ from benches import READ_BY_HAND
 
 from tactile_lab.acquisition.asked_field import AskedField, read_off
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.commands.read_off import field_reader, readings
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import QuantityError, RefusedError, SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.report.findings import find
@@ -45,8 +45,8 @@ def test_a_calibration_from_what_is_read_off(tmp_path, given):
     file = tmp_path / "shown.txt" if given == "in a file" else None
     reader = field_reader(loaded, person, file)
     done = Execution(loaded, tmp_path / "runs", asked_field=reader).run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
-    assert done.ending.off.verified
+    assert done.state is RunState.COMPLETE, done.reason
+    assert done.off.verified
     with Run.load(done.folder) as run:
         assert run.field["field"] == pytest.approx([float(b) * 1e-3 for b in SHOWN])
     told = " ".join(find(read(done.folder)).conclusion.sentences)
@@ -69,8 +69,8 @@ def test_a_person_who_leaves_ends_the_run_safely(tmp_path):
     loaded = scene(tmp_path)
     reader = field_reader(loaded, gone, None)
     done = Execution(loaded, tmp_path / "runs", asked_field=reader).run()
-    assert done.ending.exit_code == 3
-    assert "the terminal was closed" in done.ending.reason
+    assert done.exit_code == 3
+    assert "the terminal was closed" in done.reason
 
 
 def test_only_a_scene_that_records_the_field_asks(tmp_path):

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from sim_backend.bench import open_bench
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.acquisition.field_mean import AVERAGING, FieldMean
 from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
@@ -50,7 +50,7 @@ def scene(folder, range="500 mV", overrides=SHORT, more=""):
 def test_a_calibration_reads_the_field_from_the_scope(tmp_path):
     loaded = scene(tmp_path)
     done = Execution(loaded, tmp_path / "runs").run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     with Run.load(done.folder) as run:
         assert "field" not in run.signals
         field = run.field
@@ -71,8 +71,8 @@ def test_the_meter_s_range_is_watched(tmp_path):
     assert "expected to reach" in " ".join(plan(loaded, preview=False).warnings)
     bench = open_bench(loaded, needs(loaded))
     done = Execution(loaded, tmp_path / "runs", bench=bench).run()
-    assert done.ending.exit_code == 3
-    assert "scope input B" in done.ending.reason
+    assert done.exit_code == 3
+    assert "scope input B" in done.reason
 
 
 def test_a_coarse_range_is_warned_of(tmp_path):

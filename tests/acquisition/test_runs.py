@@ -8,7 +8,7 @@ import pytest
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
@@ -23,9 +23,9 @@ def codes(ran):
 
 def test_the_demo_finds_the_papers_spikes_and_loses_nothing(run_scene):
     ran = run_scene()
-    assert ran.done.ending.state is RunState.COMPLETE
-    assert ran.done.ending.exit_code == 0
-    assert ran.done.ending.off.verified
+    assert ran.done.state is RunState.COMPLETE
+    assert ran.done.exit_code == 0
+    assert ran.done.off.verified
     counts = [
         e.outcome.spike_times.size for e in ran.told if isinstance(e, events.TrialEnded)
     ]
@@ -120,7 +120,7 @@ def test_V_C1_alone_searches_no_spikes_and_opens_one_channel(run_scene, short):
 
 def test_the_field_is_read_while_the_coil_plays(run_scene, short):
     ran = run_scene(*short, 'record.signals=["field"]')
-    assert ran.done.ending.state is RunState.COMPLETE, ran.done.ending.reason
+    assert ran.done.state is RunState.COMPLETE, ran.done.reason
     with ran.stored() as run:
         assert run.signals == ()
         assert run.field["field"].size > 5
@@ -174,9 +174,9 @@ def test_stopping_keeps_the_data_and_leaves_the_coil_off(run_scene, short):
             execution.stop("a person pressed STOP")
 
     ran = run_scene(*short, watch=stop_at_half)
-    assert ran.done.ending.state is RunState.ABORTED
-    assert ran.done.ending.off.verified
-    assert ran.done.ending.reason == "a person pressed STOP"
+    assert ran.done.state is RunState.ABORTED
+    assert ran.done.off.verified
+    assert ran.done.reason == "a person pressed STOP"
     with ran.stored() as run:
         assert run.info["status"] == "aborted"
         assert 0.5e6 < len(run.signal("V_K")) < 1.6e6
@@ -195,9 +195,9 @@ def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(
             scene, needs(scene), scope_faults=[Fault(kind="unplug", sample=700_000)]
         ),
     )
-    assert ran.done.ending.state is RunState.FAULTED
-    assert ran.done.ending.exit_code == 3
-    assert "scope" in ran.done.ending.reason.lower()
+    assert ran.done.state is RunState.FAULTED
+    assert ran.done.exit_code == 3
+    assert "scope" in ran.done.reason.lower()
     with ran.stored() as run:
         assert run.info["status"] == "faulted"
         assert len(run.signal("V_K")) >= 600_000
@@ -219,9 +219,9 @@ def test_a_protocol_that_fails_in_the_middle_leaves_the_coil_off(run_scene, tmp_
         "            raise RuntimeError('the protocol has a bug')\n"
     )
     ran = run_scene(scene=str(file))
-    assert ran.done.ending.state is RunState.FAULTED
-    assert ran.done.ending.off.verified
-    assert "the protocol has a bug" in ran.done.ending.reason
+    assert ran.done.state is RunState.FAULTED
+    assert ran.done.off.verified
+    assert "the protocol has a bug" in ran.done.reason
     assert "in trials" in (ran.folder / "traceback.txt").read_text()
 
 
@@ -234,9 +234,9 @@ def test_a_full_disk_ends_the_run_with_the_coil_off_and_the_data_kept(
             monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
 
     ran = run_scene(*short, watch=fill)
-    assert ran.done.ending.exit_code == 3
-    assert ran.done.ending.off.verified
-    assert "Free some space" in ran.done.ending.reason
+    assert ran.done.exit_code == 3
+    assert ran.done.off.verified
+    assert "Free some space" in ran.done.reason
     with ran.stored() as run:
         assert run.status == "faulted"
         assert len(run.signal("V_K")) >= 0.5e6
@@ -269,8 +269,8 @@ def test_a_disk_that_fails_at_the_very_end_is_no_complete_run(
             monkeypatch.setattr(SampleColumn, "write_pyramid", refuse)
 
     ran = run_scene(*short, watch=fail_last)
-    assert ran.done.ending.exit_code == 3
-    assert "No space left" in ran.done.ending.reason
+    assert ran.done.exit_code == 3
+    assert "No space left" in ran.done.reason
     assert ran.stored().info["status"] == "faulted"
 
 
@@ -304,7 +304,7 @@ def test_recovery_is_neither_streamed_nor_stored_nor_a_gap(run_scene, tmp_path):
         "        yield Trial(force=pulse, label='two', level=0.2)\n"
     )
     ran = run_scene(scene=str(file))
-    assert ran.done.ending.state is RunState.COMPLETE, ran.done.ending.reason
+    assert ran.done.state is RunState.COMPLETE, ran.done.reason
     ended = [e.outcome for e in ran.told if isinstance(e, events.TrialEnded)]
     assert [o.trial.label for o in ended] == ["one", "recovery", "two"]
     assert ended[2].spike_times.size > 0
@@ -333,6 +333,6 @@ def test_a_hung_loop_loses_its_lease_and_the_coil_is_made_safe(run_scene, short)
             clock.sleep_until(clock.now() + 3.0)
 
     ran = run_scene(*short, watch=hang_once)
-    assert ran.done.ending.state is RunState.FAULTED
-    assert "lease" in ran.done.ending.reason
-    assert ran.done.ending.off.verified
+    assert ran.done.state is RunState.FAULTED
+    assert "lease" in ran.done.reason
+    assert ran.done.off.verified

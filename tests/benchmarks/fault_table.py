@@ -26,7 +26,7 @@ from usb_fault_rows import session
 
 from sim_backend.bench import open_bench
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Executed, Execution
+from tactile_lab.engine.execution import Executed, Execution
 from tactile_lab.errors import TactileLabError
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
@@ -67,11 +67,11 @@ def outcome(scene: Scene, injection: Injection, folder: Path) -> tuple[str, str]
     done = Execution(scene, folder, bench=bench).run()
     struck = made or _struck(bench, end)
     really_off = not source.output_on and abs(source.measured_current()) < OFF_CURRENT
-    told = done.ending.reason or ""
+    told = done.reason or ""
     if not struck:
         return MISSED, told
     if injection.bug and (done.folder / "traceback.txt").exists():
-        return (ENDED if done.ending.off.verified and really_off else WRONG), told
+        return (ENDED if done.off.verified and really_off else WRONG), told
     return _judged(done, really_off), told
 
 
@@ -82,7 +82,7 @@ def _struck(bench: Any, end: Any) -> bool:
 
 
 def _judged(done: Executed, really_off: bool) -> str:
-    ending = done.ending
+    ending = done
     if (
         ending.off.verified
         and not really_off

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from provenance import provenance
 
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.plugins import scene_names
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
@@ -32,8 +32,8 @@ def measure(name: str) -> tuple[str, float]:
     with tempfile.TemporaryDirectory() as scratch:
         execution = Execution(load(name), Path(scratch))
         done = execution.run()
-        if done.ending.exit_code:
-            raise SystemExit(f"{name} ended as {done.ending.state}: {done.ending}")
+        if done.exit_code:
+            raise SystemExit(f"{name} ended as {done.state}: {done}")
         began = time.monotonic()
         write(done.folder, read(done.folder))
         report = time.monotonic() - began

@@ -23,7 +23,7 @@ from gui.app import begin
 from gui.lanes.stored import RunSource
 from gui.session.request import Request
 from gui.state import State
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 
 PULSE = 4.5
 """One pulse of the scene with its ramps and its rest, s."""

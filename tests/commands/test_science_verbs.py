@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.cli import cli
+from tactile_lab.engine.execution import Execution
 from tactile_lab.scene.load import load
 
 

@@ -5,12 +5,12 @@ import json
 
 import pytest
 
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.analysis.field_calibration import (
     FieldStep,
     fit_field,
     write_calibration,
 )
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.plan import plan
 from tactile_lab.report.from_run import read
@@ -84,7 +84,7 @@ def test_a_force_the_calibration_does_not_cover_is_refused(calibrated):
 def test_a_calibrated_run_states_what_it_knows(calibrated, tmp_path):
     scene = calibrated(*SHORT, "bench.magnet.geometry_uncertainty=0.05")
     done = Execution(scene, tmp_path / "runs").run()
-    assert done.ending.exit_code == 0, done.ending.reason
+    assert done.exit_code == 0, done.reason
     report = write(done.folder, read(done.folder))
     found = json.loads(report.results.read_text(encoding="utf-8"))
     (trial,) = found["trials"]
@@ -101,9 +101,9 @@ def test_another_coil_is_refused_before_it_is_switched_on(calibrated, tmp_path):
         tmp_path / "runs",
         emit=told.append,
     ).run()
-    assert done.ending.exit_code == 3
-    assert done.ending.off.verified
-    assert "belongs to the coil KEPCO of the other lab" in done.ending.reason
+    assert done.exit_code == 3
+    assert done.off.verified
+    assert "belongs to the coil KEPCO of the other lab" in done.reason
     assert not any(type(event).__name__ == "CoilCurrent" for event in told)
 
 
@@ -113,7 +113,7 @@ def test_another_coil_can_be_allowed(calibrated, tmp_path):
     )
     told = []
     done = Execution(scene, tmp_path / "runs", emit=told.append).run()
-    assert done.ending.exit_code == 0
+    assert done.exit_code == 0
     messages = [e.text for e in told if type(e).__name__ == "Message"]
     assert any("allow_other_coil" in text for text in messages)
     assert "allow_other_coil" in " ".join(read(done.folder).warnings)

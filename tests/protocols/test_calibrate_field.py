@@ -5,8 +5,8 @@ import json
 import pytest
 
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.calibration import read_calibration
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
@@ -26,7 +26,7 @@ SHORT = (
 def calibrated(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     done = Execution(load("calibrate_field", SHORT), folder).run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     write(done.folder, read(done.folder))
     return done.folder
 

@@ -16,7 +16,7 @@ from protocols.threshold_search import ThresholdSearch
 from protocols.waveform import ForceTable
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_V_C1
@@ -163,7 +163,7 @@ SHORT = (
 
 def test_a_run_tells_f_at_zero_and_the_rest_before_every_trial(tmp_path):
     done = Execution(load("demo", SHORT), tmp_path).run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     write(done.folder, read(done.folder))
     found = json.loads((done.folder / "results.json").read_text())
     zero = found["conclusion"]["force_at_zero"]
@@ -182,9 +182,9 @@ def test_a_run_whose_rest_drifts_ends_safely_with_its_data(tmp_path):
     """The remanent force of an undemagnetised core moves the rest by 15 mV."""
     scene = load("demo", (*SHORT, "protocol.drift_limit=5 mV"))
     done = Execution(scene, tmp_path).run()
-    assert done.ending.state is RunState.FAULTED
-    assert "V_C1 at rest has drifted" in (done.ending.reason or "")
-    assert done.ending.off.verified
+    assert done.state is RunState.FAULTED
+    assert "V_C1 at rest has drifted" in (done.reason or "")
+    assert done.off.verified
     assert done.spikes == 0  # the 200 mN trial was never played
     assert len(read(done.folder).trials) == 2
 

@@ -7,7 +7,7 @@ import pytest
 
 from sim_backend.bench import open_bench, options
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.report.findings import find
@@ -25,7 +25,7 @@ def checked(folder, *overrides, **faults):
     done = Execution(
         scene, folder, bench=open_bench(scene, needs(scene), world=world)
     ).run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     findings = find(read(done.folder))
     values = json.loads(json.dumps(results(findings)))["conclusion"]
     return values, findings.conclusion.sentences
@@ -136,7 +136,7 @@ def test_what_the_bench_does_not_measure_is_not_checked(tmp_path):
     (tmp_path / "bare.toml").write_text(BARE)
     scene = load("wiring_check", SHORT, bench=str(tmp_path / "bare.toml"))
     done = Execution(scene, tmp_path / "runs").run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     channels = find(read(done.folder)).conclusion.values["channels"]
     assert {name: c["ok"] for name, c in channels.items()} == {
         "V_C1": True,
@@ -180,7 +180,7 @@ def test_a_person_is_asked_for_each_place_in_turn(tmp_path):
 
     bench = replace(bench, place_probes=None)
     done = Execution(scene, tmp_path, bench=bench, ask=ask).run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     assert ["0 V" in a or "V_S" in a for a in asked] == [True, True, False]
     channels = find(read(done.folder)).conclusion.values["channels"]
     assert channels["V_C1"]["ok"], channels
@@ -194,6 +194,6 @@ def test_a_person_who_goes_away_ends_the_run_safely(tmp_path):
         raise EOFError("the terminal was closed")
 
     done = Execution(scene, tmp_path, bench=bench, ask=gone).run()
-    assert done.ending.state is RunState.FAULTED
-    assert "the terminal was closed" in done.ending.reason
-    assert done.ending.off.verified
+    assert done.state is RunState.FAULTED
+    assert "the terminal was closed" in done.reason
+    assert done.off.verified

@@ -10,7 +10,7 @@ from sim_backend.bench import open_bench
 from sim_backend.picoscope.faults import Fault
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
@@ -66,7 +66,7 @@ def run(folder: Path, *faults: Fault) -> tuple[Executed, int]:
 )
 def test_faults_while_streaming(tmp_path: Path, fault: Fault, reason: str) -> None:
     done, samples = run(tmp_path, fault)
-    ending = done.ending
+    ending = done
     assert ending.state is RunState.FAULTED
     assert ending.exit_code == 3
     assert ending.off.verified, ending.off.text
@@ -81,8 +81,8 @@ def test_faults_while_streaming(tmp_path: Path, fault: Fault, reason: str) -> No
 )
 def test_unplugged_before_the_first_sample(tmp_path: Path, call: str) -> None:
     done, samples = run(tmp_path, Fault(kind="unplug", call=call))
-    assert done.ending.state is RunState.FAULTED
-    assert done.ending.off.verified
+    assert done.state is RunState.FAULTED
+    assert done.off.verified
     assert samples == 0
 
 
@@ -101,7 +101,7 @@ def test_unplugged_before_the_first_sample(tmp_path: Path, call: str) -> None:
 )
 def test_what_a_run_survives(tmp_path: Path, fault: Fault) -> None:
     done, samples = run(tmp_path, fault)
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
-    assert done.ending.off.verified
+    assert done.state is RunState.COMPLETE, done.reason
+    assert done.off.verified
     assert dict(done.loss) == {"samples": 0, "spikes": 0}
     assert samples >= 300_000

@@ -10,7 +10,7 @@ from sim_backend.bench import open_bench
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
@@ -56,8 +56,8 @@ def run(folder: Path, fault: SerialFault) -> tuple[Executed, int]:
 )
 def test_what_a_run_survives(tmp_path: Path, fault: SerialFault) -> None:
     done, samples = run(tmp_path, fault)
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
-    assert done.ending.off is not None and done.ending.off.verified
+    assert done.state is RunState.COMPLETE, done.reason
+    assert done.off is not None and done.off.verified
     assert samples > 150_000
 
 
@@ -84,10 +84,10 @@ def test_faults_that_end_a_run_safely(
     tmp_path: Path, fault: SerialFault, reason: str
 ) -> None:
     done, samples = run(tmp_path, fault)
-    assert done.ending.state is RunState.FAULTED
-    assert done.ending.exit_code == 3
-    assert done.ending.off is not None and done.ending.off.verified, done.ending.off
-    assert reason in (done.ending.reason or ""), done.ending.reason
+    assert done.state is RunState.FAULTED
+    assert done.exit_code == 3
+    assert done.off is not None and done.off.verified, done.off
+    assert reason in (done.reason or ""), done.reason
     assert samples > 0
     assert done.loss["samples"] == 0
 
@@ -115,13 +115,13 @@ def test_what_cannot_be_verified_is_not_called_safe(
     tmp_path: Path, fault: SerialFault
 ) -> None:
     done, samples = run(tmp_path, fault)
-    if done.ending.off is not None and done.ending.off.verified:
+    if done.off is not None and done.off.verified:
         # deaf to set-points only: the way out was open and was verified
-        assert fault.line == PULSE and done.ending.exit_code == 3
+        assert fault.line == PULSE and done.exit_code == 3
         return
-    assert done.ending.exit_code == 4
-    assert done.ending.off is not None
-    assert "switch the coil source off at the instrument" in done.ending.off.text
+    assert done.exit_code == 4
+    assert done.off is not None
+    assert "switch the coil source off at the instrument" in done.off.text
     assert samples > 0
 
 
@@ -136,23 +136,23 @@ def test_what_cannot_be_verified_is_not_called_safe(
 )
 def test_faults_before_the_first_sample(tmp_path: Path, fault: SerialFault) -> None:
     done, samples = run(tmp_path, fault)
-    assert done.ending.state is RunState.FAULTED
-    assert done.ending.exit_code in (3, 4)
+    assert done.state is RunState.FAULTED
+    assert done.exit_code in (3, 4)
     assert samples == 0
 
 
 def test_a_compliance_that_is_not_taken_energises_nothing(tmp_path: Path) -> None:
     done, _ = run(tmp_path, SerialFault(kind="refused", line="VOLT 14"))
-    assert done.ending.exit_code == 3
-    assert "-222" in (done.ending.reason or "")
-    assert done.ending.off is not None and done.ending.off.verified
+    assert done.exit_code == 3
+    assert "-222" in (done.reason or "")
+    assert done.off is not None and done.off.verified
 
 
 def test_a_scene_has_the_plug_pulled_to_practise_on(tmp_path: Path) -> None:
     scene = load("demo", (*OVERRIDES, 'simulated.coil_unplugged="1 s"'))
     done = Execution(scene, tmp_path).run()
-    assert done.ending.exit_code == 4, "nobody knows what the coil does"
-    assert done.ending.off.verified is False
+    assert done.exit_code == 4, "nobody knows what the coil does"
+    assert done.off.verified is False
     assert 0.5 < done.duration < 1.5
     kept = load(done.folder / "scene.toml").simulated
     assert kept.coil_unplugged == 1.0

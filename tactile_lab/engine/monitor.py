@@ -1,10 +1,10 @@
-"""Watching the sensor with the coil off: nothing is kept but what is asked for.
+"""Monitoring the sensor with the coil off: nothing is kept but what is asked for.
 
-from tactile_lab.acquisition.watching import Watching
+from tactile_lab.engine.monitor import Monitor
 
-watching = Watching(load("monitor"))      # opens nothing
-Thread(target=watching.run).start()       # until watching.stop("...")
-folder = watching.record(Path("runs"))    # the last 60 s as a run
+monitor = Monitor(load("monitor"))       # opens nothing
+Thread(target=monitor.run).start()       # until monitor.stop("...")
+folder = monitor.record("runs")          # the last 60 s as a run
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from pathlib import Path
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
-from tactile_lab.acquisition.live import Live
-from tactile_lab.acquisition.provenance import keep_scene, origin, temperature
+from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.acquisition.stop import StopRequest
-from tactile_lab.acquisition.task import Task
-from tactile_lab.bench import Bench, Stream
+from tactile_lab.bench import Bench
+from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
+from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.plan import plan
 from tactile_lab.plugins import open_bench
@@ -31,7 +30,6 @@ from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
-from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
@@ -41,25 +39,32 @@ KEPT = 60.0
 MOST = 1_000_000_000
 """Bytes that may be held."""
 LOOK = 0.5
-"""Length of the record that a standing is told from, s."""
+"""Length of the record that the sensor's state is told from, s."""
 SILENT = 2.0
 """Time without a spike after which the rate counts as 0, s."""
 
 
 @dataclass(frozen=True)
-class Standing:
-    """Where the sensor stands now.
+class SensorState:
+    """The sensor at rest, just now.
 
     Attributes:
-        V_C1, V_C2: mean of the last half second, V; None before there is any.
+        critical_V_C1: the sensor fires below it, V.
+        V_C1, V_C2: mean of the newest samples, V; None before there is any.
         rate: of the last two spikes, Hz; 0 where they are long ago.
-        distance: of V_C1 from the critical V_C1, V; above 0 the sensor is silent.
+        held: how much `record` would keep, s.
     """
 
-    V_C1: float | None
-    V_C2: float | None
-    rate: float
-    distance: float | None
+    critical_V_C1: float
+    V_C1: float | None = None
+    V_C2: float | None = None
+    rate: float = 0.0
+    held: float = 0.0
+
+    @property
+    def distance(self) -> float | None:
+        """V_C1 less the critical one, V; above 0 the sensor is silent."""
+        return None if self.V_C1 is None else self.V_C1 - self.critical_V_C1
 
     def __str__(self) -> str:
         """For a person who trims V_GS."""
@@ -73,7 +78,7 @@ class Standing:
         )
 
 
-class Watching:
+class Monitor(Task[Ending]):
     """A scene without force, run until stopped; making one opens nothing.
 
     Args:
@@ -97,12 +102,12 @@ class Watching:
         emit: events.Emit = events.ignore,
         keep: float = KEPT,
     ) -> None:
-        self.scene = scene
         self.plan = plan(scene, preview=False)
         needed = self.plan.needs
         if needed.coil:
             raise SceneError(
-                f"{scene.name} asks for a force: run it. Watching leaves the coil off."
+                f"{scene.name} asks for a force: run it. The monitor leaves the coil "
+                "off."
             )
         size = 2 * len(needed.channels) * scene.record.sample_rate * keep
         if size > MOST:
@@ -110,53 +115,48 @@ class Watching:
                 f"Holding {show(keep, 's')} takes {size / 1e9:.1f} GB of memory; "
                 f"{MOST / 1e9:g} GB is the limit. Lower record.sample_rate."
             )
-        self.bench = bench or open_bench(scene, needed, realtime=realtime)
-        self.stop = StopRequest(self.bench.clock)
-        self.live = Live()
-        self._emit = emit
+        used = bench or open_bench(scene, needed, realtime=realtime)
+        super().__init__(scene, used, emit)
         self._ring = Ring(keep)
-        on = needed.detect_on
-        self._search = SpikeSearch(scene, on) if on is not None else None
-        self._runner: Runner | None = None
-        self._last: tuple[float, float] = (float("-inf"), 0.0)
+        self._search = SpikeSearch.of(scene, needed.detect_on)
+        self._last = (float("-inf"), 0.0)
         self._recording = threading.Lock()
+        self._runner = Runner(
+            Program(
+                trials=scene.protocol.trials,
+                channels=needed.channels,
+                interval=1.0 / scene.record.sample_rate,
+                search=self._search,
+                current_for=_no_current,
+                expected=None,
+                doubts=lambda _: (),
+            ),
+            self.bench,
+            lambda stream: self._ring,
+            self.stop,
+            self.live,
+            self._note_spikes,
+        )
 
     def run(self) -> Ending:
-        """Watch until `stop`, or until the protocol ends."""
-        task = Task(
-            trials=self.scene.protocol.trials,
-            channels=self.plan.needs.channels,
-            interval=1.0 / self.scene.record.sample_rate,
-            search=self._search,
-            current_for=_no_current,
-            expected=None,
-            doubts=lambda _: (),
-        )
-        self._runner = Runner(
-            task, self.bench, self._begin, self.stop, self.live, self._told
-        )
+        """Monitor until `stop`, or until the protocol ends."""
         return self._runner.run()
 
     @property
-    def standing(self) -> Standing:
-        """Where the sensor stands now."""
-        signals = self.live.signals
-        reach = 0.0
-        if signals:
-            newest = self.live.since(self.live.written - 1, signals[0]).time
-            reach = float(newest[-1]) if newest.size else 0.0
+    def sensor(self) -> SensorState:
+        """The sensor just now."""
+        reach = self.live.reach
         levels = self.live.levels(reach - LOOK, reach + 1.0)
         when, rate = self._last
-        V_C1 = levels.get("V_C1")
-        critical = self.scene.circuit.critical_V_C1
-        return Standing(
-            V_C1=V_C1,
-            V_C2=levels.get("V_C2"),
-            rate=rate if reach - when < SILENT else 0.0,
-            distance=None if V_C1 is None else V_C1 - critical,
+        return SensorState(
+            self.scene.circuit.critical_V_C1,
+            levels.get("V_C1"),
+            levels.get("V_C2"),
+            rate if reach - when < SILENT else 0.0,
+            min(reach, self._ring.length),
         )
 
-    def record(self, out: Path, notes: Mapping[str, str] | None = None) -> Path:
+    def record(self, out: Path | str, notes: Mapping[str, str] | None = None) -> Path:
         """Keep what is held as a complete run, from any thread; its folder.
 
         Args:
@@ -171,28 +171,19 @@ class Watching:
         with self._recording:
             about = origin(self.plan, self.bench, all_notes)
             about["planned_s"] = held.length
-            folder = RunFolder.create(out, self.scene.name, about)
+            folder = RunFolder.create(Path(out), self.scene.name, about)
             keep_scene(folder, self.scene)
             self._write(folder, held)
             write_certificate(folder.path)
         return folder.path
 
     def _write(self, folder: RunFolder, held: Held) -> None:
-        found = None
-        if self._search is not None:
-            found = self._search.detection(held.stream)
-            folder.update(detection=self._search.describe(held.stream))
-        magnet = self.scene.bench.magnet
-        layout = Layout(
-            signals=self.plan.needs.stored,
-            detection=found,
-            simulated=self.bench.simulated,
-            attributes={"newtons_per_ampere": magnet.newtons_per_ampere},
+        recorder = Recorder(
+            folder, layout(self.plan, self.bench, folder, self._search, held.stream)
         )
-        recorder = Recorder(folder, layout)
         held.replay(recorder)
         recorder.trial(0, 0.0, held.length, label="watched", level=0.0)
-        settings = {} if self._runner is None else self._runner.instruments.settings
+        settings = self._runner.instruments.settings
         over = [
             channel.signal
             for row, channel in enumerate(held.stream.channels)
@@ -212,14 +203,11 @@ class Watching:
             overrange=sorted(over),
         )
 
-    def _begin(self, stream: Stream | None) -> Ring:
-        return self._ring
-
-    def _told(self, event: events.Event) -> None:
+    def _note_spikes(self, event: events.Event) -> None:
         if isinstance(event, events.SpikesSeen):
             self._last = event.times[-1], event.rates[-1]
         self._emit(event)
 
 
 def _no_current(trial: Trial, update_interval: float, before: float) -> Waveform:
-    raise SceneError(f'Trial "{trial.label}" asks for a current; watching has none.')
+    raise SceneError(f'Trial "{trial.label}" asks for a current; a monitor has none.')

@@ -7,7 +7,7 @@ import pytest
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.provenance import temperature
+from tactile_lab.engine.provenance import temperature
 from tactile_lab.planning.needs import needs
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
@@ -76,7 +76,7 @@ def test_a_run_is_read_and_repeated_without_what_it_was_made_from(
     run_scene, own, tmp_path
 ):
     ran = run_scene(scene=str(own))
-    assert ran.done.ending.state is RunState.COMPLETE, ran.done.ending.reason
+    assert ran.done.state is RunState.COMPLETE, ran.done.reason
     files = read_info(ran.folder)["files"]
     assert set(files) == {
         "scene.toml", "inputs/scene.toml", "inputs/tap.py", "inputs/mine.csv",

@@ -7,19 +7,17 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from tactile_lab.acquisition.environment import environment
-from tactile_lab.bench import Bench
+from tactile_lab.acquisition.search import SpikeSearch
+from tactile_lab.bench import Bench, Stream
+from tactile_lab.engine.environment import environment
 from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import Plan
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, RunFolder
+from tactile_lab.store.layout import Layout
 
 Settings = Mapping[str, Mapping[str, str]]
-
-MOVED = frozenset({"output", "setpoint_A", "range"})
-"""Settings that a run itself moves: the recorded current tells of the coil's, and a
-teslameter picks its range as the field needs it."""
 
 
 def origin(plan: Plan, bench: Bench, notes: Mapping[str, str]) -> dict[str, Any]:
@@ -39,6 +37,27 @@ def origin(plan: Plan, bench: Bench, notes: Mapping[str, str]) -> dict[str, Any]
         "notes": dict(notes),
         "environment": environment(),
     }
+
+
+def layout(
+    plan: Plan,
+    bench: Bench,
+    folder: RunFolder,
+    search: SpikeSearch | None,
+    stream: Stream | None,
+) -> Layout:
+    """What the record of a planned run holds; `run.json` says how spikes are found."""
+    detection = None
+    if search is not None and stream is not None:
+        detection = search.detection(stream)
+        folder.update(detection=search.describe(stream))
+    magnet = plan.scene.bench.magnet
+    return Layout(
+        signals=plan.needs.stored,
+        detection=detection,
+        simulated=bench.simulated,
+        attributes={"newtons_per_ampere": magnet.newtons_per_ampere},
+    )
 
 
 def keep_scene(folder: RunFolder, scene: Scene) -> None:
@@ -75,18 +94,6 @@ def temperature(scene: Scene, read_back: Settings) -> dict[str, object]:
             continue
         return {"K": celsius + ZERO_CELSIUS, "from": instrument}
     return {"K": None, "from": None}
-
-
-def changed(before: Settings, after: Settings) -> Iterator[str]:
-    """Settings read back at the end that are not as at the beginning, one line each.
-
-    What was not read at both times is passed over, and so is what the run moves.
-    """
-    for instrument, found in after.items():
-        for name, value in found.items():
-            was = before.get(instrument, {}).get(name, value)
-            if was != value and name not in MOVED:
-                yield f"{instrument}: {name} was {was} at the start, {value} at the end"
 
 
 def _names(files: tuple[Path, ...]) -> dict[Path, str]:

@@ -15,7 +15,7 @@ from tactile_lab.waveform import Waveform
 
 
 @dataclass(frozen=True)
-class Task:
+class Program:
     """All the loop must know of a scene.
 
     Attributes:

@@ -6,8 +6,8 @@ import pytest
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.ring import Ring
-from tactile_lab.acquisition.watching import Watching
 from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.engine.monitor import Monitor
 from tactile_lab.errors import RecordingError, SceneError
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
@@ -30,18 +30,18 @@ def test_record_keeps_the_last_seconds_as_a_whole_run(tmp_path):
         if isinstance(event, events.SpikesSeen):
             seen.extend(event.times)
         if isinstance(event, events.Progress) and event.elapsed > 2.5 and not kept:
-            kept.append((event.elapsed, watching.record(tmp_path, {"why": "trimmed"})))
+            kept.append((event.elapsed, monitor.record(tmp_path, {"why": "trimmed"})))
 
-    watching = Watching(load("monitor", FIRES), emit=emit, keep=1.0)
-    ending = watching.run()
+    monitor = Monitor(load("monitor", FIRES), emit=emit, keep=1.0)
+    ending = monitor.run()
     assert ending.state is RunState.COMPLETE
     assert ending.off.verified
-    assert watching.standing.distance < 0
-    assert watching.standing.rate > 1
-    assert "below it: fires" in str(watching.standing)
+    assert monitor.sensor.distance < 0
+    assert monitor.sensor.rate > 1
+    assert "below it: fires" in str(monitor.sensor)
 
     when, folder = kept[0]
-    later = watching.record(tmp_path)
+    later = monitor.record(tmp_path)
     for path, end in ((folder, when), (later, 4.2)):
         with Run.load(path) as run:
             assert run.status == "complete"
@@ -65,32 +65,32 @@ def test_watching_stops_when_asked_and_stores_nothing_of_itself(tmp_path, monkey
 
     def emit(event):
         if isinstance(event, events.Progress) and event.elapsed > 1:
-            watching.stop("enough")
+            monitor.stop("enough")
 
     overrides = ("protocol.duration=600 s", "record.sample_rate=10 kS/s")
-    watching = Watching(load("monitor", overrides), emit=emit)
-    ending = watching.run()
+    monitor = Monitor(load("monitor", overrides), emit=emit)
+    ending = monitor.run()
     assert ending.state is RunState.ABORTED
     assert ending.reason == "enough"
-    assert watching.standing.distance == pytest.approx(0.37, abs=0.02)
+    assert monitor.sensor.distance == pytest.approx(0.37, abs=0.02)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_pushes_is_not_watched():
     with pytest.raises(SceneError, match="asks for a force"):
-        Watching(load("demo"))
+        Monitor(load("demo"))
 
 
 def test_what_does_not_fit_into_the_memory_is_refused():
     with pytest.raises(SceneError, match=r"GB of memory.*sample_rate"):
-        Watching(load("monitor", ["record.sample_rate=5 MS/s"]))
+        Monitor(load("monitor", ["record.sample_rate=5 MS/s"]))
 
 
 def test_nothing_can_be_kept_before_the_first_sample(tmp_path):
-    watching = Watching(load("monitor"))
-    assert str(watching.standing) == "no V_C1 yet"
+    monitor = Monitor(load("monitor"))
+    assert str(monitor.sensor) == "no V_C1 yet"
     with pytest.raises(RecordingError, match="Nothing to keep"):
-        watching.record(tmp_path / "runs")
+        monitor.record(tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
 
 

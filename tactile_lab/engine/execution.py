@@ -1,10 +1,10 @@
-"""One execution of a scene: bench, run folder, loop, report. The scripting entry point.
+"""One execution of a scene: bench, run folder, loop, record.
 
-from tactile_lab.acquisition.execution import Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.scene.load import load
 
-done = Execution(load("demo"), Path("runs")).run()
-print(done.folder, done.spikes)
+done = Execution(load("demo"), "runs").run()
+print(done.state, done.folder, done.spikes)
 """
 
 from __future__ import annotations
@@ -19,19 +19,13 @@ from tactile_lab.acquisition import events
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.ending import CoilState, Ending, Executed
-from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.person import Ask
-from tactile_lab.acquisition.provenance import (
-    changed,
-    keep_scene,
-    origin,
-    temperature,
-)
+from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.acquisition.stop import StopRequest
-from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Bench, Stream
+from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
+from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.current import current_for
@@ -41,7 +35,6 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate
 from tactile_lab.store.folder import RunFolder, Status
-from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.recorder_thread import RecorderThread
 from tactile_lab.trial import Trial
@@ -55,8 +48,8 @@ STATUS: dict[events.RunState, Status] = {
 """What a run's folder calls the states a run can end in."""
 
 
-class Execution:
-    """A scene about to run. Making one validates and plans; it opens nothing.
+class Execution(Task[Executed]):
+    """A scene about to run. Making one validates, plans and makes the run's folder.
 
     Args:
         scene: what to run.
@@ -69,6 +62,10 @@ class Execution:
             called in a thread of its own.
         asked_field: has a person read the teslameter, where the bench says so.
 
+    Attributes:
+        plan: what the scene needs, leaves out and costs.
+        folder: of the run; it exists from now on.
+
     Raises:
         SceneError, LimitError: the scene cannot be run on its bench.
         RecordingError: the folder cannot be written.
@@ -77,7 +74,7 @@ class Execution:
     def __init__(
         self,
         scene: Scene,
-        out: Path,
+        out: Path | str,
         *,
         bench: Bench | None = None,
         realtime: bool = False,
@@ -86,47 +83,32 @@ class Execution:
         ask: Ask | None = None,
         asked_field: AskedField | None = None,
     ) -> None:
-        self.scene = scene
         self.plan = plan(scene, preview=False)
         self.needs = self.plan.needs
-        self.bench = bench or open_bench(scene, self.needs, realtime=realtime)
+        used = bench or open_bench(scene, self.needs, realtime=realtime)
+        super().__init__(scene, used, emit)
         self._ask = ask
         self._asked_field = asked_field
         self._check_somebody_is_there()
-        self.stop = StopRequest(self.bench.clock)
-        self._emit = emit
-        self._notes = {**scene.conditions.notes, **(notes or {})}
-        self._live = Live()
-        on = self.needs.detect_on
-        self._search = SpikeSearch(scene, on) if on is not None else None
-        self._journal: RecorderThread | None = None
+        self._search = SpikeSearch.of(scene, self.needs.detect_on)
+        self._recorder: RecorderThread | None = None
+        self._runner: Runner | None = None
         self.folder = RunFolder.create(
-            out,
+            Path(out),
             scene.name,
-            origin(self.plan, self.bench, self._notes),
+            origin(self.plan, self.bench, {**scene.conditions.notes, **(notes or {})}),
             needed=self.plan.estimate.disk,
         )
-        self._runner: Runner | None = None
-        self._certificate: Certificate | None = None
-
-    @property
-    def live(self) -> Live:
-        """The newest samples, decimated."""
-        return self._live
 
     @property
     def coil_state(self) -> CoilState:
         """What is known of the coil now."""
-        thread = self._runner.instruments.coil if self._runner else None
-        if thread is None:
-            return CoilState(False, None, None, None)
-        last = thread.last
-        return CoilState(
-            thread.live,
-            last.setpoint if last else None,
-            thread.measured,
-            thread.off,
-        )
+        coil = self._runner.instruments.coil if self._runner else None
+        return CoilState() if coil is None else coil.state
+
+    def note(self, text: str, at: float) -> None:
+        """Put a note of the user, at `at` s of run time, into the run's log."""
+        self.folder.log("note", text, time_s=at)
 
     def run(self) -> Executed:
         """Run to the end; the coil is safe and the folder closed when this returns.
@@ -139,22 +121,24 @@ class Execution:
         began = time.monotonic()
         self._emit(events.FolderMade(self.folder.path))
         keep_scene(self.folder, self.scene)
-        runner = Runner(
-            self._task(),
+        self._runner = runner = Runner(
+            self._program(),
             self.bench,
             self._begin_record,
             self.stop,
-            self._live,
+            self.live,
             self._emit,
         )
-        self._runner = runner
         ending = runner.run()
         took = time.monotonic() - began
-        ending = self._close(runner, ending, took)
-        proof = self._certificate
+        proof: Certificate | None = None
+        try:
+            proof = self._close(runner, ending, took)
+        except Exception as failure:  # whatever it is, the coil's state is told
+            ending = ending.faulted_by(failure)
         return Executed(
+            **vars(ending),
             folder=self.folder.path,
-            ending=ending,
             spikes=runner.intake.spikes,
             loss={
                 "samples": proof.samples if proof else None,
@@ -166,59 +150,47 @@ class Execution:
 
     def _begin_record(self, stream: Stream | None) -> RecorderThread:
         """Start the record; codes can be scaled from now on."""
-        magnet = self.scene.bench.magnet
-        detection = None
-        if self._search is not None and stream is not None:
-            detection = self._search.detection(stream)
-            self.folder.update(detection=self._search.describe(stream))
-        layout = Layout(
-            signals=self.needs.stored,
-            detection=detection,
-            simulated=self.bench.simulated,
-            attributes={"newtons_per_ampere": magnet.newtons_per_ampere},
-        )
-        self._journal = RecorderThread(
-            Recorder(self.folder, layout),
+        self._recorder = RecorderThread(
+            Recorder(
+                self.folder,
+                layout(self.plan, self.bench, self.folder, self._search, stream),
+            ),
             when_full="wait" if self.bench.clock.simulated else "error",
         )
-        return self._journal
+        return self._recorder
 
-    def _close(self, runner: Runner, ending: Ending, took: float) -> Ending:
+    def _close(self, runner: Runner, ending: Ending, took: float) -> Certificate | None:
         """Complete the record and say in it how the run ended, which may fail, too."""
         status = STATUS[ending.state]
-        before = runner.instruments.settings
-        after = runner.instruments.settings_after
+        instruments = runner.instruments
         entries = {
             "reason": ending.reason,
             "coil": ending.off.text,
             "coil_verified_off": ending.off.verified,
             "duration_s": runner.duration,
             "took_s": took,
-            "temperature": temperature(self.scene, before),
-            "instruments": before,
-            "instruments_after": after,
-            "instruments_changed": list(changed(before, after)),
+            "temperature": temperature(self.scene, instruments.settings),
+            "instruments": instruments.settings,
+            "instruments_after": instruments.settings_after,
+            "instruments_changed": instruments.changes,
             "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
             "overrange": sorted(runner.intake.overrange),
         }
+        if ending.failure and not isinstance(ending.failure, TactileLabError):
+            told = "".join(traceback.format_exception(ending.failure))
+            self.folder.write_text("traceback.txt", told)
+        if self._recorder is None:
+            self.folder.finish(status, **entries)
+            return None
         try:
-            if ending.failure and not isinstance(ending.failure, TactileLabError):
-                told = "".join(traceback.format_exception(ending.failure))
-                self.folder.write_text("traceback.txt", told)
-            if self._journal is None:
-                self.folder.finish(status, **entries)
-                return ending
-            try:
-                self._journal.close(status, runner.intake.produced, **entries)
-            finally:
-                self._certificate = write_certificate(self.folder.path)
-        except TactileLabError as failure:
-            return ending.faulted_by(failure)
-        return ending
+            self._recorder.close(status, runner.intake.produced, **entries)
+        finally:
+            proof = write_certificate(self.folder.path)
+        return proof
 
-    def _task(self) -> Task:
+    def _program(self) -> Program:
         scene, needed = self.scene, self.needs
-        return Task(
+        return Program(
             trials=scene.protocol.trials,
             channels=needed.channels,
             interval=1.0 / scene.record.sample_rate,

@@ -9,12 +9,11 @@ from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
-from tactile_lab.acquisition.person import Errand
-from tactile_lab.acquisition.provenance import changed
+from tactile_lab.acquisition.person import Prompt
+from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.acquisition.search import REST, SpikeSearch
 from tactile_lab.acquisition.stop import Lease, StopRequest
-from tactile_lab.acquisition.task import Task
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
@@ -32,11 +31,11 @@ class StopAskedError(Exception):
     """Somebody asked the run to stop."""
 
 
-class Serving:
-    """Serves the instruments of one run whenever its loop waits for something.
+class Pump:
+    """Moves what instruments deliver whenever the loop of a run waits for something.
 
     Args:
-        task: what the run does.
+        program: what the run does.
         clock: the bench's time.
         instruments: their threads.
         intake: takes the samples.
@@ -48,7 +47,7 @@ class Serving:
 
     def __init__(
         self,
-        task: Task,
+        program: Program,
         clock: Clock,
         instruments: Instruments,
         intake: Intake,
@@ -57,7 +56,7 @@ class Serving:
         lease: Lease,
         emit: events.Emit,
     ) -> None:
-        self._task = task
+        self._program = program
         self._clock = clock
         self._instruments = instruments
         self._intake = intake
@@ -67,7 +66,7 @@ class Serving:
         self._emit = emit
         self._told = 0.0
 
-    def serve(self, done: Callable[[], bool], until: float | None = None) -> None:
+    def until(self, done: Callable[[], bool], until: float | None = None) -> None:
         """Do all that comes up until `done()`, or until clock time `until`, s.
 
         Raises:
@@ -101,17 +100,17 @@ class Serving:
 
     def rest_until(self, when: float) -> None:
         """Wait until clock time `when`, s."""
-        self.serve(lambda: self._clock.now() >= when, when)
+        self.until(lambda: self._clock.now() >= when, when)
 
-    def errand(self, work: Callable[[], T]) -> T:
+    def ask(self, work: Callable[[], T]) -> T:
         """What a person comes back with; simulated time stands still meanwhile."""
-        errand = Errand(work)
+        prompt = Prompt(work)
         if not self._clock.simulated:
-            self.serve(lambda: errand.ended)
-        while not errand.ended_within(PULSE):
+            self.until(lambda: prompt.ended)
+        while not prompt.ended_within(PULSE):
             if self._stop.requested:
                 raise StopAskedError
-        return errand.result()
+        return prompt.result()
 
     def start_stream(self) -> None:
         """Have the scope stream, if there is one, and begin the record with it.
@@ -124,12 +123,12 @@ class Serving:
             if self._account.journal is None:
                 self._account.begin(None)
             return
-        scope.stream_from(self._task.channels, self._task.interval)
-        self.serve(lambda: scope.stream is not None)
+        scope.stream_from(self._program.channels, self._program.interval)
+        self.until(lambda: scope.stream is not None)
         stream = scope.stream
         if stream is None:
             raise RefusedError("The scope did not start its stream.")
-        search = self._task.search
+        search = self._program.search
         if search is not None and search.must_learn:
             self._learn(search, scope, stream)
         journal = self._account.journal or self._account.begin(stream)
@@ -147,7 +146,7 @@ class Serving:
             return
         stream = scope.stream
         scope.halt()
-        self.serve(lambda: scope.stream is None)
+        self.until(lambda: scope.stream is None)
         if stream is not None:
             start = self._account.axis(stream.started)
             self._account.align(start, self._intake.reached, stream.uncertainty)
@@ -171,7 +170,7 @@ class Serving:
         """
         wanted = max(1, round(REST / stream.interval))
         until = self._clock.now() + REST + GRACE
-        self.serve(lambda: scope.ahead >= wanted, until)
+        self.until(lambda: scope.ahead >= wanted, until)
         if scope.ahead == 0:
             raise InstrumentError(
                 f"The scope has sent no samples for {REST + GRACE:g} s, so no spike "
@@ -193,10 +192,9 @@ class Serving:
             self._lease.renew()
             if self._intake.reached - self._told >= PULSE:
                 self._told = self._intake.reached
-                self._emit(events.Progress(self._told, self._task.expected))
+                self._emit(events.Progress(self._told, self._program.expected))
 
     def _tell_changes(self) -> None:
         """Say which settings are not as they were when the run began."""
-        found = self._instruments
-        for text in changed(found.settings, found.settings_after):
+        for text in self._instruments.changes:
             self._account.warn(text)

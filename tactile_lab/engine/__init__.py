@@ -1,0 +1,1 @@
+"""Runs, monitors and manual control: what uses a bench, here or in a process beside."""

@@ -1,0 +1,60 @@
+"""Scenes short enough to be run whole, on the simulated bench, many times."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.ending import Executed
+from tactile_lab.engine.execution import Execution
+from tactile_lab.scene.load import load
+from tactile_lab.store.run import Run
+
+
+@dataclass
+class Ran:
+    """A run that has ended, and all it told."""
+
+    done: Executed
+    told: list[events.Event] = field(default_factory=list)
+
+    @property
+    def folder(self) -> Path:
+        return self.done.folder
+
+    def stored(self) -> Run:
+        return Run.load(self.folder)
+
+
+@pytest.fixture
+def run_scene(tmp_path):
+    """Run a scene by name with overrides, SI overrides as text, to the end."""
+
+    def run(*overrides, scene="demo", bench=None, watch=None):
+        loaded = load(scene, overrides)
+        told = []
+
+        def emit(event):
+            told.append(event)
+            if watch is not None:
+                watch(execution, event)
+
+        made = bench(loaded) if bench is not None else None
+        execution = Execution(loaded, tmp_path / "runs", bench=made, emit=emit)
+        return Ran(execution.run(), told)
+
+    return run
+
+
+SHORT = (
+    'protocol.levels=["200 mN"]',
+    "protocol.hold=0.8 s",
+    "protocol.rest=0.3 s",
+)
+"""One pulse at the highest level: 1.6 s, a dozen spikes."""
+
+
+@pytest.fixture
+def short():
+    return SHORT
