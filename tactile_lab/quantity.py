@@ -139,12 +139,26 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     return f"{text} {prefix}{unit}".replace("-", "−").rstrip()
 
 
+def count(number: int, what: str) -> str:
+    """A number of things: "1 trial", "4 trials"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+class SIFloat(float):
+    """A float given in Python: SI, also where a file must write the unit."""
+
+
+class SIInt(int):
+    """A whole number given in Python: SI, also where a file must write the unit."""
+
+
 @dataclass(frozen=True)
 class Unit:
     """Pydantic field type: SI float inside, quantity text in files and on the wire.
 
     Text is parsed; a bare number is taken as SI from Python code but refused where
-    the validation context says ``{"text_only": True}`` (scene files).
+    the validation context says ``{"text_only": True}`` (scene files), unless it is
+    marked as one of Python's.
 
     Attributes:
         symbol: SI unit.
@@ -175,7 +189,9 @@ class Unit:
             raise QuantityError(
                 f"{value!r} is no quantity; write for example {example(self.symbol)}."
             )
-        elif (info.context or {}).get("text_only"):
+        elif (info.context or {}).get("text_only") and not isinstance(
+            value, SIFloat | SIInt
+        ):
             raise QuantityError(
                 f'{value!r} has no unit; write for example "{value} {self.symbol}".'
             )

@@ -29,8 +29,6 @@ def command(
 ) -> None:
     """List the runs in folder ROOT (./runs), oldest first."""
     with refusing():
-        from dataclasses import asdict
-
         from tactile_lab.store.catalogue import catalogue
 
         entries = catalogue(
@@ -41,7 +39,7 @@ def command(
             until=until.date() if until else None,
         )
     if as_json:
-        print_json({"runs": [asdict(entry) for entry in entries]})
+        print_json({"runs": [entry.to_dict() for entry in entries]})
         return
     for entry in entries:
         kind = {True: "sim", False: "real", None: "?"}[entry.simulated]

@@ -13,7 +13,7 @@ from tactile_lab.planning.needs import Needs, needs
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, warnings
-from tactile_lab.quantity import show
+from tactile_lab.quantity import count, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY
 
@@ -24,7 +24,7 @@ GRID = 4000
 """Points at which the preview is looked at."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Plan:
     """What a run of a scene takes, needs, leaves out, and where it falls short.
 
@@ -49,6 +49,18 @@ class Plan:
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
     preview: Result | None
+
+    def __repr__(self) -> str:
+        cost = self.estimate
+        return (
+            f"<Plan of {self.scene.name}: {show(cost.duration, 's')}, "
+            f"{count(cost.trials, 'trial')}, {count(len(self.warnings), 'warning')}>"
+        )
+
+    def _repr_html_(self) -> str:
+        from tactile_lab.planning.text import html
+
+        return html(self)
 
     def to_dict(self) -> dict[str, Any]:
         """The documented JSON object (docs/json.md)."""

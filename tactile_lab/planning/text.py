@@ -4,46 +4,62 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from tactile_lab.notebook import facts
 from tactile_lab.planning.plan import Plan
-from tactile_lab.quantity import show
+from tactile_lab.quantity import count, show
 from tactile_lab.signals import SIGNALS
 
 
 def text(plan: Plan) -> str:
     """All of `plan` but its warnings."""
-    return "\n".join(_lines(plan))
+    lines = [title(plan)]
+    for heading, rows in sections(plan):
+        width = min(max(len(what) for what, _ in rows), 24)
+        lines += ["", heading]
+        lines += [f"  {what:<{width}}  {why}".rstrip() for what, why in rows]
+    return "\n".join(lines)
 
 
-def _lines(plan: Plan) -> Iterator[str]:
-    scene, cost = plan.scene, plan.estimate
+def html(plan: Plan) -> str:
+    """The same, and its warnings, for a notebook."""
+    parts = [facts(heading, rows) for heading, rows in sections(plan)]
+    if plan.warnings:
+        parts.append(facts("warnings", [(line, "") for line in plan.warnings]))
+    return facts(title(plan), ()) + "".join(parts)
+
+
+def title(plan: Plan) -> str:
+    """What runs on which bench."""
+    scene = plan.scene
     kind = "simulated" if scene.bench.simulated else "REAL INSTRUMENTS"
-    yield f"{scene.name}: {scene.protocol.title} on {scene.bench.name} ({kind})"
-    yield ""
-    yield "needs"
-    yield from _table(plan.uses)
-    yield "leaves out"
-    yield from _grouped(plan.leaves_out)
-    yield "takes"
-    yield from _table(_costs(plan))
-    yield "resolution, one code"
-    yield from _table(
-        (name, show(value, SIGNALS[name].unit))
-        for name, value in cost.resolution.items()
-    )
-    yield "rests on"
-    for line in plan.assumptions:
-        yield f"  {line}"
+    return f"{scene.name}: {scene.protocol.title} on {scene.bench.name} ({kind})"
+
+
+def sections(plan: Plan) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Headings and the rows below each; none is empty."""
+    steps = plan.estimate.resolution.items()
+    found = [
+        ("needs", list(plan.uses)),
+        ("leaves out", _grouped(plan.leaves_out)),
+        ("takes", list(_costs(plan))),
+        (
+            "resolution, one code",
+            [(name, show(value, SIGNALS[name].unit)) for name, value in steps],
+        ),
+        ("rests on", [(line, "") for line in plan.assumptions]),
+    ]
+    return [(heading, rows) for heading, rows in found if rows]
 
 
 def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     cost = plan.estimate
     pauses = cost.duration - cost.streamed
     paused = f", {_time(pauses)} of it pauses" if pauses > 0 else ""
-    yield "duration", f"{_time(cost.duration)}, {_count(cost.trials, 'trial')}{paused}"
+    yield "duration", f"{_time(cost.duration)}, {count(cost.trials, 'trial')}{paused}"
     channels = len(plan.needs.channels)
     yield (
         "samples",
-        f"{cost.samples_per_channel:,} on {_count(channels, 'channel')} at "
+        f"{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
         f"{show(plan.scene.record.sample_rate, 'S/s')}; {cost.samples_stored:,} stored",
     )
     yield "disk", f"{_bytes(cost.disk)} compressed, {_bytes(cost.disk_raw)} raw"
@@ -63,26 +79,12 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
 
 
-def _table(rows: Iterable[tuple[str, str]]) -> Iterator[str]:
-    rows = list(rows)
-    width = min(max((len(what) for what, _ in rows), default=0), 24)
-    for what, why in rows:
-        yield f"  {what:<{width}}  {why}"
-    yield ""
-
-
-def _grouped(rows: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """What shares a reason on one line."""
+def _grouped(rows: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """What shares a reason in one row."""
     found: dict[str, list[str]] = {}
     for what, why in rows:
         found.setdefault(why, []).append(what)
-    for why, names in found.items():
-        yield f"  {', '.join(names)} ({why})"
-    yield ""
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    return [(f"{', '.join(names)} ({why})", "") for why, names in found.items()]
 
 
 def _time(seconds: float) -> str:

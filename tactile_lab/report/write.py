@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from tactile_lab import notebook
 from tactile_lab.report.bench_conclusions import write_calibration_file
 from tactile_lab.report.canvas import save
 from tactile_lab.report.figures import figures
@@ -23,6 +24,10 @@ class Report:
     svg: Path
     html: Path
     results: Path
+
+    def _repr_html_(self) -> str:
+        """The page in a frame, for a notebook."""
+        return notebook.framed(self.html.read_text(encoding="utf-8"))
 
 
 def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tactile_lab.plugins import (
 )
 from tactile_lab.scene import overrides as options
 from tactile_lab.scene.bench_file import BenchSpec, BenchTable
+from tactile_lab.scene.overrides import Overrides
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.sensor import SensorTable
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
@@ -36,16 +38,17 @@ SIMULATED = "sim"
 
 
 def load(
-    path: str | Path | None = None,
-    overrides: Sequence[str] = (),
-    bench: str | None = None,
+    scene: str | Path | Scene | None = None,
+    overrides: Overrides = (),
+    bench: str | Path | None = None,
 ) -> Scene:
-    """The scene in `path`; opens no instrument and writes nothing.
+    """A scene, validated; opens no instrument and writes nothing.
 
     Args:
-        path: a scene (TOML), a protocol file (.py), the name of a scene that ships, or
-            None for the demo.
-        overrides: ``table.key=value`` texts that change single keys.
+        scene: a scene file (TOML), a protocol file (.py), the name of a scene that
+            ships, a scene that was loaded, or None for the demo.
+        overrides: change single keys: ``{"protocol.level": 0.12}``, with quantities as
+            SI numbers or texts ("120 mN"), or ``table.key=value`` texts.
         bench: path of a bench file, or "sim" for the built-in simulated bench; replaces
             the scene's own ``[bench]``.
 
@@ -53,11 +56,18 @@ def load(
         SceneError: something cannot be used as written; names file, key, value, what is
             allowed and the nearest valid key.
     """
-    file = _find(path)
-    if file.suffix == ".py":
-        data: dict[str, Any] = {"protocol": {"name": file.stem, "source": file.name}}
+    if isinstance(scene, Scene):
+        if not overrides and bench is None:
+            return scene
+        file, name = scene.path or Path(f"{scene.name}.toml"), scene.name
+        data = scene.to_dict()
     else:
-        data = _read(file, "Scene")
+        file = _find(scene)
+        name = file.stem
+        if file.suffix == ".py":
+            data = {"protocol": {"name": name, "source": file.name}}
+        else:
+            data = _read(file, "Scene")
     origins = {}
     if bench is not None:
         data["bench"] = (
@@ -65,7 +75,7 @@ def load(
         )
         origins["bench.file"] = f"--bench {bench}"
     origins |= options.apply(data, overrides)
-    return resolve(data, file, origins)
+    return replace(resolve(data, file, origins), name=name)
 
 
 def resolve(

@@ -1,49 +1,98 @@
-"""``--set key=value``: single keys of a scene changed from the command line."""
+"""Single keys of a scene changed: ``--set key=value``, or a mapping in Python."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from os.path import isfile
+from pathlib import Path
 from typing import Any
 
 from tactile_lab.errors import SceneError
+from tactile_lab.quantity import SIFloat, SIInt
+
+Overrides = Sequence[str] | Mapping[str, Any]
+"""``table.key=value`` texts, or values by ``table.key``."""
+
+FILES = (
+    "protocol.file", "protocol.source", "bench.file", "bench.magnet.calibration",
+    "bench.coil.dialect", "bench.scope.dialect", "bench.field_meter.dialect",
+)  # fmt: skip
+"""Keys that name a file: one that lies where the program was started is meant."""
 
 
-def apply(data: dict[str, Any], overrides: Sequence[str]) -> dict[str, str]:
-    """Change `data` in place by ``table.key=value`` texts.
+def apply(data: dict[str, Any], overrides: Overrides) -> dict[str, str]:
+    """Change keys of `data` in place.
 
-    A value is TOML where it reads as TOML (numbers, true, lists, quoted texts), and
-    otherwise a text, so that quantities need no quotes of their own.
+    The value in a text is TOML where it reads as TOML (numbers, true, lists, quoted
+    texts), and otherwise a text, so that quantities need no quotes of their own. In a
+    mapping a quantity is a text with its unit or a number in SI.
 
     Returns:
-        The option as written for each dotted key it set, to be named in messages.
+        The change as written for each dotted key it set, to be named in messages.
 
     Raises:
         SceneError: not of that form, or the key lies inside something that is no table.
     """
     origins = {}
-    for text in overrides:
-        key, equals, value = text.partition("=")
-        path = [part.strip() for part in key.split(".")]
-        if not equals or len(path) < 2 or not all(path):
+    for path, value, origin in _changes(overrides):
+        if len(path) < 2 or not all(path):
             raise SceneError(
-                f'--set {text}: write table.key=value, such as protocol.hold="2 s".'
+                f'{origin}: write table.key=value, such as protocol.hold="2 s".'
             )
         table = data
         for depth, part in enumerate(path[:-1]):
             table = table.setdefault(part, {})
             if not isinstance(table, dict):
                 raise SceneError(
-                    f"--set {text}: {'.'.join(path[: depth + 1])} is no table."
+                    f"{origin}: {'.'.join(path[: depth + 1])} is no table."
                 )
-        table[path[-1]] = _value(value.strip())
-        origins[".".join(path)] = f"--set {text}"
+        key = ".".join(path)
+        if key in FILES and isinstance(value, str) and isfile(value):
+            value = str(Path(value).resolve())
+        table[path[-1]] = value
+        origins[key] = origin
     return origins
 
 
-def _value(text: str) -> Any:
+def _changes(overrides: Overrides) -> Iterable[tuple[list[str], Any, str]]:
+    """Path of the key, value, and how the change was written."""
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            yield _path(key), _from_python(value), f"{key} = {value!r}"
+        return
+    for text in overrides:
+        key, equals, written = text.partition("=")
+        yield _path(key) if equals else [], _from_text(written.strip()), f"--set {text}"
+
+
+def _path(key: str) -> list[str]:
+    return [part.strip() for part in key.split(".")]
+
+
+def _from_text(text: str) -> Any:
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
     return parsed["value"] if set(parsed) == {"value"} else text
+
+
+def _from_python(value: Any) -> Any:
+    """`value` as a file would hold it; numbers, those of numpy too, are SI."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    match value:
+        case Mapping():
+            return {key: _from_python(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_from_python(item) for item in value]
+        case Path():
+            return str(value)
+        case bool():
+            return value
+        case int():
+            return SIInt(value)
+        case float():
+            return SIFloat(value)
+    return value

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.folder import INFO, is_live, read_info, write_json
+
+if TYPE_CHECKING:
+    from tactile_lab.store.run import Run
 
 INDEX = ".index.json"
 VERSION = 2
@@ -22,10 +25,11 @@ SENSOR_KEYS = ("sensor", "sample")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
-    """One run in the catalogue.
+class RunSummary:
+    """One run in the catalogue, without its samples.
 
     Attributes:
+        folder: of the run.
         name: of the folder.
         started: ISO time with zone.
         status: as in `run.json`; "cut short" where a running run has no writer.
@@ -37,6 +41,7 @@ class Entry:
         trouble: why the run cannot be read; empty where it can.
     """
 
+    folder: Path
     name: str
     started: str = ""
     status: str = "unreadable"
@@ -50,6 +55,21 @@ class Entry:
     loss: str = ""
     trouble: str = ""
 
+    def load(self) -> Run:
+        """The run itself, opened for reading.
+
+        Raises:
+            RunFolderError: it cannot be read, or ended before its first sample.
+        """
+        from tactile_lab.store.run import Run
+
+        return Run.load(self.folder)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All but the folder, for the index and for JSON."""
+        names = (field.name for field in fields(self))
+        return {name: getattr(self, name) for name in names if name != "folder"}
+
 
 def catalogue(
     root: Path,
@@ -58,7 +78,7 @@ def catalogue(
     sensor: str | None = None,
     since: date | None = None,
     until: date | None = None,
-) -> list[Entry]:
+) -> list[RunSummary]:
     """Runs in folder `root` that match, oldest first.
 
     Args:
@@ -86,7 +106,7 @@ def catalogue(
     return sorted(chosen, key=lambda entry: (entry.started, entry.name))
 
 
-def _all(root: Path) -> list[Entry]:
+def _all(root: Path) -> list[RunSummary]:
     """Every run, from the index where `run.json` has not changed since."""
     known = _read_index(root)
     index: dict[str, Any] = {}
@@ -94,10 +114,10 @@ def _all(root: Path) -> list[Entry]:
     for path, stamp in _folders(root):
         old = known.get(path.name)
         if old is not None and old["stamp"] == stamp:
-            entry = Entry(**old["entry"])
+            entry = RunSummary(folder=path, **old["entry"])
         else:
             entry = _entry(path)
-        index[path.name] = {"stamp": stamp, "entry": asdict(entry)}
+        index[path.name] = {"stamp": stamp, "entry": entry.to_dict()}
         if entry.status == "running" and not is_live(path):
             entry = replace(entry, status="cut short")
         entries.append(entry)
@@ -135,21 +155,22 @@ def _read_index(root: Path) -> dict[str, Any]:
         if content["version"] != VERSION:
             return {}
         for item in content["runs"].values():
-            Entry(**item["entry"])
+            RunSummary(folder=root, **item["entry"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
     runs: dict[str, Any] = content["runs"]
     return runs
 
 
-def _entry(path: Path) -> Entry:
+def _entry(path: Path) -> RunSummary:
     try:
         info = read_info(path)
     except RunFolderError as error:
-        return Entry(name=path.name, trouble=str(error))
+        return RunSummary(folder=path, name=path.name, trouble=str(error))
     notes = info.get("notes") or {}
     sensors = [str(notes[key]) for key in SENSOR_KEYS if notes.get(key)]
-    return Entry(
+    return RunSummary(
+        folder=path,
         name=path.name,
         started=str(info.get("started") or ""),
         status=str(info["status"]),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -10,7 +12,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab import notebook
 from tactile_lab.errors import RunFolderError
+from tactile_lab.model.drain_current import DrainCurrent
+from tactile_lab.quantity import count, show
+from tactile_lab.signals import SIGNALS
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.applied import (
     BIN_TIME,
@@ -19,13 +25,15 @@ from tactile_lab.store.applied import (
     applied_current,
     held,
 )
+from tactile_lab.store.derived import drain_current_of, table
 from tactile_lab.store.folder import DATA, is_live, read_info
-from tactile_lab.store.layout import BIN
+from tactile_lab.store.layout import BIN, RECORDS
 from tactile_lab.store.opening import open_data
 from tactile_lab.store.signal import Axis, StoredSignal
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
     from tactile_lab.scene.scene import Scene
@@ -289,36 +297,158 @@ class Run:
         """What happened: time (s), kind and text (bytes, UTF-8)."""
         return self.records("events")
 
-    def to_xarray(self, start: float = 0.0, end: float | None = None) -> xarray.Dataset:
-        """Signals from `start` to `end` s as an xarray dataset (reads them).
+    @property
+    def rate(self) -> Records:
+        """Instantaneous rate: time of each spike from the second on, s, and 1/ISI, Hz.
+
+        It holds from that time to the next; before the second spike it is 0.
+        """
+        times = self.spikes["time"]
+        found = np.empty(max(times.size - 1, 0), [("time", "f8"), ("rate", "f8")])
+        found["time"], found["rate"] = times[1:], 1.0 / np.diff(times)
+        return found
+
+    @property
+    def I_DS(self) -> DrainCurrent:
+        """Drain current from the stored V_C1, Eq. (16), in steps of about 1 ms.
 
         Raises:
-            RunFolderError: xarray is not installed.
+            RunFolderError: V_C1 was not stored.
         """
-        try:
-            import xarray
-        except ImportError as error:
-            raise RunFolderError(
-                "xarray is not installed; `pip install xarray`, or use run.signal()."
-            ) from error
-        arrays = {}
-        for name in self.signals:
-            signal = self.signal(name)
-            part = signal.between(start, end)
-            time = signal.time(part.start, part.stop)
-            attrs = {"units": signal.unit, "long_name": signal.title}
-            arrays[name] = xarray.DataArray(
-                signal[part], {"time": time}, ("time",), attrs=attrs
-            )
-        dataset = xarray.Dataset(arrays)
-        if arrays:
-            dataset["time"].attrs["units"] = "s"
-        simulated = int(self.simulated)
-        dataset.attrs.update(run=self.path.name, simulated=simulated)
+        return drain_current_of(self)
+
+    def to_xarray(
+        self,
+        start: float = 0.0,
+        end: float | None = None,
+        *,
+        signals: Sequence[str] | None = None,
+        rate: float | None = None,
+    ) -> xarray.Dataset:
+        """Signals from `start` to `end` s as an xarray dataset (reads them).
+
+        Args:
+            start: s on the run's axis.
+            end: s on the run's axis; None for the last sample.
+            signals: stored ones, and "force", "rate" and "I_DS", which are derived;
+                those stored and the force unless given.
+            rate: S/s to average down to; None for every sample.
+
+        Raises:
+            RunFolderError: xarray is not installed, or there is no such signal.
+        """
+        made = _optional("xarray").Dataset
+        time, columns = table(self, start, end, signals, rate)
+        dataset: xarray.Dataset = made(coords={"time": time})
+        dataset["time"].attrs["units"] = "s"
+        for name, values in columns.items():
+            known = SIGNALS[name]
+            attrs = {"units": known.unit, "long_name": known.title}
+            dataset[name] = ("time", values, attrs)
+        dataset.attrs.update(run=self.path.name, simulated=int(self.simulated))
         return dataset
+
+    def to_pandas(
+        self,
+        what: str = "signals",
+        start: float = 0.0,
+        end: float | None = None,
+        *,
+        signals: Sequence[str] | None = None,
+        rate: float | None = None,
+    ) -> pandas.DataFrame:
+        """Signals against time as a pandas table; or "spikes", "trials", "events", ...
+
+        Args:
+            what: "signals", or a table of records: spikes, trials, current, field,
+                events, rate, gaps, segments, pauses or overrange.
+            start: of the signals, s on the run's axis.
+            end: the same; None for the last sample.
+            signals: as for `to_xarray`.
+            rate: S/s to average down to; None for every sample.
+
+        Raises:
+            RunFolderError: pandas is not installed, or there is no such table.
+        """
+        pd = _optional("pandas")
+        frame: pandas.DataFrame
+        if what == "signals":
+            time, columns = table(self, start, end, signals, rate)
+            frame = pd.DataFrame(columns, index=pd.Index(time, name="time"))
+            return frame
+        if what in ("spikes", "rate"):
+            rows = getattr(self, what)
+        elif what in RECORDS:
+            rows = self.records(what)
+        else:
+            raise RunFolderError(
+                f"A run has no table {what!r}; give signals, rate or one of "
+                f"{', '.join(RECORDS)}."
+            )
+        fields = {name: rows[name] for name in rows.dtype.names}
+        for name, values in fields.items():
+            if values.dtype.kind == "S":
+                fields[name] = np.char.decode(values, "utf-8", errors="replace")
+        frame = pd.DataFrame(fields)
+        return frame
 
     def stored(self, name: str) -> int:
         """Samples of one channel that have a checksum."""
         samples, checks, _ = self.column(name)
         checked = int(checks["samples"].sum(dtype=np.int64))
         return min(checked, int(samples.shape[0]))
+
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"<Run {self.path.name}: closed>"
+        kind = "simulated" if self.simulated else "measured"
+        trials, spikes = len(self.trials), len(self.table("spikes"))
+        return (
+            f"<Run of {self.info.get('scene') or self.path.name}: {self.status}, "
+            f"{kind}, {show(self.duration, 's')}, {count(trials, 'trial')}, "
+            f"{count(spikes, 'spike')}; {', '.join(self.signals) or 'no samples'}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook, with the trials."""
+        info = self.info
+        rows = [
+            ("status", f"{self.status} {info.get('reason') or ''}".strip()),
+            ("protocol", info.get("protocol")),
+            ("bench", info.get("bench")),
+            ("physics", "simulated" if self.simulated else "measured"),
+            ("started", info.get("started")),
+            ("duration", show(self.duration, "s")),
+            ("signals", ", ".join(self.signals)),
+            ("spikes", len(self.table("spikes"))),
+            ("loss", (info.get("loss") or {}).get("text")),
+            ("folder", self.path),
+        ]
+        trials = [
+            (
+                row["label"].decode(errors="replace"),
+                show(row["start"], "s"),
+                show(row["end"], "s"),
+                row["spikes"],
+            )
+            for row in self.trials
+        ]
+        head = ("trial", "start", "end", "spikes")
+        return notebook.facts(repr(self).strip("<>"), rows) + notebook.table(
+            head, trials
+        )
+
+
+def _optional(name: str) -> Any:
+    """A library that is installed only where it is wanted.
+
+    Raises:
+        RunFolderError: it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise RunFolderError(
+            f"{name} is not installed; `pip install {name}`, or read arrays with "
+            "run.signal()."
+        ) from error

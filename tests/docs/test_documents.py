@@ -76,15 +76,27 @@ def test_the_scene_of_the_how_to_is_one(tmp_path):
     assert "tap" in tactile_lab("plan", "taps.toml", folder=tmp_path)
 
 
-def test_the_python_of_the_scripting_how_to_runs(tmp_path):
+SCRIPTING = "how-to/script-in-python.md"
+SAID = (
+    r"0\.12 N: \d+ spikes in runs", r"12\.5 s, 0\.\d+ A",
+    r"<Run of hold_10s: complete", r"V_C1 +I_DS +rate", r"^\d+ \d\.\d+e-\d+",
+    r"^tau ", r"V_C1 ",
+)  # fmt: skip
+
+
+def test_each_example_of_the_scripting_how_to_is_expected_to_say_something():
+    assert len(blocks(SCRIPTING, "python")) == len(SAID)
+
+
+@pytest.mark.parametrize("number", range(len(SAID)))
+def test_each_example_of_the_scripting_how_to_stands_alone(tmp_path, number):
     script = tmp_path / "script.py"
-    script.write_text(
-        "\n".join(blocks("how-to/script-in-python.md", "python")), encoding="utf-8"
-    )
+    script.write_text(blocks(SCRIPTING, "python")[number], encoding="utf-8")
     said = python(script, folder=tmp_path)
-    assert re.search(r"120 mN \d+ spikes", said)
-    tau = float(re.search(r"^tau ([\d.]+)", said, flags=re.M)[1])
-    assert tau == pytest.approx(8.69, rel=0.1)
+    assert re.search(SAID[number], said, flags=re.M), said
+    if number == 5:
+        tau = float(re.search(r"^tau ([\d.]+)", said, flags=re.M)[1])
+        assert tau == pytest.approx(8.69, rel=0.1)
 
 
 def test_the_how_to_analyse_a_run_is_true(tmp_path, monkeypatch, capsys):

@@ -1,0 +1,199 @@
+"""The verbs of a script: plan, run and simulate a scene, and find its runs again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+from tactile_lab.acquisition import events
+from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import ParameterError, RunFolderError, UnsafeError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import Result
+from tactile_lab.model.simulate import simulate as simulate_circuit
+from tactile_lab.planning.plan import Plan
+from tactile_lab.planning.plan import plan as plan_of
+from tactile_lab.planning.preview import model
+from tactile_lab.planning.timeline import timeline
+from tactile_lab.scene.load import load
+from tactile_lab.scene.overrides import Overrides
+from tactile_lab.scene.scene import Scene
+from tactile_lab.signals import BENCH_ONLY
+from tactile_lab.store.catalogue import RunSummary, catalogue
+from tactile_lab.store.run import Run
+from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.report.write import Report
+
+
+def plan(
+    scene: str | Path | Scene | None = None,
+    overrides: Overrides = (),
+    bench: str | Path | None = None,
+) -> Plan:
+    """What running a scene needs, leaves out and costs; opens nothing.
+
+    Args:
+        scene: as `load` takes it; the demo if None.
+        overrides: changes of single keys, as `load` takes them.
+        bench: path of a bench file, or "sim"; the scene's own if None.
+
+    Raises:
+        SceneError: the scene cannot be used, or not on its bench.
+        LimitError: a force, the coil's heat or the sample rate lies beyond a limit.
+    """
+    return plan_of(load(scene, overrides, bench))
+
+
+def run(
+    scene: str | Path | Scene | None = None,
+    overrides: Overrides = (),
+    bench: str | Path | None = None,
+    *,
+    out: str | Path = "runs",
+    realtime: bool = False,
+    report: bool = True,
+    notes: Mapping[str, str] | None = None,
+    emit: events.Emit = events.ignore,
+) -> Run:
+    """Run a scene, store every sample, and give the run back.
+
+    The coil is verified off and the record closed when this returns or raises. A
+    scene reaches real instruments only through a bench file.
+
+    Args:
+        scene: as `load` takes it; the demo if None.
+        overrides: changes of single keys, as `load` takes them.
+        bench: path of a bench file, or "sim"; the scene's own if None.
+        out: folder in which the run's own folder is made.
+        realtime: pace a simulated bench by the clock.
+        report: also write figure, report.html and results.json into the run's folder.
+        notes: kept with the run, such as {"operator": "Ada"}.
+        emit: told of everything that happens (`tactile_lab.acquisition.events`).
+
+    Raises:
+        SceneError, LimitError: refused before anything was opened.
+        RecordingError: the folder cannot be written.
+        UnsafeError: the coil's state could not be verified.
+        TactileLabError: the run faulted. What was recorded until then is kept in the
+            folder that the error's note names.
+    """
+    loaded = load(scene, overrides, bench)
+    done = Execution(loaded, Path(out), realtime=realtime, emit=emit, notes=notes).run()
+    kept = f"What was recorded is in {done.folder}."
+    if not done.off.verified:
+        raise UnsafeError(f"{done.off.text} {kept}") from done.failure
+    if done.failure is not None:
+        done.failure.add_note(kept)
+        raise done.failure
+    if report:
+        write_report(done.folder)
+    return Run.load(done.folder)
+
+
+def write_report(run: Run | str | Path, *, pdf: bool = False) -> Report:
+    """Write figure, report.html and results.json of a run, again, into its folder.
+
+    Args:
+        run: a run, or its folder.
+        pdf: also write the figures as PDF.
+
+    Raises:
+        RunFolderError: not a run, or one without data.
+        OSError: the folder cannot be written.
+    """
+    from tactile_lab.report.from_run import read
+    from tactile_lab.report.write import write
+
+    folder = run.path if isinstance(run, Run) else Path(run)
+    return write(folder, read(folder), pdf=pdf)
+
+
+@overload
+def simulate(
+    what: Circuit,
+    force: Waveform,
+    *,
+    keep: Sequence[str] = ...,
+    tolerance: float = ...,
+) -> Result: ...
+@overload
+def simulate(
+    what: str | Path | Scene | None = ...,
+    force: Overrides = ...,
+    *,
+    keep: Sequence[str] | None = ...,
+    tolerance: float = ...,
+) -> Result: ...
+def simulate(
+    what: Circuit | str | Path | Scene | None = None,
+    force: Waveform | Overrides = (),
+    *,
+    keep: Sequence[str] | None = None,
+    tolerance: float = 1e-9,
+) -> Result:
+    """The model alone, without a bench: spike times, and signals at any time.
+
+    ``simulate(Circuit(V_GS=1.41), Waveform.pulse(0.15, ramp=0.01, hold=10.0))`` or
+    ``simulate("demo", {"protocol.hold": "5 s"})``.
+
+    Args:
+        what: a circuit, or a scene as `load` takes it.
+        force: on a circuit, N against s; for a scene, changes of single keys.
+        keep: signals wanted, such as ("spikes", "V_C1"); what none of them needs is
+            not computed. Spikes unless given, or what the scene records.
+        tolerance: of spike times, s, and of V_C1, V.
+
+    Raises:
+        SceneError: the scene cannot be used.
+        ParameterError: a parameter or the force lies outside the model's domain.
+        SolverError: the model cannot answer to that tolerance.
+    """
+    if isinstance(what, Circuit):
+        if not isinstance(force, Waveform):
+            raise ParameterError(
+                "A circuit is simulated under a Waveform, such as "
+                "Waveform.pulse(0.15, ramp=0.01, hold=10.0)."
+            )
+        return simulate_circuit(
+            what, force, keep=keep or ("spikes",), tolerance=tolerance
+        )
+    if isinstance(force, Waveform):
+        raise ParameterError(
+            "A scene has a force of its own; give a Circuit with a Waveform, or a "
+            "scene with changes of single keys."
+        )
+    scene = load(what, force)
+    drive = timeline(scene, through_coil=False)
+    wanted = keep or [s for s in scene.record.signals if s not in BENCH_ONLY]
+    return model(scene, drive.force, drive.duration, list(wanted), tolerance)
+
+
+def runs(out: str | Path = "runs", *, protocol: str | None = None) -> list[RunSummary]:
+    """The runs in a folder, oldest first; each entry's `load()` opens its run.
+
+    Args:
+        out: holds run folders.
+        protocol: only runs of this protocol.
+
+    Raises:
+        RunFolderError: there is no such folder.
+    """
+    return catalogue(Path(out), protocol=protocol)
+
+
+def latest(out: str | Path = "runs", *, protocol: str | None = None) -> Run:
+    """The newest run in a folder that can be read.
+
+    Raises:
+        RunFolderError: there is no such folder, or no such run in it.
+    """
+    for entry in reversed(runs(out, protocol=protocol)):
+        try:
+            return entry.load()
+        except RunFolderError:
+            continue  # it ended before its first sample
+    what = "run" if protocol is None else f"run of {protocol}"
+    raise RunFolderError(f"{Path(out).resolve()} holds no {what} that can be read.")
