@@ -8,6 +8,7 @@ from dataclasses import replace
 from drivers.coil.source import CoilSource
 from drivers.picoscope.scope import PicoScope
 from drivers.teslameter import Teslameter
+from drivers.usbtmc.scope import UsbtmcScope
 from sim_backend.picoscope.faults import Fault
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
@@ -18,11 +19,17 @@ from sim_backend.plant.scope_source import Acquisition, Codes
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.from_row import coil_far_end, meter_far_end
 from sim_backend.serial_line.wires import plug_in
-from tactile_lab.bench import Bench, Channel
+from sim_backend.usbtmc.bus import SimulatedBus
+from sim_backend.usbtmc.device import SimulatedDevice
+from sim_backend.usbtmc.faults import UsbFault
+from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
+from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
+from tactile_lab.bench import Bench, Channel, Scope
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect, scope_dialect
 from tactile_lab.planning.needs import Needs
+from tactile_lab.scene.bench_file import ScopeSpec
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
 
@@ -144,12 +151,28 @@ def _mistakes(simulated: Simulated) -> tuple[SerialFault, ...]:
     return () if when is None else (SerialFault(kind="unplug", after=when, times=None),)
 
 
+def _usbtmc(
+    spec: ScopeSpec, source: WiredPlant, clock: Clock, faults: Sequence[UsbFault]
+) -> UsbtmcScope:
+    """A USBTMC scope and its far end on a high-speed bus."""
+    row = scope_dialect(spec.dialect or "rigol-ds1000z")
+    device = SimulatedDevice(
+        vendor=row.vendor,
+        product=row.product,
+        serial=spec.serial or "DS1ZSIM0001",
+        function=UsbtmcFunction(SimulatedDs1000z(source, clock)),
+        interface=INTERFACE,
+        faults=faults,
+    )
+    return UsbtmcScope(row, clock=clock, backend=SimulatedBus([device], clock))
+
+
 def open_bench(
     scene: Scene,
     needed: Needs,
     *,
     realtime: bool = False,
-    scope_faults: Sequence[Fault] = (),
+    scope_faults: Sequence[Fault] | Sequence[UsbFault] = (),
     coil_faults: Sequence[SerialFault] = (),
     meter_faults: Sequence[SerialFault] = (),
     world: PlantOptions | None = None,
@@ -172,15 +195,16 @@ def open_bench(
     """
     clock: Clock = RealClock() if realtime else SimulatedClock()
     plant, spec = plant_of(scene, world), scene.bench
-    coil = scope = meter = wired = None
+    coil = meter = wired = None
+    scope: Scope | None = None
     if needed.coil:
         if spec.coil is None:
             raise SceneError("The scene drives the coil, but the bench has no [coil].")
         row = coil_dialect(spec.coil.dialect)
         wire = row.serial.model_copy(update={"baud": spec.coil.baud or row.serial.baud})
         source = coil_far_end(plant, row, clock)
-        faults = (*coil_faults, *_mistakes(scene.simulated))
-        far_end = plug_in(source, wire, clock, "coil", faults)
+        mistakes = (*coil_faults, *_mistakes(scene.simulated))
+        far_end = plug_in(source, wire, clock, "coil", mistakes)
         coil = CoilSource(
             row, far_end.url, spec.coil.limits, clock, baud=spec.coil.baud
         )
@@ -192,20 +216,24 @@ def open_bench(
         if realtime:
             _compile(plant_of(scene, world), needed.channels)
         wired = WiredPlant(plant, spec.scope.channels)
-        library = FakePs3000a(
-            wired,
-            clock,
-            make or Make(clock_error=scene.simulated.clock_error),
-            scope_faults,
-        )
-        # equal clocks let the driver find a single lost sample; unequal ones do not
-        lag = 0.01 if scene.simulated.clock_error else None
-        scope = PicoScope(
-            clock=clock,
-            library=library,
-            lag_tolerance=lag,
-            poll_interval=0.02 if realtime else SIMULATED_POLL,
-        )
+        if spec.scope.driver == "usbtmc":
+            faults = [one for one in scope_faults if isinstance(one, UsbFault)]
+            scope = _usbtmc(spec.scope, wired, clock, faults)
+        else:
+            library = FakePs3000a(
+                wired,
+                clock,
+                make or Make(clock_error=scene.simulated.clock_error),
+                [one for one in scope_faults if isinstance(one, Fault)],
+            )
+            # equal clocks let the driver find a single lost sample, unequal ones not
+            lag = 0.01 if scene.simulated.clock_error else None
+            scope = PicoScope(
+                clock=clock,
+                library=library,
+                lag_tolerance=lag,
+                poll_interval=0.02 if realtime else SIMULATED_POLL,
+            )
     if needed.field_meter:
         if spec.field_meter is None:
             raise SceneError(

@@ -211,6 +211,8 @@ class Stream:
         shift: low bits of every code that are always 0 (8 for 8-bit PicoScopes).
         started: clock time at which the stream was started, s.
         uncertainty: of `started` against the first sample, s.
+        record: samples per channel that are taken at a time by a scope that is blind
+            between its records; None for a stream without gaps.
     """
 
     channels: tuple[Channel, ...]
@@ -219,6 +221,12 @@ class Stream:
     shift: int
     started: float
     uncertainty: float
+    record: int | None = None
+
+    @property
+    def gapless(self) -> bool:
+        """Whether a missing sample is a lost sample."""
+        return self.record is None
 
     def volts_per_code(self, row: int) -> tuple[float, float]:
         """(gain, offset) with signal = gain * code + offset, in the signal's unit."""

@@ -150,6 +150,7 @@ class UsbtmcScope(Opened):
             shift=SHIFT,
             started=(before + after) / 2,
             uncertainty=(after - before) / 2 + self._poll_interval,
+            record=row.depth[len(channels)],
         )
         self._running, self._next = True, 0
         return self._stream

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import usb.backend
+import usb.util
 
 from sim_backend.usbtmc.device import BULK_IN, BULK_OUT, SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault, gone, halted, in_use, timed_out
@@ -16,12 +18,37 @@ from tactile_lab.clock import Clock
 _ABORT_BULK_IN, _CLEAR, _SUCCESS = 3, 5, 1
 
 
+@dataclass(frozen=True)
+class Wire:
+    """How long bulk transfers take: each waits for a frame, then has it to itself.
+
+    Attributes:
+        frame: time between two frames, in which the host begins transfers, s.
+        rate: most that bulk transfers carry, B/s.
+    """
+
+    frame: float
+    rate: float
+
+    def time(self, size: int) -> float:
+        """Duration of a transfer of `size` bytes, s."""
+        return self.frame + size / self.rate
+
+
+WIRES = {
+    usb.util.SPEED_FULL: Wire(1e-3, 1_216_000.0),
+    usb.util.SPEED_HIGH: Wire(125e-6, 53_248_000.0),
+}
+"""USB 2.0, s. 5.8.4: at full speed 19 packets of 64 bytes fit a frame (table 5-9), at
+high speed 13 packets of 512 bytes fit a microframe (table 5-10)."""
+
+
 class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]
     """A pyusb backend with simulated devices: ``usb.core.find(backend=bus)``.
 
     Args:
         devices: what is plugged in.
-        clock: time that passes while a transfer times out; None passes none.
+        clock: time that transfers take (`WIRES`) and time out in; None passes none.
     """
 
     def __init__(
@@ -150,6 +177,7 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]
         if dev_handle.function is not None:
             if fault is not None:
                 dev_handle.function.spoil(fault)
+            self._pass(dev_handle, len(data))
             dev_handle.function.received(bytes(data))
         return len(data)
 
@@ -165,6 +193,7 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]
         filled = dev_handle.read(buff)
         if filled < 0:
             self._time_out(timeout)
+        self._pass(dev_handle, filled)
         return filled
 
     def ctrl_transfer(
@@ -209,6 +238,11 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]
         if device.hung:
             self._time_out(timeout)
         return fault
+
+    def _pass(self, device: SimulatedDevice, size: int) -> None:
+        """Let the time pass that a transfer of `size` bytes takes."""
+        if self._clock is not None:
+            self._clock.sleep_until(self._clock.now() + WIRES[device.speed].time(size))
 
     def _time_out(self, milliseconds: int) -> None:
         if self._clock is not None:

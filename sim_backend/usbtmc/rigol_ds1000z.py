@@ -6,11 +6,11 @@ Four inputs, memory depths and time bases of the series; one record at a time.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.plant.scope_source import Acquisition, Input, SampleSource
+from sim_backend.plant.scope_source import Acquisition, Codes, Input, SampleSource
 from sim_backend.serial_line.scpi import (
     Handler,
     ScpiError,
@@ -19,7 +19,6 @@ from sim_backend.serial_line.scpi import (
     no_argument,
     number,
 )
-from sim_backend.usbtmc.triggered_record import TriggeredRecord
 from tactile_lab.clock import Clock
 
 _STEPS_A_DIVISION = 25
@@ -36,6 +35,44 @@ class _Channel:
     offset: float = 0.0
     coupling: str = "DC"
     probe: float = 10.0
+
+
+@dataclass
+class _Record:
+    """One record around a forced trigger; nothing is sampled that is not kept.
+
+    Attributes:
+        acquisition: how it is sampled; its samples are counted from its start.
+        armed: sample at which it was armed.
+        before, after: samples before and from the trigger on.
+        trigger: sample at which it triggered.
+    """
+
+    acquisition: Acquisition
+    armed: int
+    before: int
+    after: int
+    trigger: int | None = None
+    codes: Codes | None = None
+
+    def state(self, sample: int) -> str:
+        """What the scope says of it once it has taken `sample` samples."""
+        if self.trigger is None:
+            return "WAIT" if sample >= self.armed + self.before else "RUN"
+        return "STOP" if sample >= self.trigger + self.after else "TD"
+
+    def force(self, sample: int) -> None:
+        """Trigger at `sample`, or as soon after it as enough lies before."""
+        if self.trigger is None:
+            self.trigger = max(sample, self.armed + self.before)
+
+    def read(self, source: SampleSource) -> Codes:
+        """All its samples."""
+        if self.codes is None:
+            first = (self.trigger or 0) - self.before
+            points = self.before + self.after
+            self.codes, _ = source.render(self.acquisition, first, points)
+        return self.codes
 
 
 class SimulatedDs1000z:
@@ -66,7 +103,8 @@ class SimulatedDs1000z:
         self._depth: int | None = None
         self._running = True
         self._sluggish, self._stale = sluggish, 0
-        self._record: TriggeredRecord | None = None
+        self._record: _Record | None = None
+        self._acquisition: Acquisition | None = None
         self._reading = {"source": "1", "mode": "NORM", "form": "BYTE"}
         self._first, self._last = 1, 1200
         self.parser = ScpiParser(self._commands())
@@ -191,31 +229,36 @@ class SimulatedDs1000z:
         no_argument(argument)
         self._running, self._stale = True, self._sluggish
         inputs = tuple(
-            Input(name, channel.scale * _HALF_HIGH, channel.offset, channel.coupling)
+            Input(
+                name,
+                channel.scale * _HALF_HIGH * 1.27,
+                channel.offset,
+                channel.coupling,
+            )
             for name, channel in self.channels.items()
             if channel.shown
         )
         points = self._points()
         # the converter reaches a little beyond the screen: 127 codes of 25 a division
-        acquisition = Acquisition(
-            tuple(
-                Input(i.name, i.range * 1.27, i.offset, i.coupling) for i in inputs
-            ),
-            1 / self._rate(), self._clock.now(), 127 << _SHIFT, _SHIFT,
-        )  # fmt: skip
-        self._record = TriggeredRecord(
-            self._source, acquisition, before=points // 2, after=points - points // 2
+        new = Acquisition(
+            inputs, 1 / self._rate(), self._clock.now(), 127 << _SHIFT, _SHIFT
+        )
+        old = self._acquisition
+        if old is None or replace(new, started=old.started) != old:
+            self._acquisition = old = new
+        self._record = _Record(
+            old, self._sample(old), before=points // 2, after=points - points // 2
         )
 
     def _force(self, argument: str) -> None:
         no_argument(argument)
         if self._record is not None:
-            self._advance(self._record)
-            self._record.force(0)
+            self._record.force(self._sample(self._record.acquisition))
 
-    def _advance(self, record: TriggeredRecord) -> None:
-        elapsed = self._clock.now() - record.acquisition.started
-        record.advance(math.floor(elapsed / record.acquisition.interval + 1e-6))
+    def _sample(self, acquisition: Acquisition) -> int:
+        """Samples taken by now."""
+        elapsed = self._clock.now() - acquisition.started
+        return math.floor(elapsed / acquisition.interval + 1e-6)
 
     def _status(self) -> str:
         record = self._record
@@ -224,13 +267,9 @@ class SimulatedDs1000z:
             return "STOP"
         if record is None:
             return "AUTO" if self._running else "STOP"
-        self._advance(record)
-        if record.complete:
-            self._running = False
-            return "STOP"
-        if record.trigger is not None:
-            return "TD"
-        return "WAIT" if record.armed else "RUN"
+        state = record.state(self._sample(record.acquisition))
+        self._running = state != "STOP"
+        return state
 
     def _set_source(self, argument: str) -> None:
         names = {f"CHAN{n}": n for n in self.channels}
@@ -265,7 +304,7 @@ class SimulatedDs1000z:
             self.parser.push(-221, "Settings conflict")
             return b"#9000000000"
         assert record is not None
-        codes, _ = record.codes()
+        codes = record.read(self._source)
         row = [setting.name for setting in record.acquisition.inputs].index(name)
         part = codes[row, self._first - 1 : self._last]
         raw = ((part >> _SHIFT) + _REFERENCE).astype(np.uint8).tobytes()

@@ -18,6 +18,8 @@ FULL = 0.95
 class FieldMean:
     """Means of the field channel of one stream, each over `AVERAGING`.
 
+    A reading ends with its record where a scope has gaps between records.
+
     Args:
         stream: as it runs.
         start: of its first sample on the run's axis, s.
@@ -31,7 +33,7 @@ class FieldMean:
         self._span = max(1, round(AVERAGING / stream.interval))
         self._sum = 0
         self._count = 0
-        self._ended = 0
+        self._first = 0
 
     def feed(self, block: Block) -> list[Reading]:
         """Readings completed by `block`, each at the middle of its time, T.
@@ -44,6 +46,8 @@ class FieldMean:
         if block.overrange[self._row]:
             raise self._beyond()
         readings = []
+        if not self._count:
+            self._first = block.first
         codes = block.codes[self._row]
         while codes.size:
             part = codes[: self._span - self._count]
@@ -51,16 +55,19 @@ class FieldMean:
             self._sum += int(part.sum(dtype=np.int64))
             self._count += part.size
             if self._count == self._span:
-                readings.append(self._reading(self._sum / self._span))
-                self._ended += self._span
-                self._sum = self._count = 0
+                readings.append(self._reading())
+        if self._count and not self._stream.gapless:
+            readings.append(self._reading())
         return readings
 
-    def _reading(self, code: float) -> Reading:
+    def _reading(self) -> Reading:
+        code = self._sum / self._count
+        middle = self._first + (self._count - 1) / 2
+        self._first += self._count
+        self._sum = self._count = 0
         if abs(code) > FULL * self._stream.full_scale:
             raise self._beyond()
         gain, offset = self._stream.volts_per_code(self._row or 0)
-        middle = self._ended + (self._span - 1) / 2
         time = self._start + middle * self._stream.interval
         return Reading(time, gain * code + offset)
 

@@ -37,6 +37,10 @@ class Sink(Protocol):
         """Store a block; waits or raises RecordingError when the queue is full."""
         ...
 
+    def gap(self, missing: int) -> None:
+        """A stream ended so many samples after the last that came."""
+        ...
+
     def spikes(self, times: NDArray[np.float64], found: NDArray[np.void]) -> None:
         """Store detected spikes with their times on the run's axis."""
         ...
@@ -104,16 +108,18 @@ class Intake:
         """Take a block; times of the spikes it completed, s on the run's axis.
 
         Raises:
-            SamplesLostError: samples between this block and the last are missing.
+            SamplesLostError: samples between this block and the last are missing,
+                though the scope streams without gaps.
         """
         if self._stream is None or self._sink is None:
             raise SamplesLostError("A block arrived although no stream runs.")
-        if block.first != self._expected:
+        missing = block.first - self._expected
+        if missing and (self._stream.gapless or missing < 0):
             raise SamplesLostError(
-                f"{block.first - self._expected} samples are missing before sample "
-                f"{block.first}: the scope or its driver lost them. Lower the rate."
+                f"{missing} samples are missing before sample {block.first}: the "
+                "scope or its driver lost them. Lower the rate."
             )
-        self._expected += block.samples
+        self._expected = block.first + block.samples
         self.produced += block.samples
         for channel, over in zip(self._stream.channels, block.overrange, strict=True):
             if over:
@@ -140,8 +146,12 @@ class Intake:
         """Let go of spikes that no trial to come can ask for."""
         del self._spike_times[: bisect_left(self._spike_times, time)]
 
-    def end(self) -> tuple[float, ...]:
-        """The stream has ended; times of spikes that were still open."""
+    def end(self, time: float) -> tuple[float, ...]:
+        """The stream ended at run time `time`, s; times of spikes still open."""
+        if self._stream is not None and self._sink is not None:
+            unseen = round((time - self.reached) / self._stream.interval)
+            if unseen > 0 and not self._stream.gapless:
+                self._sink.gap(unseen)
         found = () if self._detector is None else self._keep(self._detector.flush())
         self._stream, self._detector = None, None
         return found

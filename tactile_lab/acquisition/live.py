@@ -48,6 +48,8 @@ class Live:
         self._written = 0
         self._per_bin = 1
         self._interval = 0.0
+        self._start = 0.0
+        self._gapless = True
         self._scale: list[tuple[float, float]] = []
         self._rest: NDArray[np.int16] = np.empty((0, 0), np.int16)
         self._ring: NDArray[np.float32] = np.empty((3, 0, 0), np.float32)
@@ -84,24 +86,34 @@ class Live:
                 stream.volts_per_code(row) for row in range(len(stream.channels))
             ]
             self._rest = np.empty((len(stream.channels), 0), np.int16)
-            self._next_time = start
+            self._next_time = self._start = start
+            self._gapless = stream.gapless
 
     def add(self, block: Block) -> None:
-        """Decimate a block that follows the one before without a gap."""
+        """Decimate a block; where the stream has gaps, no bin reaches across blocks."""
+        if not self._gapless:
+            self._next_time = self._start + block.first * self._interval
         codes = block.codes
         if self._rest.shape[1]:
             codes = np.concatenate([self._rest, codes], axis=1)
-        bins = codes.shape[1] // self._per_bin
-        whole = bins * self._per_bin
+        whole = codes.shape[1] // self._per_bin * self._per_bin
+        self._write(codes[:, :whole], self._per_bin)
         self._rest = codes[:, whole:].copy()
-        if bins == 0:
+        if not self._gapless:
+            self._write(self._rest, self._rest.shape[1])
+            self._rest = self._rest[:, :0]
+
+    def _write(self, codes: NDArray[np.int16], per_bin: int) -> None:
+        """Append bins of `per_bin` samples each."""
+        if codes.shape[1] == 0:
             return
-        cells = codes[:, :whole].reshape(codes.shape[0], bins, self._per_bin)
+        bins = codes.shape[1] // per_bin
+        cells = codes.reshape(codes.shape[0], bins, per_bin)
         low, high = cells.min(axis=2), cells.max(axis=2)
         # twice as fast as a mean; int32 holds the sum of 65535 codes
-        kind = np.int32 if self._per_bin < 1 << 16 else np.int64
-        mean = cells.sum(axis=2, dtype=kind) / np.float32(self._per_bin)
-        width = self._per_bin * self._interval
+        kind = np.int32 if per_bin < 1 << 16 else np.int64
+        mean = cells.sum(axis=2, dtype=kind) / np.float32(per_bin)
+        width = per_bin * self._interval
         with self._lock:
             at = (self._written + np.arange(bins)) % CAPACITY
             self._time[at] = self._next_time + width * np.arange(bins)

@@ -147,10 +147,11 @@ class Pump:
         stream = scope.stream
         scope.halt()
         self.until(lambda: scope.stream is None)
-        if stream is not None:
+        # records with gaps are each dated by host time: there is nothing to align
+        if stream is not None and stream.gapless:
             start = self._account.axis(stream.started)
             self._account.align(start, self._intake.reached, stream.uncertainty)
-        self._account.spikes(self._intake.end())
+        self._end_intake(scope)
 
     def last_words(self) -> None:
         """Store what the instruments still delivered while they were closed."""
@@ -158,7 +159,8 @@ class Pump:
             self._tell_changes()
             self._take_blocks()
             self._account.readings(self._instruments)
-            self._account.spikes(self._intake.end())
+            if self._instruments.scope is not None:
+                self._end_intake(self._instruments.scope)
         except TactileLabError as failure:
             self._emit(events.Message("error", str(failure)))
 
@@ -193,6 +195,10 @@ class Pump:
             if self._intake.reached - self._told >= PULSE:
                 self._told = self._intake.reached
                 self._emit(events.Progress(self._told, self._program.expected))
+
+    def _end_intake(self, scope: ScopeThread) -> None:
+        seen_until = self._account.axis(scope.polled_until)
+        self._account.spikes(self._intake.end(seen_until))
 
     def _tell_changes(self) -> None:
         """Say which settings are not as they were when the run began."""

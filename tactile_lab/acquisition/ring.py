@@ -29,7 +29,7 @@ class Held:
     Attributes:
         stream: how the samples are scaled.
         start: of the first sample held.
-        blocks: consecutive.
+        blocks: in order, with gaps between them where the scope has some.
         spikes: detected among them.
         field: (time, T) read meanwhile.
         events: (time, kind, text).
@@ -49,8 +49,9 @@ class Held:
 
     @property
     def length(self) -> float:
-        """Duration, s."""
-        return self.samples * self.stream.interval
+        """Duration, s, gaps between records included."""
+        first, last = self.blocks[0], self.blocks[-1]
+        return (last.first + last.samples - first.first) * self.stream.interval
 
     def replay(self, journal: Journal) -> None:
         """Tell it all to a journal whose time begins with the first sample held."""
@@ -68,6 +69,8 @@ class Held:
             journal.field(time - self.start, value)
         for time, kind, text in self.events:
             journal.event(max(time - self.start, 0.0), kind, text)
+        if not self.stream.gapless:
+            return
         told = align((), 0.0, self.length, self.stream.uncertainty)
         journal.align(
             offset=told.offset, drift=told.drift, uncertainty=told.uncertainty
@@ -127,6 +130,9 @@ class Ring:
                 self._spikes.popleft()
             while self._field and self._field[0][0] < oldest:
                 self._field.popleft()
+
+    def gap(self, missing: int) -> None:
+        """Nothing: what is held ends with its last sample."""
 
     def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
         """Hold spikes."""

@@ -120,7 +120,7 @@ class Runner:
         self._account.state(events.RunState.RUNNING, "running")
 
     def _play_all(self) -> None:
-        self._pump.rest_until(self._clock.now() + BASELINE)
+        self._rest(BASELINE)
         trials = self._program.trials()
         outcome: Outcome | None = None
         try:
@@ -153,11 +153,12 @@ class Runner:
         else:
             scope.poll_at(end)
             target = start + trial.length - 2 * self._program.interval
-            self._pump.until(lambda: self.intake.reached >= target, end + GRACE)
+            grace = GRACE + 2 * self._record
+            self._pump.until(lambda: self.intake.reached >= target, end + grace)
             if self.intake.reached < target:
                 raise InstrumentError(
                     f"The scope is {target - self.intake.reached:.3g} s of samples "
-                    f"behind at the end of a trial (limit {GRACE:g} s). Lower the "
+                    f"behind at the end of a trial (limit {grace:g} s). Lower the "
                     "sample rate or use a faster USB port."
                 )
         if asked is not None:
@@ -177,6 +178,16 @@ class Runner:
             codes=self._codes(),
             drift=drift,
         )
+
+    @property
+    def _record(self) -> float:
+        """How long a scope with gaps takes for a record, s; 0 for one without."""
+        stream = (
+            None if self.instruments.scope is None else self.instruments.scope.stream
+        )
+        if stream is None or stream.record is None:
+            return 0.0
+        return stream.record * stream.interval
 
     def _codes(self) -> dict[str, float]:
         """One code of each measured signal, SI."""
@@ -208,7 +219,8 @@ class Runner:
         watch = self._program.drift
         if watch is None or "V_C1" not in rest:
             return None
-        return watch.before(rest["V_C1"], self._account.now)
+        seen = self.intake.reached if self._record else self._account.now
+        return watch.before(rest["V_C1"], seen)
 
     def _pause(self, index: int, trial: Trial) -> Outcome:
         """A planned recovery: the coil holds, nothing is streamed or stored."""
@@ -218,7 +230,7 @@ class Runner:
         self._pump.rest_until(begin + trial.length)
         self._account.pause(start, self._account.now)
         self._pump.start_stream()
-        self._pump.rest_until(self._clock.now() + BASELINE)
+        self._rest(BASELINE)
         return Outcome(
             trial=trial,
             index=index,
@@ -242,7 +254,16 @@ class Runner:
         self._account.pause(start, self._account.now)
         self._pump.start_stream()
         # the newest samples lag by a poll: none from before the move count as rest
-        self._pump.rest_until(self._clock.now() + 2 * BASELINE)
+        self._rest(2 * BASELINE)
+
+    def _rest(self, length: float) -> None:
+        """Record the sensor at rest for `length` s, and for one record at least."""
+        began = self._account.now
+        until = self._clock.now() + length
+        self._pump.rest_until(until)
+        if self._record:
+            grace = until + GRACE + 2 * self._record
+            self._pump.until(lambda: self.intake.reached > began, grace)
 
     def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
         """Begin a trial now: its start in clock time and in run time, s."""
@@ -266,6 +287,6 @@ class Runner:
 
     def _note_edges(self, start: float) -> None:
         """Let the trial that began at `start` s of run time tell where clocks lie."""
-        if "coil_current" in self._live.signals:
+        if "coil_current" in self._live.signals and not self._record:
             end = self.intake.reached
             self._account.note_edges(self._live.between(start, end, "coil_current"))

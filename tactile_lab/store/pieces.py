@@ -51,11 +51,16 @@ class Pieces:
             )
         if missing == 0:
             return None
-        _, start, interval, *_ = self.segment
-        at = start + (first - self._begins[-1][0]) * interval
+        at = self.reached + missing * self.segment[2]
         self._expected = first
         self._begin(at)
         return missing, at
+
+    @property
+    def reached(self) -> float:
+        """Run time just past the newest sample, s."""
+        _, start, interval, *_ = self.segment
+        return start + (self._expected - self._begins[-1][0]) * interval
 
     def take(self, samples: int) -> None:
         """So many samples per channel follow."""

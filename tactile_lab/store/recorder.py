@@ -89,6 +89,11 @@ class Recorder:
             self._records["segments"].append(*self._pieces.segment)
         self._guard(lambda: self._append(block))
 
+    def gap(self, missing: int) -> None:
+        """Store that the stream went on for so many samples that never came."""
+        self._records["gaps"].append(self._pieces.taken, missing, self._pieces.reached)
+        self.tick()
+
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
         """Correct the running segment's place in time.
 

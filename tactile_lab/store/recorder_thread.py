@@ -86,6 +86,10 @@ class RecorderThread:
         self._put(partial(self._recorder.append, block), block.codes.nbytes)
         self._queued += block.samples
 
+    def gap(self, missing: int) -> None:
+        """See `Recorder.gap`."""
+        self._put(partial(self._recorder.gap, missing))
+
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
         """See `Recorder.align`."""
         align = self._recorder.align
