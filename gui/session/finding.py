@@ -136,4 +136,7 @@ def loss_text(loss: Mapping[str, Any]) -> str:
     if samples is None:
         return ""
     also = "" if spikes is None else f", {spikes} spikes"
+    covered, streamed = loss.get("covered_s"), loss.get("streamed_s")
+    if covered is not None and streamed is not None:
+        also = f"; gaps by design, {covered:.4g} of {streamed:.4g} s covered"
     return f"Loss: {samples} samples{also}."

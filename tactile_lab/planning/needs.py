@@ -43,6 +43,7 @@ class Needs:
             current and labelled "model".
         guaranteed_rate: streaming rate the scope's maker guarantees for so many
             channels, S/s; infinite where it is not known.
+        gapless: whether the scope streams without gaps; true without a scope.
     """
 
     coil: bool
@@ -53,6 +54,7 @@ class Needs:
     detect_on: str | None
     model: tuple[str, ...]
     guaranteed_rate: float
+    gapless: bool = True
 
 
 def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
@@ -85,7 +87,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
             "neither [field_meter] nor a scope channel with the signal field."
         )
     by_hand = meter is not None and meter.driver == "manual"
-    channels, rate = _as_the_scope_can(scene, channels, detect_on)
+    channels, rate, gapless = _as_the_scope_can(scene, channels, detect_on)
     return Needs(
         coil=drive.drives,
         field_meter=metered and not by_hand,
@@ -104,6 +106,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
             if SIGNALS[name].source == "model" and name not in wired
         ),
         guaranteed_rate=rate,
+        gapless=gapless,
     )
 
 
@@ -137,11 +140,11 @@ def _check_wired(
 
 def _as_the_scope_can(
     scene: Scene, channels: tuple[Channel, ...], detect_on: str | None
-) -> tuple[tuple[Channel, ...], float]:
-    """The channels as they will be set, and the rate the scope is sure to keep, S/s."""
+) -> tuple[tuple[Channel, ...], float, bool]:
+    """Channels as they will be set; the rate the scope surely keeps, S/s; gapless."""
     scope = scene.bench.scope
     if scope is None or not channels:
-        return channels, float("inf")
+        return channels, float("inf"), True
     capability = scope_capability(scope)
     if scene.protocol.sees_supply:
         channels = tuple(
@@ -155,7 +158,7 @@ def _as_the_scope_can(
             "records and would miss some. Use a streaming scope or record "
             "neither spikes nor rate."
         )
-    return channels, rate
+    return channels, rate, capability.gapless
 
 
 def _widened(channel: Channel, supply: float, ranges: Sequence[float]) -> Channel:

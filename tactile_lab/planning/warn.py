@@ -114,6 +114,11 @@ def _scope(scene: Scene, needed: Needs) -> Iterator[str]:
             f"{show(needed.guaranteed_rate, 'S/s')} guaranteed on any USB port; the "
             "run ends as faulted if samples are lost."
         )
+    if not needed.gapless:
+        yield (
+            "this scope is blind while it hands a record over: there are gaps between "
+            "its records, which stay open in all that shows or exports them."
+        )
 
 
 def _field(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:

@@ -206,6 +206,8 @@ def _loss(info: Mapping[str, Any]) -> Loss | None:
         spikes_online=loss["spikes_online"],
         spikes=loss["spikes"],
         sentence=loss["text"],
+        covered=loss.get("covered_s"),
+        streamed=loss.get("streamed_s"),
     )
 
 

@@ -238,6 +238,10 @@ def _certificate(findings: Findings) -> str:
         rows["Samples produced"] = _count(loss.samples_produced, "not known")
         rows["Samples stored"] = _count(loss.samples_stored)
         rows["Samples lost"] = _count(loss.samples, "not known")
+        if loss.covered is not None and loss.streamed is not None:
+            rows["Time covered"] = (
+                f"{loss.covered:.4g} of {loss.streamed:.4g} s; gaps by design"
+            )
         rows["Spikes found on line"] = _count(loss.spikes_online)
         rows["Differing when searched again"] = _count(
             loss.spikes, "not possible: the searched channel was not stored"

@@ -47,6 +47,8 @@ def results(findings: Findings) -> dict[str, Any]:
             "samples_produced": loss.samples_produced,
             "spikes": loss.spikes,
             "spikes_online": loss.spikes_online,
+            "covered_s": loss.covered,
+            "streamed_s": loss.streamed,
         },
         "conclusion": findings.conclusion.values,
         "statements": list(findings.conclusion.sentences),

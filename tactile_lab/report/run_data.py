@@ -90,6 +90,8 @@ class Loss:
         spikes_online: spikes found while the run went on.
         spikes: found by only one of the searches on line and in the stored samples;
             None where the searched channel was not stored.
+        covered: time that has samples, s; None for a scope without gaps.
+        streamed: time the scope was asked to see, s; None likewise.
         sentence: all of it: "loss: 0 of 72000000 samples, 0 of 47 spikes".
     """
 
@@ -98,6 +100,8 @@ class Loss:
     spikes_online: int
     spikes: int | None
     sentence: str
+    covered: float | None = None
+    streamed: float | None = None
 
     @property
     def samples(self) -> int | None:

@@ -26,10 +26,13 @@ class Certificate:
     """What was produced, what was stored, and what spikes the stored samples hold.
 
     Attributes:
-        produced: samples the scope delivered plus known gaps, all channels; None
-            where the run was cut short before it could say.
+        produced: samples the scope delivered, all channels, and where it streams
+            without gaps those known to be missing; None where the run was cut short
+            before it could say.
         written: samples stored, all channels.
         gaps: samples per channel known to be missing.
+        covered: time that has samples, s; None for a scope that streams without gaps.
+        streamed: time from the begin to the end of each stream, s; None likewise.
         online: spikes found while the run went on.
         offline: spikes found again in the stored samples; None where the channel was
             not stored.
@@ -42,6 +45,8 @@ class Certificate:
     online: int
     offline: int | None
     differing: int | None
+    covered: float | None = None
+    streamed: float | None = None
 
     @property
     def samples(self) -> int | None:
@@ -56,13 +61,19 @@ class Certificate:
     @property
     def clean(self) -> bool:
         """Nothing is known to be lost."""
-        return not self.samples and not self.gaps and not self.spikes
+        lost = self.gaps if self.covered is None else 0
+        return not self.samples and not lost and not self.spikes
 
     def __str__(self) -> str:
         if self.produced is None:
             samples = f"not known of {self.written} samples (the run was cut short)"
         else:
             samples = f"{self.samples} of {self.produced} samples"
+        if self.covered is not None and self.streamed is not None:
+            return (
+                f"loss: {samples}; gaps by design, {self.covered:.4g} of "
+                f"{self.streamed:.4g} s covered"
+            )
         if self.differing is None:
             spikes = f"{self.online} spikes, not possible to check (not stored)"
         else:
@@ -77,6 +88,8 @@ class Certificate:
             "produced": self.produced,
             "written": self.written,
             "gaps": self.gaps,
+            "covered_s": self.covered,
+            "streamed_s": self.streamed,
             "spikes_online": self.online,
             "spikes_offline": self.offline,
             "text": str(self),
@@ -88,6 +101,7 @@ def certify(run: Run) -> Certificate:
     counters = run.info.get("samples") or {}
     rows = run.records("gaps")["missing"]
     missing = int(rows.sum())
+    lost = missing if run.gapless else 0
     produced: int | None = 0
     written = 0
     for name in run.signals:
@@ -95,14 +109,21 @@ def certify(run: Run) -> Certificate:
         if delivered is None or produced is None:
             produced = None
         else:
-            produced += delivered + missing
+            produced += delivered + lost
         written += run.stored(name)
     online = run.records("spikes")["sample"]
     offline = None if not searched_is_stored(run) else redetect(run)["sample"]
+    covered = streamed = None
+    if run.signals and not run.gapless:
+        interval = float(run.attributes["interval"])
+        covered = run.samples * interval
+        streamed = covered + missing * interval
     return Certificate(
         produced=produced,
         written=written,
         gaps=missing,
+        covered=covered,
+        streamed=streamed,
         online=online.size,
         offline=None if offline is None else offline.size,
         differing=None if offline is None else unmatched(online, offline).size,

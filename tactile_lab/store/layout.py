@@ -4,7 +4,7 @@
     /pyramid/<signal>   smallest, largest and sum of the codes of each `bin` samples
     /checks/<signal>    per chunk: samples in it, CRC-32 of their codes
     /segments           stretches without a gap, and where they lie in time
-    /gaps /overrange    missing samples; blocks in which an input left its range
+    /gaps /overrange    samples that never came; blocks in which an input left its range
     /spikes             found on line
     /current /field     applied current, teslameter readings
     /trials /pauses /events
@@ -159,6 +159,8 @@ def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
             spikes["gain"], spikes["offset"] = stream.volts_per_code(row)
     chunk = chunk_length(stream.interval)
     file.attrs.update(interval=stream.interval, full_scale=stream.full_scale)
+    if stream.record is not None:
+        file.attrs["record"] = stream.record
     code = np.dtype(np.int8 if stream.shift == 8 else np.int16)
     for row in layout.rows(stream):
         channel = stream.channels[row]

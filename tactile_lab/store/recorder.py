@@ -91,7 +91,9 @@ class Recorder:
 
     def gap(self, missing: int) -> None:
         """Store that the stream went on for so many samples that never came."""
-        self._records["gaps"].append(self._pieces.taken, missing, self._pieces.reached)
+        pieces = self._pieces
+        ended = pieces.reached + missing * pieces.segment[2]
+        self._records["gaps"].append(pieces.taken, missing, ended)
         self.tick()
 
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:

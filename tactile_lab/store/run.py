@@ -127,6 +127,11 @@ class Run:
         return dict(self._file.attrs)
 
     @property
+    def gapless(self) -> bool:
+        """Whether a missing sample is a lost sample: not from a scope that polls."""
+        return "record" not in self._file.attrs
+
+    @property
     def signals(self) -> tuple[str, ...]:
         """Names of the signals stored sample by sample."""
         group = self._file.get("samples")
@@ -228,6 +233,16 @@ class Run:
             kind="reset" if attrs["kind"] == "reset" else "crossing",
             span=int(attrs["span"]),
         )
+
+    @property
+    def gaps(self) -> Records:
+        """Times without samples while the scope streamed: start, end (s), missing."""
+        rows = self.records("gaps")
+        gaps = np.empty(rows.size, [("start", "f8"), ("end", "f8"), ("missing", "i8")])
+        interval = float(self.attributes.get("interval", 0.0))
+        gaps["start"] = rows["time"] - rows["missing"] * interval
+        gaps["end"], gaps["missing"] = rows["time"], rows["missing"]
+        return gaps
 
     @property
     def trials(self) -> Records:

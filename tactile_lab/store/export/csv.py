@@ -11,7 +11,7 @@ from tactile_lab.store.run import Run
 
 
 def export(run: Run, folder: Path, selection: Selection) -> list[Path]:
-    """Write `signals.csv`, `spikes.csv`, `current.csv`, ... into `folder`.
+    """Write `signals.csv`, `spikes.csv`, `gaps.csv`, ... into `folder`.
 
     Raises:
         RunFolderError: a signal or rate the run does not have.
@@ -28,12 +28,13 @@ def export(run: Run, folder: Path, selection: Selection) -> list[Path]:
             for times, columns in selection.pieces(run):
                 np.savetxt(file, np.column_stack([times, *columns]), "%.12g", ",")
     tables = {
+        "gaps": (run.gaps, {"start": "s", "end": "s"}),
         "spikes": (run.spikes, {"time": "s", "amplitude": "V", "width": "s"}),
         "current": (run.current, {"time": "s", "setpoint": "A", "measured": "A"}),
         "field": (run.field, {"time": "s", "field": "T"}),
     }
     for name, (rows, units) in tables.items():
-        chosen = rows[selection.inside(run, rows["time"])]
+        chosen = selection.rows(rows)
         if chosen.size:
             written.append(folder / f"{name}.csv")
             with written[-1].open("w", encoding="utf-8", newline="\n") as file:

@@ -48,9 +48,8 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
             "values": np.concatenate(values).astype(np.float32),
             "unit": run.signal(name).unit,
         }
-    for name in ("spikes", "current", "field"):
-        rows = getattr(run, name)
-        rows = rows[selection.inside(run, rows["time"])]
+    for name in ("gaps", "spikes", "current", "field"):
+        rows = selection.rows(getattr(run, name))
         content[name] = {column: rows[column] for column in rows.dtype.fields or ()}
     trials = run.trials
     content["trials"] = {

@@ -54,8 +54,11 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
     _add_signals(pynwb, session, run, selection)
     _add_slow(pynwb, session, run)
     _add_trials(session, run)
-    times = run.spikes["time"]
-    times = times[selection.inside(run, times)]
+    for gap in selection.rows(run.gaps):
+        session.add_invalid_time_interval(
+            start_time=float(gap["start"]), stop_time=float(gap["end"])
+        )
+    times = selection.rows(run.spikes)["time"]
     if run.detection is not None:
         step = run.signal(run.signals[0]).interval if run.signals else -1.0
         session.units = pynwb.misc.Units(
@@ -70,25 +73,31 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
 
 
 def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
-    """One series per signal and stretch without a gap."""
+    """One series per signal and stream; where it has gaps, each sample has a time."""
     spans = selection.spans(run)
+    if spans and not run.gapless:
+        spans = [(spans[0][0], spans[-1][1])]
     for name in selection.names(run):
         signal = run.signal(name)
         for number, (first, stop) in enumerate(spans):
             title = name if len(spans) == 1 else f"{name}_{number + 1}"
-            codes = pynwb.H5DataIO(signal.codes[first:stop], compression="gzip")
+            times: dict[str, Any] = {
+                "starting_time": float(run.axis.time_of(float(first))),
+                "rate": 1.0 / signal.interval,
+            }
+            if not run.gapless:
+                times = {"timestamps": signal.time(first, stop)}
             session.add_acquisition(
                 pynwb.TimeSeries(
                     name=title,
                     description=f"{signal.title}, scope input "
                     f"{signal.attributes.get('input')}",
-                    data=codes,
+                    data=pynwb.H5DataIO(signal.codes[first:stop], compression="gzip"),
                     unit=UNITS.get(signal.unit, signal.unit),
                     conversion=signal.gain,
                     offset=signal.offset,
                     resolution=abs(signal.gain),
-                    starting_time=float(run.axis.time_of(float(first))),
-                    rate=1.0 / signal.interval,
+                    **times,
                 )
             )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,11 +77,12 @@ class Selection:
                 spans.append((first, last))
         return spans
 
-    def inside(self, run: Run, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which of `times`, s, lie in the part."""
+    def rows(self, table: NDArray[Any]) -> NDArray[Any]:
+        """Rows of a table whose time, or stretch of time, lies in the part."""
         end = np.inf if self.end is None else self.end
-        mask: NDArray[np.bool_] = (times >= self.start) & (times < end)
-        return mask
+        if "time" in (table.dtype.names or ()):
+            return table[(table["time"] >= self.start) & (table["time"] < end)]
+        return table[(table["end"] > self.start) & (table["start"] < end)]
 
     def pieces(self, run: Run) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
         """(times, one array of SI values per signal), a bounded piece at a time."""
