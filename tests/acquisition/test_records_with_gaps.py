@@ -11,9 +11,10 @@ from click.testing import CliRunner
 from sim_backend.bench import open_bench
 from sim_backend.usbtmc.faults import UsbFault
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.execution import Execution
 from tactile_lab.cli import cli
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import SceneError
+from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.store.certificate import certify
 from tactile_lab.store.run import Run
@@ -83,7 +84,7 @@ def test_every_sample_lies_at_its_own_time(tmp_path, bench):
     rate = "record.sample_rate=1 MS/s"
     scene = load("demo", (*SHORT, THREE, rate), str(bench))
     done = Execution(scene, tmp_path / "runs").run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     with Run.load(done.folder) as run:
         shunt, played = run.signal("coil_current"), run.current
         time = shunt.time()
@@ -103,7 +104,7 @@ def test_a_planned_pause_is_no_gap(tmp_path, bench):
     few = ("protocol.hold=0.3 s", "protocol.gap=1 s")
     scene = load("force_check", (*few, THREE, rate), str(bench))
     done = Execution(scene, tmp_path / "runs").run()
-    assert done.ending.state is RunState.COMPLETE, done.ending.reason
+    assert done.state is RunState.COMPLETE, done.reason
     with Run.load(done.folder) as run:
         proof, pauses = certify(run), run.records("pauses")
         silent = float((pauses["end"] - pauses["start"]).sum())
@@ -125,11 +126,11 @@ def test_a_planned_pause_is_no_gap(tmp_path, bench):
 def test_a_fault_on_the_wire_keeps_what_was_recorded(tmp_path, bench, fault, reason):
     rate = "record.sample_rate=1 MS/s"
     scene = load("demo", (*SHORT, THREE, rate), str(bench))
-    made = open_bench(scene, scope_faults=[fault])
+    made = open_bench(scene, needs(scene), scope_faults=[fault])
     done = Execution(scene, tmp_path / "runs", bench=made).run()
-    assert done.ending.state is RunState.FAULTED
-    assert reason in done.ending.reason
-    assert done.ending.off.verified
+    assert done.state is RunState.FAULTED
+    assert reason in done.reason
+    assert done.off.verified
     with Run.load(done.folder) as run:
         proof = certify(run)
         assert run.samples >= 3 * 30_000
