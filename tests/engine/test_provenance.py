@@ -58,7 +58,11 @@ def own(tmp_path):
     folder = tmp_path / "mine"
     for name in ("rows", "cal"):
         (folder / name).mkdir(parents=True)
-    row = resources.files("drivers").joinpath("dialects/kepco-bop.toml").read_text()
+    row = (
+        resources.files("tactile_lab.instruments")
+        .joinpath("rows/coil/kepco-bop.toml")
+        .read_text()
+    )
     (folder / "rows" / "mine.toml").write_text(row)
     (folder / "cal" / "mine.csv").write_text(FIELD)
     (folder / "scene.toml").write_text(BENCH)  # a name the run uses itself
