@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import io
 import sys
 from collections.abc import Sequence
@@ -31,7 +32,11 @@ VERBS = {
     "identify": "Fit parameters of the sensor to a run, with intervals.",
     "transfer": "I_S, m and swing from a measured transfer curve.",
 }
-"""Verb and its line in ``--help``; verb ``x-y`` is `command` in commands/x_y.py."""
+"""Verb and its line in ``--help``.
+
+Verb ``x-y`` is `command` in commands/x_y.py; those that need instruments or the
+window live with them, as entry points of the group `tactile_lab.verbs`.
+"""
 
 INTERRUPTED = 130
 
@@ -48,7 +53,13 @@ class LazyVerbs(click.Group):
         if name not in VERBS:
             return None
         module = f"tactile_lab.commands.{name.replace('-', '_')}"
-        command: click.Command = importlib.import_module(module).command
+        command: click.Command
+        if importlib.util.find_spec(module) is None:
+            from tactile_lab.plugins import plugged_in
+
+            command = plugged_in("tactile_lab.verbs", name)
+        else:
+            command = importlib.import_module(module).command
         return command
 
     def resolve_command(

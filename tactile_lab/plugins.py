@@ -1,46 +1,99 @@
-"""Reaching upward by name only: protocols, dialects, benches.
+"""What plugs in from above or outside: entry points, and Python files of a user.
 
-Everything above `tactile_lab` is found here by string or file path, so that nothing
-in this package imports it. Names are looked up on disk; a module is imported only
-when it is asked for.
+This package imports nothing above it. Drivers, simulated far ends, the simulated bench,
+protocols and further verbs register as entry points of an installed distribution, this
+one's in `pyproject.toml`; they are imported when they are asked for.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib
 import importlib.util
 import sys
-from collections.abc import Sequence
-from importlib import resources
+from functools import cache
+from importlib import metadata, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_lab.errors import SceneError, nearest
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from importlib.resources.abc import Traversable
     from types import ModuleType
 
-    from tactile_lab.bench import Bench, Channel, CoilCapability, ScopeCapability
-    from tactile_lab.planning.needs import Needs
-    from tactile_lab.scene.bench_file import CoilSpec, ScopeSpec
-    from tactile_lab.scene.scene import Scene
     from tactile_lab.trial import Protocol
+
+
+@cache
+def registered(group: str) -> Mapping[str, metadata.EntryPoint]:
+    """Entry points of a group by name, ours and other distributions'; none imported."""
+    return {entry.name: entry for entry in metadata.entry_points(group=group)}
+
+
+def plugged_in(group: str, name: str) -> Any:
+    """What is registered as `name` in a group, imported.
+
+    Raises:
+        SceneError: nothing is, or it does not import.
+    """
+    entry = registered(group).get(name)
+    if entry is None:
+        raise SceneError(
+            f'Nothing is registered as "{name}" in {group}. If this checkout is newer '
+            "than its installation, install it again: pip install -e ."
+        )
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as reason:
+        raise SceneError(
+            f'"{name}" of {group} cannot be imported from {entry.value}: {reason}.'
+        ) from reason
+
+
+def module_from_file(path: Path, what: str) -> ModuleType:
+    """A Python file of the user's own, run as a module.
+
+    Args:
+        path: of the file.
+        what: is in it, for messages: "Protocol", "Driver".
+
+    Raises:
+        SceneError: the file is missing or does not run.
+    """
+    path = path.resolve()
+    if not path.is_file():
+        raise SceneError(f"{what} file {path} does not exist or is not a file.")
+    mark = hashlib.sha256(str(path).encode()).hexdigest()[:8]
+    name = f"_{what.lower()}_{path.stem}_{mark}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise SceneError(f"{what} file {path} is not Python; its name must end in .py.")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # annotations of the class are resolved there
+    try:
+        spec.loader.exec_module(module)
+    except Exception as reason:
+        del sys.modules[spec.name]
+        raise SceneError(
+            f"{what} file {path} does not run: {type(reason).__name__}: {reason}"
+        ) from reason
+    return module
 
 
 def protocol_names() -> tuple[str, ...]:
     """Names of the protocols that ship, sorted; imports none of them."""
-    return tuple(sorted(_names("protocols", ".py")))
+    return tuple(sorted(_protocols()))
 
 
 def scene_names() -> tuple[str, ...]:
     """Names of the scenes that ship, sorted."""
-    return tuple(sorted(_names("protocols", ".toml", "scenes")))
+    return tuple(sorted(_scenes()))
 
 
 def scene_path(name: str) -> Path:
     """Where the shipped scene `name` lies."""
-    return Path(str(resources.files("protocols") / "scenes" / f"{name}.toml"))
+    return Path(str(_scenes()[name]))
 
 
 def protocol_class(name: str) -> type[Protocol]:
@@ -50,15 +103,15 @@ def protocol_class(name: str) -> type[Protocol]:
         SceneError: there is none of that name (the nearest is named), or its file is
             not a protocol.
     """
-    known = protocol_names()
+    known = _protocols()
     if name not in known:
         hint = nearest(name, known)
         raise SceneError(
             f'protocol "{name}" does not exist; {hint + " " if hint else ""}'
-            f"Known: {', '.join(known)}. A protocol of your own is named by "
+            f"Known: {', '.join(sorted(known))}. A protocol of your own is named by "
             'source = "path/to/file.py".'
         )
-    return _only_protocol(importlib.import_module(f"protocols.{name}"), name)
+    return _only_protocol(importlib.import_module(known[name]), name)
 
 
 def protocol_from_file(path: Path) -> type[Protocol]:
@@ -67,162 +120,41 @@ def protocol_from_file(path: Path) -> type[Protocol]:
     Raises:
         SceneError: the file is missing, does not run, or holds no protocol of its name.
     """
-    path = path.resolve()
-    if not path.is_file():
-        raise SceneError(f"Protocol file {path} does not exist or is not a file.")
-    mark = hashlib.sha256(str(path).encode()).hexdigest()[:8]
-    spec = importlib.util.spec_from_file_location(f"_protocol_{path.stem}_{mark}", path)
-    if spec is None or spec.loader is None:
-        raise SceneError(
-            f"Protocol file {path} is not Python; its name must end in .py."
-        )
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # annotations of the class are resolved there
-    try:
-        spec.loader.exec_module(module)
-    except Exception as reason:
-        del sys.modules[spec.name]
-        raise SceneError(
-            f"Protocol file {path} does not run: {type(reason).__name__}: {reason}"
-        ) from reason
-    return _only_protocol(module, path.stem)
+    return _only_protocol(module_from_file(path, "Protocol"), path.stem)
 
 
-def open_bench(scene: Scene, needed: Needs, *, realtime: bool = False) -> Bench:
-    """The bench `scene` names, with the instruments it needs; opens no instrument.
-
-    Args:
-        scene: its `bench` says whether physics is real or computed.
-        needed: which instruments are needed, as the scene's plan has it.
-        realtime: let a simulated bench keep pace with the wall clock.
-    """
-    room = "sim_backend.bench" if scene.bench.simulated else "drivers.bench"
-    opening: Any = importlib.import_module(room)
-    bench: Bench = opening.open_bench(scene, needed, realtime=realtime)
-    return bench
+def _packages() -> list[ModuleType]:
+    """Registered packages of protocols; their modules are protocols."""
+    group = "tactile_lab.protocols"
+    return [plugged_in(group, name) for name in registered(group)]
 
 
-def serve_bench(**options: Any) -> Any:
-    """The simulated serial instruments, made for other programs; not yet served.
-
-    Args:
-        options: as `sim_backend.serve.ServedBench` takes them.
-
-    Raises:
-        SceneError: an address or dialect that cannot be served.
-    """
-    return importlib.import_module("sim_backend.serve").ServedBench(**options)
+@cache
+def _protocols() -> dict[str, str]:
+    """Module of each protocol by its name."""
+    return {
+        name: f"{package.__name__}.{name}"
+        for package in _packages()
+        for name in _inside(resources.files(package), ".py")
+    }
 
 
-def attached(**options: Any) -> list[dict[str, Any]]:
-    """What is attached to this computer; options as `drivers.attached.attached`."""
-    found: list[dict[str, Any]] = importlib.import_module("drivers.attached").attached(
-        **options
-    )
-    return found
+@cache
+def _scenes() -> dict[str, Traversable]:
+    """File of each scene by its name."""
+    return {
+        name: file
+        for package in _packages()
+        for name, file in _inside(resources.files(package) / "scenes", ".toml").items()
+    }
 
 
-def try_out_device(port: str, dialect: str, **options: Any) -> dict[str, str]:
-    """Settings of a serial instrument, opened and closed as a run would.
-
-    Raises:
-        SceneError: no such dialect.
-        InstrumentError, UnsafeError: as `drivers.attached.try_out`.
-    """
-    module: Any = importlib.import_module("drivers.attached")
-    settings: dict[str, str] = module.try_out(port, dialect, **options)
-    return settings
-
-
-def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
-    """Findings about this computer, as `drivers.diagnosis.diagnose` has them."""
-    module: Any = importlib.import_module("drivers.diagnosis")
-    findings: list[dict[str, Any]] = module.diagnose(folder, needed_rate)
-    return findings
-
-
-def coil_capability(coil: CoilSpec) -> CoilCapability:
-    """What such a source can do, as far as is known before it is opened.
-
-    Raises:
-        SceneError: there is no such dialect, or a limit is beyond the source's rating.
-    """
-    from tactile_lab.bench import CoilCapability
-    from tactile_lab.instruments.dialects import coil_dialect
-
-    row = coil_dialect(coil.dialect)
-    row.check_limits(coil.limits)
-    return CoilCapability(
-        title=row.title,
-        bipolar=row.polarity == "both",
-        update_interval=row.promised_interval(coil.baud),
-    )
-
-
-def scope_capability(scope: ScopeSpec) -> ScopeCapability:
-    """What such a scope can do, as far as is known before it is opened.
-
-    Raises:
-        SceneError: there is no such row of a USBTMC scope.
-    """
-    from tactile_lab.bench import ScopeCapability
-
-    if scope.driver == "usbtmc":
-        from tactile_lab.instruments.dialects import scope_dialect
-
-        row = scope_dialect(scope.dialect or "rigol-ds1000z")
-        return ScopeCapability(
-            gapless=False,
-            inputs=row.inputs,
-            ranges=row.ranges,
-            bits=row.bits,
-            fastest=row.fastest,
-        )
-    pico: Any = importlib.import_module("drivers.picoscope.scope")
-    return ScopeCapability(
-        gapless=True,
-        inputs=tuple(pico.INPUTS),
-        ranges=tuple(pico.RANGES),
-        bits=8,
-        fastest=tuple(pico.GUARANTEED),
-    )
-
-
-def check_scope(scope: ScopeSpec, channels: Sequence[Channel], rate: float) -> float:
-    """Check that the scope can be set so; the rate it is sure to keep, S/s.
-
-    Args:
-        scope: driver and model.
-        channels: to enable, at least one.
-        rate: asked for, S/s.
-
-    Raises:
-        LimitError: an input, range, coupling or rate the scope does not have.
-    """
-    from tactile_lab.errors import LimitError
-
-    capability = scope_capability(scope)
-    wiring: Any = importlib.import_module("drivers.scope_wiring")
-    wiring.check_channels(channels, capability)
-    fastest = capability.fastest[min(len(channels), len(capability.fastest)) - 1]
-    if scope.driver == "ps3000a":  # it may stream faster than its maker guarantees
-        setup: Any = importlib.import_module("drivers.picoscope.setup")
-        setup.streaming_interval(1 / rate)
-    elif rate > fastest:
-        raise LimitError(
-            f"{rate:g} S/s on {len(channels)} channels is beyond the scope's "
-            f"{fastest:g} S/s. Lower record.sample_rate."
-        )
-    return float(fastest)
-
-
-def _names(package: str, ending: str, *inside: str) -> list[str]:
-    folder = resources.files(package).joinpath(*inside)
-    return [
-        entry.name.removesuffix(ending)
+def _inside(folder: Traversable, ending: str) -> dict[str, Traversable]:
+    return {
+        entry.name.removesuffix(ending): entry
         for entry in folder.iterdir()
         if entry.name.endswith(ending) and not entry.name.startswith("_")
-    ]
+    }
 
 
 def _only_protocol(module: ModuleType, name: str) -> type[Protocol]:

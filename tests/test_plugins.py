@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from tactile_lab.errors import SceneError, nearest
+from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.plugins import (
-    coil_capability,
     protocol_class,
     protocol_from_file,
     protocol_names,

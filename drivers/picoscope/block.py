@@ -12,10 +12,10 @@ from drivers.picoscope import status
 from drivers.picoscope.sdk import BLOCK_READY, INPUTS
 from drivers.picoscope.setup import configure
 from drivers.picoscope.unit import Unit
-from drivers.scope_wiring import check_channels
 from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import LimitError, NoReplyError, ParameterError
+from tactile_lab.instruments.channels import check_channels
 
 _PAUSE = 0.002
 _RISING, _FALLING = 2, 3

@@ -18,10 +18,10 @@ from drivers.picoscope.setup import (
     streaming_interval,
 )
 from drivers.picoscope.unit import Unit
-from drivers.scope_wiring import check_channels, described
 from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import LinkLostError, RefusedError, SamplesLostError
+from tactile_lab.instruments.channels import check_channels, described
 
 GUARANTEED = (31.25e6, 15.625e6, 7.8125e6, 7.8125e6)
 """Streaming rate for 1 to 4 inputs that Pico guarantees on any USB port, S/s."""

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from drivers.opened import Opened
-from drivers.scope_wiring import check_channels, described
 from drivers.usbtmc.link import UsbtmcLink
 from drivers.usbtmc.record import SHIFT, RecordReader, number, tell
 from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
@@ -21,6 +20,7 @@ from tactile_lab.errors import (
     NoReplyError,
     RefusedError,
 )
+from tactile_lab.instruments.channels import check_channels, described
 from tactile_lab.instruments.scope_dialect import ScopeDialect
 
 _MOST_ERRORS = 20
@@ -75,11 +75,7 @@ class UsbtmcScope(Opened):
     @property
     def capability(self) -> ScopeCapability:
         """What the row says of the model."""
-        row = self._dialect
-        return ScopeCapability(
-            gapless=False, inputs=row.inputs, ranges=row.ranges, bits=row.bits,
-            fastest=row.fastest,
-        )  # fmt: skip
+        return self._dialect.capability
 
     @property
     def poll_interval(self) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
+from drivers.attached import attached, try_out
 from gui.dialogs.attached import Attached
 from gui.dialogs.bench_text import BY_PERSON, Choice
 from gui.look.theme import Theme
@@ -15,7 +16,6 @@ from gui.parts import column, label, line, push, set_role
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.instruments.dialects import dialect_ids
-from tactile_lab.plugins import attached, try_out_device
 from tactile_lab.quantity import show
 
 SCOPES = (("ps3000a", "PicoScope 3000"), ("usbtmc", "USBTMC (SCPI)"), ("", "none"))
@@ -153,7 +153,7 @@ class Instruments(QWidget):
 
         def work() -> None:
             try:
-                settings = try_out_device(address, dialect)
+                settings = try_out(address, dialect)
                 self.tested.emit(role, True, f"✓ {told(settings)}")
             except (TactileLabError, OSError) as error:
                 self.tested.emit(role, False, str(error))

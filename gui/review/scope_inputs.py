@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLineEdit, QWidget
 from gui.parts import column, empty, label, push
 from gui.setup.texts import exact, toml
 from tactile_lab.errors import QuantityError, SceneError
-from tactile_lab.plugins import scope_capability
+from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.quantity import parse, show
 from tactile_lab.scene.bench_file import BenchSpec, ChannelTable
 

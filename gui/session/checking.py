@@ -6,9 +6,9 @@ from gui.session.messages import Checked, Identified, Refused
 from gui.session.request import Request
 from gui.state import Fault
 from tactile_lab.bench import Bench, OffReport
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.errors import TactileLabError
 from tactile_lab.planning.needs import needs
-from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
 
 

@@ -10,9 +10,9 @@ from gui.session.commands import TakeCoil
 from gui.session.messages import CoilByHand, FieldByHand, HandOff, Told
 from gui.session.request import Request
 from gui.session.task import Task
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.errors import TactileLabError
 from tactile_lab.planning.needs import needs
-from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
 
 if TYPE_CHECKING:

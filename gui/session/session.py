@@ -25,7 +25,7 @@ from gui.session.messages import Level
 from gui.session.request import Request, bench_request
 from gui.state import Fault, Snapshot, State
 from tactile_lab.errors import TactileLabError
-from tactile_lab.plugins import check_scope
+from tactile_lab.instruments.registry import check_scope
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
 

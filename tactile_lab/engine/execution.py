@@ -24,13 +24,13 @@ from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, Stream
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.current import current_for
 from tactile_lab.planning.plan import plan
-from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate

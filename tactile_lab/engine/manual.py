@@ -19,10 +19,10 @@ from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.stop import Lease
 from tactile_lab.bench import Bench, OffReport
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.needs import needs
-from tactile_lab.plugins import open_bench
 from tactile_lab.scene.scene import Scene
 from tactile_lab.waveform import Waveform
 

@@ -21,11 +21,11 @@ from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.plan import plan
-from tactile_lab.plugins import open_bench
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.certificate import write_certificate

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tactile_lab.bench import ScopeCapability
 from tactile_lab.instruments.serial_dialect import Dialect, Lines, Strict, frozen
 
 Numbers = Annotated[tuple[float, ...], BeforeValidator(frozen)]
@@ -91,6 +92,17 @@ class ScopeDialect(Dialect):
     def ranges(self) -> tuple[float, ...]:
         """Full scale of each vertical scale, V."""
         return tuple(float(f"{s * self.divisions_high:.6g}") for s in self.scales)
+
+    @property
+    def capability(self) -> ScopeCapability:
+        """What the model can do; between two records it is blind."""
+        return ScopeCapability(
+            gapless=False,
+            inputs=self.inputs,
+            ranges=self.ranges,
+            bits=self.bits,
+            fastest=self.fastest,
+        )
 
     def timebase(self, interval: float, inputs: int) -> float:
         """The longest s a division that samples at least as often as wanted.

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.magnetics import Magnet
-from tactile_lab.plugins import coil_capability
 from tactile_lab.quantity import show
 from tactile_lab.scene.bench_file import CoilSpec
 from tactile_lab.trial import Trial

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_lab.bench import Channel, CoilLimits
+from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.planning.heat import heat_along
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
-from tactile_lab.plugins import coil_capability
 from tactile_lab.scene.scene import Scene
 from tactile_lab.waveform import Waveform
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 from tactile_lab.bench import Channel
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.registry import check_scope, scope_capability
 from tactile_lab.planning.asked import asked_signals
 from tactile_lab.planning.timeline import Timeline, timeline
-from tactile_lab.plugins import check_scope, scope_capability
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import SIGNALS
 

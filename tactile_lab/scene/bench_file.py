@@ -8,13 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from tactile_lab.bench import Channel, CoilLimits
 from tactile_lab.calibration import read_calibration
 from tactile_lab.errors import nearest
+from tactile_lab.instruments.registry import (
+    CoilDriverName,
+    MeterDriverName,
+    ScopeDriverName,
+)
 from tactile_lab.magnetics import Magnet
 from tactile_lab.quantity import Unit
 from tactile_lab.scene.tables import Table
@@ -33,8 +38,16 @@ AnyVoltage = Annotated[float, Unit("V")]
 
 FieldPerVoltage = Annotated[float, Unit("T/V")]
 
+OWN_FILES = ("dialect", "driver")
+"""Keys of an instrument that may name a file of the user's own."""
+
 WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field")
 """Signals a scope channel can carry."""
+
+
+def is_file(value: object) -> bool:
+    """Whether a dialect or driver is named by the path of its file."""
+    return isinstance(value, str) and value.endswith((".toml", ".py"))
 
 
 class LimitsTable(Table):
@@ -53,16 +66,20 @@ class CoilSpec(Table):
     """``[coil]`` of a bench: the current source.
 
     Attributes:
+        driver: "serial", or path of a Python file with a `CoilDriver`.
         dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
         limits: see `CoilLimits`.
+        options: keys of the driver's own.
     """
 
+    driver: CoilDriverName = "serial"
     dialect: str = "kepco-bop"
     port: str = "sim://coil"
     baud: int | None = Field(default=None, ge=50, le=4_000_000)
     limits_table: LimitsTable = Field(default=LimitsTable(), alias="limits")
+    options: dict[str, Any] = Field(default={})
 
     @property
     def limits(self) -> CoilLimits:
@@ -160,21 +177,23 @@ class ScopeSpec(Table):
     """``[scope]``: the digitiser.
 
     Attributes:
-        driver: "ps3000a" or "usbtmc".
+        driver: "ps3000a" or "usbtmc", or path of a Python file with a `ScopeDriver`.
         dialect: for usbtmc, the row of the model.
         library: path of the vendor's library; the usual places unless given.
         serial: serial number, where several are attached.
         allow_usb2: accept a USB 2 port.
         allow_usb_power: accept running without the power supply.
+        options: keys of the driver's own.
         wiring: entries of ``[[scope.channels]]``.
     """
 
-    driver: Literal["ps3000a", "usbtmc"] = "ps3000a"
+    driver: ScopeDriverName = "ps3000a"
     dialect: str | None = None
     library: str | None = None
     serial: str | None = None
     allow_usb2: bool = False
     allow_usb_power: bool = False
+    options: dict[str, Any] = Field(default={})
     wiring: tuple[ChannelTable, ...] = Field(default=(), alias="channels")
 
     @field_validator("wiring")
@@ -197,18 +216,21 @@ class FieldMeterSpec(Table):
     """``[field_meter]``: the teslameter.
 
     Attributes:
-        driver: "serial", or "manual": a person is asked what it shows.
+        driver: "serial"; "manual": a person is asked what it shows; or path of a
+            Python file with a `FieldMeterDriver`.
         dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
         interval: time between two readings, s.
+        options: keys of the driver's own.
     """
 
-    driver: Literal["serial", "manual"] = "serial"
+    driver: MeterDriverName = "serial"
     dialect: str = "lakeshore-425"
     port: str = "sim://field_meter"
     baud: int | None = Field(default=None, ge=50, le=4_000_000)
     interval: Positive = 0.2
+    options: dict[str, Any] = Field(default={})
 
 
 class MagnetTable(Table):
@@ -261,9 +283,9 @@ class BenchTable(Table):
     def _reachable(self) -> BenchTable:
         for name in ("coil", "field_meter"):
             spec = getattr(self, name)
-            if getattr(spec, "driver", "") == "manual":
+            if spec is None or spec.driver != "serial":
                 continue
-            if spec is not None and not self.simulated and spec.port.startswith("sim:"):
+            if not self.simulated and spec.port.startswith("sim:"):
                 raise ValueError(
                     f"[{name}] port is missing: real instruments need one, such as "
                     '"/dev/ttyUSB0" or "COM3"; simulated = true needs none'
@@ -275,7 +297,9 @@ class BenchTable(Table):
                 "leave one of them out"
             )
         coil, meter = self.coil, self.field_meter
-        if coil is not None and meter is not None and coil.port == meter.port:
+        if coil is None or meter is None or coil.driver != meter.driver:
+            return self
+        if coil.port == meter.port:
             raise ValueError(
                 f'[coil] and [field_meter] both have port = "{coil.port}"; a port has '
                 "one instrument, so correct one of them"
@@ -326,7 +350,7 @@ class BenchSpec:
             SceneError: the calibration file cannot be used.
         """
         values = {name: getattr(table.magnet, name) for name in ("r", "A1", "A2", "B1")}
-        table = _with_rows(table, folder)
+        table = _with_files(table, folder)
         calibration = None
         if table.magnet.calibration is not None:
             calibration = read_calibration(
@@ -359,12 +383,16 @@ class BenchSpec:
         )
 
 
-def _with_rows(table: BenchTable, folder: Path) -> BenchTable:
-    """`table` with dialect files of the user's own found relative to `folder`."""
+def _with_files(table: BenchTable, folder: Path) -> BenchTable:
+    """`table` with a user's own dialects and drivers found relative to `folder`."""
     placed = {}
     for name in ("coil", "scope", "field_meter"):
         spec = getattr(table, name)
-        if spec is not None and (spec.dialect or "").endswith(".toml"):
-            path = str((folder / spec.dialect).resolve())
-            placed[name] = spec.model_copy(update={"dialect": path})
+        if spec is not None:
+            files = {
+                key: str((folder / getattr(spec, key)).resolve())
+                for key in OWN_FILES
+                if is_file(getattr(spec, key))
+            }
+            placed[name] = spec.model_copy(update=files)
     return table.model_copy(update=placed)

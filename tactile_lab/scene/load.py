@@ -20,7 +20,7 @@ from tactile_lab.plugins import (
     scene_path,
 )
 from tactile_lab.scene import overrides as options
-from tactile_lab.scene.bench_file import BenchSpec, BenchTable
+from tactile_lab.scene.bench_file import OWN_FILES, BenchSpec, BenchTable, is_file
 from tactile_lab.scene.overrides import Overrides
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.sensor import SensorTable
@@ -296,16 +296,19 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
 def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A scene's own bench keys; files they name lie beside the scene."""
     placed = dict(inline)
-    for table, key in (
-        ("magnet", "calibration"),
-        ("coil", "dialect"),
-        ("scope", "dialect"),
-        ("field_meter", "dialect"),
-    ):
-        values = inline.get(table)
-        name = values.get(key) if isinstance(values, dict) else None
-        if isinstance(name, str) and (key != "dialect" or name.endswith(".toml")):
-            placed[table] = {**values, key: str((folder / name).resolve())}  # type: ignore[dict-item]
+    for table, values in inline.items():
+        if not isinstance(values, dict):
+            continue
+        files = {
+            key: str((folder / name).resolve())
+            for key, name in values.items()
+            if isinstance(name, str)
+            and (
+                (table == "magnet" and key == "calibration")
+                or (key in OWN_FILES and is_file(name))
+            )
+        }
+        placed[table] = {**values, **files}
     return placed
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.scene.bench_file import BenchSpec, is_file
 from tactile_lab.scene.sensor import SensorTable, StartVoltages
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.scene.toml_text import to_toml
@@ -56,8 +56,9 @@ class Scene:
         if self.bench.magnet.calibration is not None:
             named.append(self.bench.magnet.calibration.path)
         for spec in (self.bench.coil, self.bench.scope, self.bench.field_meter):
-            if spec is not None and (spec.dialect or "").endswith(".toml"):
-                named.append(Path(str(spec.dialect)))
+            if spec is not None:
+                own = (spec.dialect, spec.driver)
+                named += [Path(str(name)) for name in own if is_file(name)]
         file = getattr(self.protocol, "file", None)
         if isinstance(file, str):
             named.append(Path(file))

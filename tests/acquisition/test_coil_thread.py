@@ -5,8 +5,8 @@ import pytest
 
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.planning.needs import needs
-from tactile_lab.plugins import open_bench
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
 

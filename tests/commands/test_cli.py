@@ -1,6 +1,5 @@
 """The command line answers at once, imports what a verb needs, and knows its verbs."""
 
-import importlib.util
 import json
 import os
 import resource
@@ -84,8 +83,6 @@ def test_help_names_every_verb(capsys):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_in_the_table_has_its_command(verb):
-    name = f"tactile_lab.commands.{verb.replace('-', '_')}"
-    assert importlib.util.find_spec(name) is not None
     command = cli.get_command(click.Context(cli), verb)
     assert isinstance(command, click.Command)
 
@@ -111,7 +108,7 @@ def test_plan_opens_nothing_and_draws_only_when_asked():
     names = loaded_after("plan", "v_c1_only")
     tops = {name.split(".")[0] for name in names}
     assert not tops & {"serial", "usb", "PySide6", "h5py", "matplotlib", "sim_backend"}
-    assert "drivers.bench" not in names
+    assert not names & {"drivers.coil.source", "drivers.teslameter"}
 
 
 def test_a_pipe_that_lacks_our_characters_is_no_error():

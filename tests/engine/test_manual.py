@@ -1,8 +1,8 @@
 """The coil's thread, driven without a run."""
 
+from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.manual import ManualControl
 from tactile_lab.planning.needs import needs
-from tactile_lab.plugins import open_bench
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import sys
 from pathlib import Path
@@ -41,7 +40,7 @@ def command(target: str | None, bench: str, out: Path, theme: str) -> None:
             f'pip install -e ".[gui]"; or alone: {INSTALL}'
         )
     try:
-        app = importlib.import_module("gui.app")
+        from gui import app
     except ImportError as error:
         raise click.ClickException(
             f"Qt does not load: {error}. On Debian its libraries come with: apt-get "

@@ -52,12 +52,12 @@ def command(
     pseudo-terminals. The addresses printed are ports for a bench file, and for any
     program that uses pyserial.
     """
-    from tactile_lab.plugins import serve_bench
+    from sim_backend.serve import ServedBench
 
     if coil is None and teslameter is None:
         coil = teslameter = "pty"
     with refusing():
-        served = serve_bench(
+        served = ServedBench(
             coil=coil,
             teslameter=teslameter,
             coil_row=coil_dialect,

@@ -47,7 +47,7 @@ def command(
     USB serial adapters are asked for the instrument's name with the harmless *IDN?.
     Nothing is set and no output is switched on.
     """
-    from tactile_lab.plugins import attached
+    from drivers.attached import attached
 
     if dialect is not None:
         if len(ports) != 1:
@@ -80,11 +80,11 @@ def _print(one: dict[str, Any]) -> None:
 def _try_out(
     port: str, dialect: str, baud: int | None, transcript: Path | None, as_json: bool
 ) -> None:
+    from drivers.attached import try_out
     from tactile_lab.errors import SceneError
-    from tactile_lab.plugins import try_out_device
 
     try:
-        settings = try_out_device(port, dialect, baud=baud, transcript=transcript)
+        settings = try_out(port, dialect, baud=baud, transcript=transcript)
     except SceneError as reason:
         fail(str(reason), 2)
     except TactileLabError as reason:

@@ -35,7 +35,7 @@ def command(out: Path, rate: float, as_json: bool) -> None:
 
     Opens no port and no instrument. Exit code 1 if there is a problem.
     """
-    from tactile_lab.plugins import diagnose
+    from drivers.diagnosis import diagnose
 
     with refusing():
         findings = diagnose(out, rate * BYTES_PER_SAMPLE)

@@ -1,0 +1,102 @@
+"""The drivers that ship: what each can do, and how it is made.
+
+Entry points in `pyproject.toml` name them. Nothing here imports a wire or a vendor's
+library before an instrument is made, so a plan can ask what an instrument can.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tactile_lab.bench import CoilCapability, ScopeCapability
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect, scope_dialect
+from tactile_lab.instruments.registry import CoilDriver, FieldMeterDriver, ScopeDriver
+
+if TYPE_CHECKING:
+    from drivers.coil.source import CoilSource
+    from drivers.picoscope.scope import PicoScope
+    from drivers.teslameter import Teslameter
+    from drivers.usbtmc.scope import UsbtmcScope
+    from tactile_lab.clock import Clock
+    from tactile_lab.instruments.scope_dialect import ScopeDialect
+    from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
+
+DEFAULT_SCOPE = "rigol-ds1000z"
+"""Dialect of a USBTMC scope where the bench file names none."""
+
+
+def _source(table: CoilSpec, clock: Clock) -> CoilSource:
+    from drivers.coil.source import CoilSource
+
+    row = coil_dialect(table.dialect)
+    return CoilSource(row, table.port, table.limits, clock, baud=table.baud)
+
+
+def _source_capability(table: CoilSpec) -> CoilCapability:
+    row = coil_dialect(table.dialect)
+    row.check_limits(table.limits)
+    return CoilCapability(
+        title=row.title,
+        bipolar=row.polarity == "both",
+        update_interval=row.promised_interval(table.baud),
+    )
+
+
+def _picoscope(table: ScopeSpec, clock: Clock) -> PicoScope:
+    from drivers.picoscope.scope import PicoScope
+
+    return PicoScope(
+        clock=clock,
+        library=table.library,
+        serial=table.serial,
+        allow_usb2=table.allow_usb2,
+        allow_usb_power=table.allow_usb_power,
+    )
+
+
+def _picoscope_capability(table: ScopeSpec) -> ScopeCapability:
+    from drivers.picoscope.scope import GUARANTEED
+    from drivers.picoscope.sdk import INPUTS, RANGES
+
+    return ScopeCapability(
+        gapless=True,
+        inputs=INPUTS,
+        ranges=tuple(RANGES),
+        bits=8,
+        fastest=GUARANTEED,
+    )
+
+
+def _check_picoscope_rate(rate: float) -> None:
+    from drivers.picoscope.setup import streaming_interval
+
+    streaming_interval(1 / rate)  # it may stream faster than its maker guarantees
+
+
+def _usbtmc_scope(table: ScopeSpec, clock: Clock) -> UsbtmcScope:
+    from drivers.usbtmc.scope import UsbtmcScope
+
+    return UsbtmcScope(usbtmc_dialect(table), clock=clock, serial=table.serial)
+
+
+def _usbtmc_capability(table: ScopeSpec) -> ScopeCapability:
+    return usbtmc_dialect(table).capability
+
+
+def usbtmc_dialect(table: ScopeSpec) -> ScopeDialect:
+    """How the USBTMC scope of a bench file speaks."""
+    return scope_dialect(table.dialect or DEFAULT_SCOPE)
+
+
+def _teslameter(table: FieldMeterSpec, clock: Clock) -> Teslameter:
+    from drivers.teslameter import Teslameter
+
+    return Teslameter(meter_dialect(table.dialect), table.port, clock, baud=table.baud)
+
+
+SERIAL_SOURCE = CoilDriver(make=_source, capability=_source_capability)
+PS3000A = ScopeDriver(
+    make=_picoscope, capability=_picoscope_capability, check_rate=_check_picoscope_rate
+)
+USBTMC = ScopeDriver(make=_usbtmc_scope, capability=_usbtmc_capability)
+SERIAL_METER = FieldMeterDriver(make=_teslameter)

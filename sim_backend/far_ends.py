@@ -1,0 +1,109 @@
+"""The instruments that ship on their simulated far ends, each from table and world.
+
+Entry points in `pyproject.toml` name them; each imports its driver and far end when it
+is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drivers.registered import usbtmc_dialect
+from tactile_lab.errors import SceneError
+from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+
+if TYPE_CHECKING:
+    from drivers.coil.source import CoilSource
+    from drivers.picoscope.scope import PicoScope
+    from drivers.teslameter import Teslameter
+    from drivers.usbtmc.scope import UsbtmcScope
+    from sim_backend.world import WiredInputs, World
+    from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
+
+SIMULATED_POLL = 0.05
+"""Time between polls where nobody watches, s: fewer, larger blocks cost less."""
+
+
+def serial_source(table: CoilSpec, world: World) -> CoilSource:
+    """A serial current source that drives the plant's coil."""
+    from drivers.coil.source import CoilSource
+    from sim_backend.serial_line.faults import SerialFault
+    from sim_backend.serial_line.from_row import coil_far_end
+    from sim_backend.serial_line.wires import plug_in
+
+    row = coil_dialect(table.dialect)
+    wire = row.serial.model_copy(update={"baud": table.baud or row.serial.baud})
+    faults = list(world.faults.get("coil", ()))
+    if (when := world.simulated.coil_unplugged) is not None:
+        faults.append(SerialFault(kind="unplug", after=when, times=None))
+    source = coil_far_end(world.plant, row, world.clock)
+    far_end = plug_in(source, wire, world.clock, "coil", faults)
+    return CoilSource(row, far_end.url, table.limits, world.clock, baud=table.baud)
+
+
+def ps3000a(table: ScopeSpec, world: World) -> PicoScope:
+    """A PicoScope 3404D at the plant's voltages, behind its vendor's functions."""
+    from drivers.picoscope.scope import PicoScope
+    from sim_backend.picoscope.scope import Make
+    from sim_backend.picoscope.sdk import FakePs3000a
+
+    clock_error = world.simulated.clock_error
+    library = FakePs3000a(
+        _wired(world),
+        world.clock,
+        world.make or Make(clock_error=clock_error),
+        world.faults.get("scope", ()),
+    )
+    return PicoScope(
+        clock=world.clock,
+        library=library,
+        # equal clocks let the driver find a single lost sample; unequal ones do not
+        lag_tolerance=0.01 if clock_error else None,
+        poll_interval=SIMULATED_POLL if world.clock.simulated else 0.02,
+    )
+
+
+def usbtmc(table: ScopeSpec, world: World) -> UsbtmcScope:
+    """A Rigol DS1000Z at the plant's voltages, on a high-speed bus."""
+    from drivers.usbtmc.scope import UsbtmcScope
+    from sim_backend.usbtmc.bus import SimulatedBus
+    from sim_backend.usbtmc.device import SimulatedDevice
+    from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
+    from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
+
+    row = usbtmc_dialect(table)
+    device = SimulatedDevice(
+        vendor=row.vendor,
+        product=row.product,
+        serial=table.serial or "DS1ZSIM0001",
+        function=UsbtmcFunction(SimulatedDs1000z(_wired(world), world.clock)),
+        interface=INTERFACE,
+        faults=world.faults.get("scope", ()),
+    )
+    backend = SimulatedBus([device], world.clock)
+    return UsbtmcScope(row, clock=world.clock, backend=backend)
+
+
+def serial_meter(table: FieldMeterSpec, world: World) -> Teslameter:
+    """A serial teslameter in the plant's field."""
+    from drivers.teslameter import Teslameter
+    from sim_backend.serial_line.from_row import meter_far_end
+    from sim_backend.serial_line.wires import plug_in
+
+    row = meter_dialect(table.dialect)
+    probe = meter_far_end(
+        world.plant,
+        row,
+        world.clock,
+        noise=world.simulated.field_noise,
+        seed=world.simulated.seed,
+    )
+    faults = world.faults.get("field_meter", ())
+    far_end = plug_in(probe, row.serial, world.clock, "field-meter", faults)
+    return Teslameter(row, far_end.url, world.clock)
+
+
+def _wired(world: World) -> WiredInputs:
+    if world.inputs is None:
+        raise SceneError("A simulated scope needs inputs that are wired.")
+    return world.inputs
