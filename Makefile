@@ -43,9 +43,9 @@ fast: $(DEV_STAMP)
 
 # hours on two cores, alone on the machine; every table states commit and date
 reports: $(DEV_STAMP)
-	$(BIN)/tactile-lab accuracy --out docs
-	$(BIN)/tactile-lab accuracy --campaign 1000 --out docs
-	$(BIN)/tactile-lab stability --out docs
+	$(BIN)/tactile-lab validate accuracy --out docs
+	$(BIN)/tactile-lab validate honesty --scenes 1000 --out docs
+	$(BIN)/tactile-lab validate stability --out docs
 	$(BIN)/python docs/make_fit_recovery.py
 	if command -v ngspice >/dev/null; then $(BIN)/python docs/make_saturation.py; fi
 	$(BIN)/python docs/make_paper.py
@@ -60,7 +60,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/python tests/benchmarks/window_figures.py --out docs/window-figures.md
 
 screenshots: $(DEV_STAMP)
-	$(BIN)/python -m gui.screenshots docs/pictures
+	$(BIN)/python tests/pictures/take_pictures.py docs/pictures
 	$(BIN)/tactile-lab run --out $$(mktemp -d) --json | \
 	    $(BIN)/python -c 'import json, shutil, sys; from pathlib import Path; shutil.copy(Path(json.load(sys.stdin)["report"]).with_name("figure.png"), "docs/pictures/demo.png")'
 

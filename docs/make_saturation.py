@@ -18,7 +18,7 @@ import numpy as np
 
 from tactile_lab.model.circuit import Circuit, FloatArray
 from tactile_lab.model.simulate import simulate
-from tactile_lab.validation.tables import provenance
+from tactile_lab.validation.table import provenance
 from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent

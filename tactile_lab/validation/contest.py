@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +15,10 @@ from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.simulate import simulate
 from tactile_lab.validation import general, spice
-from tactile_lab.validation.problem import OutOfTimeError, Problem
+from tactile_lab.validation.problem import OutOfTimeError, Problem, spent
 from tactile_lab.validation.reference import reference
-from tactile_lab.validation.stopwatch import spent
 
 OURS = "tactile_lab"
-Solve = Callable[[Problem, float], general.Answer]
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,13 @@ class Method:
     Attributes:
         name: of the solver.
         setting: tolerance or step, for tables.
-        solve: spike times and last V_C1 within a cap on CPU time.
+        solve: spike times and last V_C1 of a problem, within `cap` s of CPU time.
         repeats: how often it is timed; the least counts.
     """
 
     name: str
     setting: str
-    solve: Solve
+    solve: Callable[..., general.Answer]
     repeats: int = 1
 
 
@@ -58,10 +58,10 @@ class Row:
     method: str
     setting: str
     verdict: str
-    spikes: int | None
-    spike_error: float | None
-    V_C1_error: float | None
-    run_time: float
+    spikes: int | None = None
+    spike_error: float | None = None
+    V_C1_error: float | None = None
+    run_time: float = 0.0
     note: str = ""
 
 
@@ -77,62 +77,33 @@ def ours(problem: Problem, cap: float, tolerance: float = 1e-9) -> general.Answe
 
 def methods(repeats: int, spice_too: bool = True) -> list[Method]:
     """All that are installed, each at several settings."""
+
+    def at(name: str, tolerance: float, solve: partial[Any], times: int = 1) -> Method:
+        return Method(name, f"tol {tolerance:g}", solve, times)
+
     found = [
-        Method(OURS, f"tol {tol:g}", partial(ours, tolerance=tol), 20 * repeats)
+        at(OURS, tol, partial(ours, tolerance=tol), 20 * repeats)
         for tol in (1e-3, 1e-6, 1e-9, 1e-12)
     ]
     for dt in (1e-3, 1e-4, 1e-5, 1e-6):
-        found += [
-            Method(
-                name, f"dt {dt:g}",
-                partial(_fixed, order=order, dt=dt), repeats if dt > 1e-5 else 1,
-            )
-            for name, order in (("Euler", 1), ("RK4", 4))
-        ]  # fmt: skip
+        for name, order in (("Euler", 1), ("RK4", 4)):
+            solve = partial(general.fixed_step, order=order, dt=dt)
+            times = repeats if dt > 1e-5 else 1
+            found.append(Method(name, f"dt {dt:g}", solve, times))
     for tol in (1e-6, 1e-9, 1e-12):
         for name in general.SCIPY:
-            found.append(
-                Method(name, f"tol {tol:g}", partial(_scipy, method=name, tol=tol))
-            )
-    if _has_cvode():
+            solve = partial(general.scipy_solver, method=name, tolerance=tol)
+            found.append(at(name, tol, solve))
+    if find_spec("sksundae") is not None:
         for tol in (1e-6, 1e-9, 1e-11, 1e-12, 1e-13):
             for name in ("Adams", "BDF"):
-                found.append(
-                    Method(
-                        f"CVODE {name}", f"tol {tol:g}",
-                        partial(_cvode, method=name, tol=tol), repeats,
-                    )
-                )  # fmt: skip
+                solve = partial(general.cvode, method=name, tolerance=tol)
+                found.append(at(f"CVODE {name}", tol, solve, repeats))
     if spice_too and spice.installed():
-        found += [
-            Method("ngspice", f"reltol {tol:g}", partial(_spice, reltol=tol))
-            for tol in (1e-3, 1e-5, 1e-6)
-        ]
+        for tol in (1e-3, 1e-5, 1e-6):
+            solve = partial(spice.ngspice, reltol=tol)
+            found.append(Method("ngspice", f"reltol {tol:g}", solve))
     return found
-
-
-def _fixed(problem: Problem, cap: float, order: int, dt: float) -> general.Answer:
-    return general.fixed_step(problem, order, dt, cap)
-
-
-def _scipy(problem: Problem, cap: float, method: str, tol: float) -> general.Answer:
-    return general.scipy_solver(problem, method, tol, cap)
-
-
-def _cvode(problem: Problem, cap: float, method: str, tol: float) -> general.Answer:
-    return general.cvode(problem, method, tol, cap)
-
-
-def _spice(problem: Problem, cap: float, reltol: float) -> general.Answer:
-    return spice.ngspice(problem, reltol, cap)
-
-
-def _has_cvode() -> bool:
-    try:
-        import sksundae.cvode  # noqa: F401
-    except ImportError:
-        return False
-    return True
 
 
 @dataclass(frozen=True)
@@ -154,30 +125,27 @@ def truth(problem: Problem) -> Truth:
 
 def judge(problem: Problem, method: Method, exact: Truth, cap: float) -> Row:
     """Run once and compare; failures become verdicts."""
+    failed = Row(problem.name, method.name, method.setting, "failed")
     began = spent()
-
-    def row(verdict: str, note: str = "") -> Row:
-        took = spent() - began
-        return Row(
-            problem.name, method.name, method.setting, verdict, None, None, None,
-            took, note,
-        )  # fmt: skip
-
     try:
-        spikes, V_C1 = method.solve(problem, cap)
-    except OutOfTimeError as error:
-        return row("timed out", str(error))
+        spikes, V_C1 = method.solve(problem, cap=cap)
     except (TactileLabError, ArithmeticError, ValueError, RuntimeError) as error:
-        verdict = "NaN" if "NaN" in str(error) else "failed"
-        return row(verdict, " ".join(str(error).split())[:120])
+        note = " ".join(str(error).split())[:120]
+        verdict = "NaN" if "NaN" in note else "failed"
+        if isinstance(error, OutOfTimeError):
+            verdict = "timed out"
+        return replace(failed, verdict=verdict, note=note, run_time=spent() - began)
     took = spent() - began
     right = spikes.size == exact.spike_times.size
     gap = np.abs(spikes - exact.spike_times).max(initial=0.0) if right else None
-    return Row(
-        problem.name, method.name, method.setting,
-        "right" if right else "wrong count", int(spikes.size),
-        None if gap is None else float(gap), abs(V_C1 - exact.V_C1), took,
-    )  # fmt: skip
+    return replace(
+        failed,
+        verdict="right" if right else "wrong count",
+        spikes=int(spikes.size),
+        spike_error=None if gap is None else float(gap),
+        V_C1_error=abs(V_C1 - exact.V_C1),
+        run_time=took,
+    )
 
 
 def contest(
@@ -199,13 +167,16 @@ def contest(
             for k, method in enumerate(entrants):
                 if turn >= method.repeats:
                     continue
-                if k in rows and rows[k].verdict in ("timed out", "failed", "NaN"):
-                    continue
-                if k in rows and rows[k].run_time > 2.0:
+                old = rows.get(k)
+                if old is not None and (old.run_time > 2.0 or not _answered(old)):
                     continue
                 new = judge(problem, method, exact, cap)
                 if turn == 0:
                     say(f"{problem.name}: {method.name} {method.setting} {new.verdict}")
-                if k not in rows or new.run_time < rows[k].run_time:
+                if old is None or new.run_time < old.run_time:
                     rows[k] = new
         yield from (rows[k] for k in sorted(rows))
+
+
+def _answered(row: Row) -> bool:
+    return row.verdict in ("right", "wrong count")

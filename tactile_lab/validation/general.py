@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,7 @@ from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry
 from tactile_lab.model.integrator import TAU_L, V_FIRE, V_RESET, Q_at
 from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
-from tactile_lab.validation.problem import OutOfTimeError, Problem, march
-from tactile_lab.validation.stopwatch import Deadline
+from tactile_lab.validation.problem import Deadline, OutOfTimeError, Problem, march
 
 SCIPY = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
 Answer = tuple[FloatArray, float]
@@ -143,7 +141,3 @@ def _fixed(
             count += 1
             y[1] = par[V_RESET]
     return count
-
-
-Solver = Callable[[Problem, float], Answer]
-"""Takes a problem and a cap on wall time, s."""

@@ -15,8 +15,8 @@ import numpy as np
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.validation import general
-from tactile_lab.validation.scenes import accuracy_scenes
-from tactile_lab.validation.stopwatch import spent as cpu_time
+from tactile_lab.validation.accuracy import accuracy_scenes
+from tactile_lab.validation.problem import spent as cpu_time
 from tactile_lab.waveform import Waveform
 
 

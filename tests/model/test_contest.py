@@ -6,9 +6,9 @@ import pytest
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.validation import general
+from tactile_lab.validation.accuracy import fastest, table, write_csv
 from tactile_lab.validation.contest import Method, Truth, judge, ours
 from tactile_lab.validation.problem import OutOfTimeError, Problem
-from tactile_lab.validation.tables import fastest, table, write_csv
 from tactile_lab.waveform import Waveform
 
 PROBLEM = Problem(

@@ -7,8 +7,8 @@ import pytest
 
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Start, simulate
-from tactile_lab.validation.campaign import Case, compare, random_case
 from tactile_lab.validation.extremes import grazing
+from tactile_lab.validation.honesty import Case, compare, random_case
 from tactile_lab.validation.reference import constant_firing, reference
 from tactile_lab.waveform import Waveform
 

@@ -12,13 +12,13 @@ from decimal import Decimal
 import numpy as np
 
 from tactile_lab.model.equations import rest_point, wright_omega
+from tactile_lab.validation.decimal_cascade import TAIL, Cascade
 from tactile_lab.validation.decimal_rule import NODES, ONE, ZERO, Numbers, solved
-from tactile_lab.validation.reference import TAIL, Run
 
 Four = tuple[float, float, float, float]
 
 
-class PairRun(Run):
+class Pair(Cascade):
     """Both voltages at once."""
 
     def T1(self, y: Decimal, v: Decimal) -> tuple[Decimal, Decimal, Four]:

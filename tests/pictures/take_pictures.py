@@ -1,4 +1,4 @@
-"""Pictures of the window in each state: ``python -m gui.screenshots [FOLDER]``.
+"""Pictures of the window in each state: ``make screenshots``.
 
 Drives the window on the simulated bench as a person would; offscreen unless a platform
 is given. Runs take real time, so this needs about three minutes.
@@ -14,9 +14,9 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from stage import SIZE, Stage, instruments_attached
 
 from gui.dialogs.connect import Connect
-from gui.staging import SIZE, Stage, instruments_attached
 from gui.state import State
 
 READ_BY_A_PERSON = """

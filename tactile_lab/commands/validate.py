@@ -1,0 +1,110 @@
+"""``tactile-lab validate``: the solver against other solvers, truth and extremes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tactile_lab.commands.terminal import refusing
+
+WRONG = 1
+
+
+@click.group()
+def command() -> None:
+    """Measure the solver of the model; each report states commit, date and machine."""
+    # before numpy starts its threads
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+out_option: Callable[..., Any] = click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write the report there, not to stdout.",
+)
+
+
+def cap_option(default: float) -> Callable[..., Any]:
+    """How long another solver may take."""
+    return click.option(
+        "--cap", default=default, show_default=True, help="Most CPU time per solver, s."
+    )
+
+
+@command.command()
+@out_option
+@cap_option(20.0)
+@click.option("--scene", "names", multiple=True, metavar="NAME", help="Only this one.")
+@click.option("--repeats", default=3, show_default=True, help="Timings; least counts.")
+def accuracy(
+    out: Path | None, names: tuple[str, ...], cap: float, repeats: int
+) -> None:
+    """Error against run time: ours and other solvers, seven scenes easy to stiff.
+
+    Truth is a 40-digit reference. CVODE (scikit-sundae) and ngspice take part where
+    they are installed.
+    """
+    with refusing():
+        from tactile_lab.validation.accuracy import compete, figure, report, write_csv
+
+        scenes, rows = compete(names, repeats, cap, _say)
+        _write(report(scenes, rows, cap), out, "accuracy.md")
+        if out is not None:
+            write_csv(rows, out / "accuracy.csv")
+            figure(rows, out / "accuracy.svg")
+            click.echo(f"Wrote accuracy.csv and accuracy.svg to {out}.")
+
+
+@command.command()
+@out_option
+@click.option(
+    "--scenes",
+    type=click.IntRange(1),
+    default=100,
+    show_default=True,
+    metavar="N",
+    help="How many; a fifth as many with T1 saturated.",
+)
+def honesty(out: Path | None, scenes: int) -> None:
+    """Is the error estimate above the true error, on random scenes and parameters?"""
+    with refusing():
+        from tactile_lab.validation.honesty import report
+
+        _write(report(scenes, _say), out, "honesty.md")
+
+
+@command.command()
+@out_option
+@cap_option(3.0)
+@click.option("--case", "names", multiple=True, metavar="TEXT", help="Only these.")
+@click.option("--ours", "alone", is_flag=True, help="Leave the other solvers out.")
+def stability(
+    out: Path | None, names: tuple[str, ...], cap: float, alone: bool
+) -> None:
+    """Extreme cases: right, wrong, NaN or timed out; exit code 1 if ours ever fails."""
+    with refusing():
+        from tactile_lab.validation.stability import report
+
+        text, bad = report(names, cap, not alone, _say)
+        _write(text, out, "stability.md")
+    if bad:
+        raise click.exceptions.Exit(WRONG)
+
+
+def _write(text: str, out: Path | None, name: str) -> None:
+    if out is None:
+        click.echo(text)
+        return
+    out.mkdir(parents=True, exist_ok=True)
+    (out / name).write_text(text, encoding="utf-8")
+    click.echo(f"Wrote {out / name}.")
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)
