@@ -8,15 +8,10 @@ from typing import Any
 
 from drivers.opened import Opened
 from drivers.picoscope import status
-from drivers.picoscope.block import Trigger, capture
 from drivers.picoscope.ring import StreamRing
 from drivers.picoscope.sample_count import SampleCount
 from drivers.picoscope.sdk import INPUTS, RANGES, TIME_UNITS
-from drivers.picoscope.setup import (
-    configure,
-    ring_samples,
-    streaming_interval,
-)
+from drivers.picoscope.setup import configure, ring_samples, streaming_interval
 from drivers.picoscope.unit import Unit
 from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
 from tactile_lab.clock import Clock
@@ -155,23 +150,6 @@ class PicoScope(Opened):
         )
         self._running, self._failure, self._data_at = True, None, after
         return self._stream
-
-    def capture(
-        self,
-        channels: Sequence[Channel],
-        interval: float,
-        samples: int,
-        *,
-        before: int = 0,
-        trigger: Trigger | None = None,
-    ) -> tuple[Stream, Block]:
-        """Capture one record in block mode; see `picoscope_block.capture`."""
-        self.stop()
-        self._unit.restore_power()
-        return capture(
-            self._unit, self._clock, self.capability, channels, interval, samples,
-            before=before, trigger=trigger,
-        )  # fmt: skip
 
     def poll(self) -> Block | None:
         """All samples since the last poll, or None if there are none yet.

@@ -30,13 +30,9 @@ STREAMING_READY = _function(
 )
 """Handle, samples, start index, overflow bits, trigger at, triggered, auto stop, p."""
 
-BLOCK_READY = _function(None, c_int16, c_uint32, c_void_p)
-"""Handle, status, p."""
-
 _enum = c_int32
 _text = POINTER(c_int8)
 _int16s = POINTER(c_int16)
-_int32s = POINTER(c_int32)
 _uint32s = POINTER(c_uint32)
 _floats = POINTER(c_float)
 
@@ -60,18 +56,6 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
         c_uint32,
     ),
     "ps3000aGetStreamingLatestValues": (c_int16, STREAMING_READY, c_void_p),
-    "ps3000aMemorySegments": (c_int16, c_uint32, _int32s),
-    "ps3000aGetTimebase2": (
-        c_int16, c_uint32, c_int32, _floats, c_int16, _int32s, c_uint32,
-    ),
-    "ps3000aRunBlock": (
-        c_int16, c_int32, c_int32, c_uint32, c_int16, _int32s, c_uint32, BLOCK_READY,
-        c_void_p,
-    ),
-    "ps3000aIsReady": (c_int16, _int16s),
-    "ps3000aGetValues": (
-        c_int16, c_uint32, _uint32s, c_uint32, _enum, c_uint32, _int16s,
-    ),
     "ps3000aStop": (c_int16,),
 }  # fmt: skip
 """Argument types by function; all return PICO_STATUS, an unsigned 32-bit integer."""

@@ -87,7 +87,6 @@ MEANINGS: dict[int, Meaning] = {
         "INVALID_HANDLE", "the scope is no longer open; open it again", LinkLostError
     ),
     0x0D: Meaning("INVALID_PARAMETER", "a parameter is out of range"),
-    0x0E: Meaning("INVALID_TIMEBASE", "this sample interval is impossible", LimitError),
     0x0F: Meaning(
         "INVALID_VOLTAGE_RANGE", "the scope does not have this range", LimitError
     ),
@@ -95,7 +94,6 @@ MEANINGS: dict[int, Meaning] = {
     STREAMING_FAILED: Meaning(
         "STREAMING_FAILED", "streaming stopped by itself", SamplesLostError
     ),
-    0x15: Meaning("BLOCK_MODE_FAILED", "block mode did not start"),
     0x16: Meaning("NULL_PARAMETER", "a pointer was empty"),
     0x1C: Meaning(
         "BUFFER_STALL",
@@ -103,7 +101,6 @@ MEANINGS: dict[int, Meaning] = {
         "computer",
         SamplesLostError,
     ),
-    0x1E: Meaning("TOO_MANY_SAMPLES", "the scope's memory is too small", LimitError),
     0x23: Meaning("USER_CALLBACK", "the library was called from within its callback"),
     BUSY: Meaning("BUSY", "busy"),
     0x2B: Meaning(

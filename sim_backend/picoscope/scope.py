@@ -13,7 +13,6 @@ import numpy as np
 
 from sim_backend.picoscope import codes as pico
 from sim_backend.picoscope.faults import Fault, Schedule
-from sim_backend.picoscope.memory import Memory
 from sim_backend.plant.scope_source import Acquisition, Codes, Input, SampleSource
 from tactile_lab.clock import Clock
 
@@ -34,7 +33,6 @@ class Make:
         longest_part: most samples of one callback; None for no limit.
         empty_callbacks: make a callback with no samples when there are none.
         clock_error: relative error of its sample clock; 50e-6 is 50 ppm.
-        memory: samples of block mode, shared by the enabled inputs.
         beyond: times the model's own streaming rate, to find a computer's limit.
     """
 
@@ -49,7 +47,6 @@ class Make:
     longest_part: int | None = None
     empty_callbacks: bool = False
     clock_error: float = 0.0
-    memory: int = 128 << 20
     beyond: int = 1
 
     @property
@@ -103,7 +100,6 @@ class SimulatedPicoScope:
         self.present = True
         self.silent = False
         self.settings: dict[int, Input] = {}
-        self.memory = Memory(self.source, self.clock, self.make.memory)
         self._powers: list[int] = []
         self._supply = True
         self._streaming: _Streaming | None = None
@@ -304,7 +300,6 @@ class SimulatedPicoScope:
         return codes, overflow
 
     def stop(self) -> int:
-        """Stop streaming, or abort a capture."""
-        self.memory.forget()
+        """Stop streaming."""
         self._streaming = None
         return pico.OK

@@ -24,19 +24,18 @@ typedef int32_t ENUM;
 typedef void(CALL *StreamingReady)(int16_t handle, int32_t samples, uint32_t start,
                                    int16_t overflow, uint32_t triggerAt,
                                    int16_t triggered, int16_t autoStop, void *p);
-typedef void(CALL *BlockReady)(int16_t handle, PICO_STATUS status, void *p);
 
 enum {
     OK = 0x00, NOT_FOUND = 0x03, INVALID_HANDLE = 0x0C, INVALID_PARAMETER = 0x0D,
-    INVALID_TIMEBASE = 0x0E, INVALID_VOLTAGE_RANGE = 0x0F, INVALID_CHANNEL = 0x10,
-    STREAMING_FAILED = 0x14, NULL_PARAMETER = 0x16, TOO_MANY_SAMPLES = 0x1E,
-    BUSY = 0x27, INVALID_SAMPLE_INTERVAL = 0x2B, INVALID_COUPLING = 0x45,
+    INVALID_VOLTAGE_RANGE = 0x0F, INVALID_CHANNEL = 0x10,
+    STREAMING_FAILED = 0x14, NULL_PARAMETER = 0x16,
+    INVALID_SAMPLE_INTERVAL = 0x2B, INVALID_COUPLING = 0x45,
     BUFFERS_NOT_SET = 0x46, REQUEST_INVALID = 0x11B
 };
-enum { HANDLE = 0x1234, INPUTS = 4, MEMORY = 1 << 24, PERIOD = 249, TABLE = 64 };
+enum { HANDLE = 0x1234, INPUTS = 4, PERIOD = 249, TABLE = 64 };
 
 static struct {
-    int open, streaming, armed, on_thread;
+    int open, streaming, on_thread;
     int enabled[INPUTS];
     ENUM coupling[INPUTS], range[INPUTS];
     float offset[INPUTS];
@@ -45,7 +44,6 @@ static struct {
     double now, interval, began;
     uint64_t next;
     uint32_t place, ring;
-    int32_t block;
     uint32_t power;
 } u;
 
@@ -260,64 +258,8 @@ API PICO_STATUS CALL ps3000aGetStreamingLatestValues(int16_t handle, StreamingRe
     return OK;
 }
 
-API PICO_STATUS CALL ps3000aMemorySegments(int16_t handle, uint32_t segments,
-                                           int32_t *most) {
-    if (handle != HANDLE) return INVALID_HANDLE;
-    if (segments != 1 || !most) return INVALID_PARAMETER;
-    *most = MEMORY;
-    return OK;
-}
-
-API PICO_STATUS CALL ps3000aGetTimebase2(int16_t handle, uint32_t timebase,
-                                         int32_t samples, float *nanoseconds,
-                                         int16_t oversample, int32_t *most,
-                                         uint32_t segment) {
-    (void)oversample;
-    if (handle != HANDLE) return INVALID_HANDLE;
-    if ((int64_t)timebase < fastest()) return INVALID_TIMEBASE;
-    if (segment) return INVALID_PARAMETER;
-    if (samples > MEMORY >> fastest()) return TOO_MANY_SAMPLES;
-    if (nanoseconds)
-        *nanoseconds = timebase < 3 ? (float)(1 << timebase) : (timebase - 2) * 8.0f;
-    if (most) *most = MEMORY >> fastest();
-    return OK;
-}
-
-API PICO_STATUS CALL ps3000aRunBlock(int16_t handle, int32_t before, int32_t after,
-                                     uint32_t timebase, int16_t oversample,
-                                     int32_t *busy, uint32_t segment, BlockReady ready,
-                                     void *p) {
-    (void)oversample, (void)timebase;
-    if (handle != HANDLE) return INVALID_HANDLE;
-    if (ready || p || segment) return INVALID_PARAMETER;
-    if (busy) *busy = 0;
-    u.block = before + after;
-    u.armed = 2; /* ready when asked a second time */
-    return OK;
-}
-
-API PICO_STATUS CALL ps3000aIsReady(int16_t handle, int16_t *ready) {
-    if (handle != HANDLE) return INVALID_HANDLE;
-    if (u.armed > 1) u.armed--, *ready = 0;
-    else *ready = (int16_t)u.armed;
-    return OK;
-}
-
-API PICO_STATUS CALL ps3000aGetValues(int16_t handle, uint32_t start, uint32_t *samples,
-                                      uint32_t ratio, ENUM mode, uint32_t segment,
-                                      int16_t *overflow) {
-    if (handle != HANDLE) return INVALID_HANDLE;
-    if (u.armed != 1) return BUSY;
-    if (start || ratio > 1 || mode || segment || !samples) return INVALID_PARAMETER;
-    if (*samples > (uint32_t)u.block) *samples = (uint32_t)u.block;
-    for (int i = 0; i < INPUTS; i++)
-        if (u.enabled[i]) render(u.buffer[i], 0, *samples, i);
-    if (overflow) *overflow = 0;
-    return OK;
-}
-
 API PICO_STATUS CALL ps3000aStop(int16_t handle) {
     if (handle != HANDLE) return INVALID_HANDLE;
-    u.streaming = u.armed = 0;
+    u.streaming = 0;
     return OK;
 }

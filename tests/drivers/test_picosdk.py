@@ -13,8 +13,7 @@ import pytest
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import ENVIRONMENT, PROTOTYPES, bind, candidates, load
 from drivers.picoscope.sdk_calls import LibraryCalls
-from sim_backend.picoscope.sdk import FakePs3000a
-from sim_backend.picoscope.sdk_header import StreamingReady
+from sim_backend.picoscope.sdk import FakePs3000a, StreamingReady
 from sim_backend.plant.scope_source import Acquisition, Codes, Voltages
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock

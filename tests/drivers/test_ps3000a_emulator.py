@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.picoscope.block import Trigger
 from drivers.picoscope.listing import Attached, attached
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import ENVIRONMENT, load
-from sim_backend.picoscope.sdk import FakePs3000a
-from sim_backend.picoscope.sdk_header import marked
+from sim_backend.picoscope.sdk import FakePs3000a, marked
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError, LinkLostError, SamplesLostError
@@ -129,19 +127,6 @@ def test_power_states_and_refusals(emulator: Any, library_file: Path) -> None:
         beyond = Channel(signal="V_K", input="A", range=0.1, offset=0.3)
         with pytest.raises(LimitError, match=r"-0\.25 to 0\.25 V"):
             scope.start([beyond], 1e-6)
-
-
-def test_a_block_through_the_compiled_abi(emulator: Any, library_file: Path) -> None:
-    clock = SimulatedClock()
-    with clock.taking_part("scope"):
-        scope = PicoScope(clock=clock, library=str(library_file))
-        scope.open()
-        trigger = Trigger(input="B", level=-0.1, rising=False)
-        stream, block = scope.capture(TWO, 16e-9, 777, before=100, trigger=trigger)
-        scope.close()
-    assert stream.interval == pytest.approx(16e-9)
-    count = np.arange(777)
-    assert np.array_equal(block.codes[0], (count % 249 - 124 + 3) * 256)
 
 
 def test_use_after_close_is_an_error(emulator: Any, library_file: Path) -> None:

@@ -15,13 +15,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.picoscope.block import Trigger
 from drivers.picoscope.listing import attached
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import RANGES
 from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock
-from tactile_lab.errors import InstrumentError, LimitError, TactileLabError
+from tactile_lab.errors import InstrumentError, LimitError
 
 pytestmark = [
     pytest.mark.hardware,
@@ -167,25 +166,6 @@ def test_the_callback_comes_on_the_polling_thread(scope: PicoScope) -> None:
         scope.poll()
     fact("callback on the polling thread", seen == {threading.get_ident()})
     assert seen
-
-
-@pytest.mark.parametrize("interval", [4e-9, 8e-9, 16e-9, 1e-6])
-def test_block_mode(scope: PicoScope, interval: float) -> None:
-    scope.open()
-    stream, block = scope.capture(
-        FOUR, interval, 10_000, before=100,
-        trigger=Trigger(input="C", level=4.0, patience=0.2),
-    )  # fmt: skip
-    fact(f"block interval for {interval:g} s", f"{stream.interval!r} s")
-    assert block.samples == 10_000
-
-
-def test_block_memory(scope: PicoScope) -> None:
-    """A block too long is refused with the size there is: the 3404D's is disputed."""
-    scope.open()
-    with pytest.raises(TactileLabError) as caught:
-        scope.capture(FOUR[:1], 1e-6, 1 << 30)
-    fact("memory", caught.value)
 
 
 @pytest.mark.skipif(
