@@ -6,33 +6,17 @@ as a JSON string (characters stand for bytes, Latin-1)::
     0.012345 > "CURR 0.10000;:SYST:ERR?\\n"
     0.041718 < "0,\\"No error\\"\\r\\n"
 
-Lines that start with `#` are comments. `sim_backend.serial_line.replay` answers from
+Lines that start with `#` are comments. `tests/support/replay.py` answers from
 a transcript.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
 from tactile_lab.errors import SceneError
-
-
-@dataclass(frozen=True)
-class Utterance:
-    """Bytes that went one way.
-
-    Attributes:
-        time: clock time, s.
-        sent: from us to the instrument.
-        data: the bytes.
-    """
-
-    time: float
-    sent: bool
-    data: bytes
 
 
 class Transcript:
@@ -68,31 +52,3 @@ class Transcript:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-
-def read_transcript(path: Path) -> list[Utterance]:
-    """What was said, in order.
-
-    Raises:
-        SceneError: the file cannot be read or is no transcript.
-    """
-    said = []
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as reason:
-        raise SceneError(f"Transcript {path} cannot be read: {reason}") from reason
-    for number, line in enumerate(lines, 1):
-        if not line.strip() or line.startswith("#"):
-            continue
-        try:
-            time, direction, text = line.split(" ", 2)
-            data = json.loads(text).encode("latin-1")
-            if direction not in "<>":
-                raise ValueError(f"{direction!r} is neither > nor <")
-            said.append(Utterance(float(time), direction == ">", data))
-        except (ValueError, AttributeError) as reason:
-            raise SceneError(
-                f"Transcript {path}, line {number}: {line!r} is not "
-                f'"seconds > text" or "seconds < text" ({reason}).'
-            ) from reason
-    return said

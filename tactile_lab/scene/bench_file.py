@@ -221,7 +221,6 @@ class FieldMeterSpec(Table):
         dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
-        interval: time between two readings, s.
         options: keys of the driver's own.
     """
 
@@ -229,7 +228,6 @@ class FieldMeterSpec(Table):
     dialect: str = "lakeshore-425"
     port: str = "sim://field_meter"
     baud: int | None = Field(default=None, ge=50, le=4_000_000)
-    interval: Positive = 0.2
     options: dict[str, Any] = Field(default={})
 
 

@@ -1,10 +1,10 @@
 """What is attached, against served instruments."""
 
 import pytest
+from replay import read_transcript
 
 from drivers.attached import ask_name, attached, fitting, try_out
 from drivers.diagnosis import diagnose, disk
-from drivers.serial_line.transcript import read_transcript
 from sim_backend.serve import ServedBench
 from tactile_lab.errors import BadReplyError
 

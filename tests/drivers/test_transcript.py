@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
+from replay import Replay, read_transcript
 
 from drivers.coil.source import CoilSource
-from drivers.serial_line.transcript import Transcript, read_transcript
+from drivers.serial_line.transcript import Transcript
 from drivers.teslameter import Teslameter
 from sim_backend.coil.source import SimCoilSource
-from sim_backend.serial_line.replay import Replay
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits

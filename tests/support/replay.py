@@ -2,10 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from collections import deque
+from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.serial_line.transcript import Utterance, read_transcript
+from tactile_lab.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Utterance:
+    """Bytes that went one way.
+
+    Attributes:
+        time: clock time, s.
+        sent: from us to the instrument.
+        data: the bytes.
+    """
+
+    time: float
+    sent: bool
+    data: bytes
 
 
 class Replay:
@@ -63,3 +80,31 @@ def _turns(said: list[Utterance]) -> list[tuple[bytes, bytes]]:
         elif turns:
             turns[-1] = (turns[-1][0], turns[-1][1] + one.data)
     return turns
+
+
+def read_transcript(path: Path) -> list[Utterance]:
+    """What was said, in order.
+
+    Raises:
+        SceneError: the file cannot be read or is no transcript.
+    """
+    said = []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as reason:
+        raise SceneError(f"Transcript {path} cannot be read: {reason}") from reason
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        try:
+            time, direction, text = line.split(" ", 2)
+            data = json.loads(text).encode("latin-1")
+            if direction not in "<>":
+                raise ValueError(f"{direction!r} is neither > nor <")
+            said.append(Utterance(float(time), direction == ">", data))
+        except (ValueError, AttributeError) as reason:
+            raise SceneError(
+                f"Transcript {path}, line {number}: {line!r} is not "
+                f'"seconds > text" or "seconds < text" ({reason}).'
+            ) from reason
+    return said
