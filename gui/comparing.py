@@ -8,7 +8,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QFont, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
-from gui.lanes.compare import MARKS, Comparison, Layout, Member
+from gui.lanes.compare import MARKS, Comparison, Layout
+from gui.lanes.source import Member
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, empty, label

@@ -11,8 +11,7 @@ from gui.agreeing import Agreeing
 from gui.choosing import choose_run, choose_scene
 from gui.comparing import load_comparison
 from gui.lanes.compare import Comparison
-from gui.lanes.expected import PlanSource
-from gui.lanes.source import LiveSource
+from gui.lanes.source import LiveSource, PlanSource, Source
 from gui.panels import Panels
 from gui.records import Records
 from gui.review.entries import Entry, entries
@@ -50,11 +49,11 @@ class Opening(QObject):
     def __init__(self, panels: Panels) -> None:
         super().__init__(panels.centre)
         self._panels = panels
-        self.run: RunSource | Comparison | None = None
+        self.run: Source | None = None
         self.ending = ""
         self.gathering = Gathering(panels.review.results, panels.session, self)
         Agreeing(panels.session, self.gathering)
-        self._model: object = None
+        self._modelled: Source | None = None
         self._ended: Path | None = None
         self._records = Records(panels.session, self)
         self._records.loaded.connect(self._show_run)
@@ -209,8 +208,8 @@ class Opening(QObject):
     def take_fetched(self) -> None:
         """Repaint where samples of a run on disk have been read."""
         if self.run is not None and self.run.take_fetched():
-            if self.run.model is not self._model:
-                self._model = self.run.model
+            if self.run.has_model and self._modelled is not self.run:
+                self._modelled = self.run
                 self.gathering.compare_with_model(self.run)
             self.show_lanes()
             self._panels.centre.stack.refresh()

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from gui.lanes.compare import Comparison
 from gui.lanes.lane import Lane, lanes_for
+from gui.lanes.source import Source
 from gui.session.session import Session
-
-if TYPE_CHECKING:
-    from gui.lanes.stored import RunSource
 
 WATCHED = ("V_C1", "V_C2", "V_K", "spikes")
 """What the monitor shows."""
 
 
-def lanes_shown(
-    session: Session, run: RunSource | Comparison | None
-) -> tuple[Lane, ...] | None:
+def lanes_shown(session: Session, run: Source | None) -> tuple[Lane, ...] | None:
     """The lanes of the monitor, of `run` from disk, or of the plan; None: no plan."""
     if session.monitor.alive:
         return lanes_for(WATCHED, twin=False)
     if run is not None:
-        return lanes_for(run.signals, twin=run.model is not None)
+        return lanes_for(run.signals, twin=run.has_model)
     expectation = session.plan_on_screen
     if expectation is None:
         return None

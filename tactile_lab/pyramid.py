@@ -52,13 +52,18 @@ class Level:
         """Cells that are no longer kept."""
         return self.count - len(self)
 
+    @property
+    def end(self) -> float:
+        """End of the newest cell, s; 0 without one."""
+        return float(self._values[0, self._last - 1]) + self.width if len(self) else 0.0
+
     def add(self, cells: Trace, gap: bool | None = None) -> None:
         """Append cells; `gap`: whether one is before them, None: as their time says."""
         if cells.empty:
             return
-        self.width = cells.width
         if gap is None:
-            gap = len(self) == 0 or follows_late(self.trace().end, cells)
+            gap = len(self) == 0 or follows_late(self.end, cells)
+        self.width = cells.width
         more = cells[-self._keep :] if len(cells) > self._keep else cells
         self.count += len(cells) - len(more)
         self._make_room(len(more))
@@ -148,7 +153,7 @@ class Pyramid:
     @property
     def end(self) -> float:
         """Time up to which there are cells, s; 0 without any."""
-        return self._levels[0].trace().end
+        return self._levels[0].end
 
     def newest(self, cells: int) -> Trace:
         """The newest cells of the finest level."""

@@ -8,11 +8,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
 from gui.dialogs.bench_text import Choice
-from gui.lanes.decimate import FloatArray
 from gui.look.theme import Theme
 from gui.parts import column, label, line, push
 from gui.review.conclusion import Conclusion
 from gui.review.loop import LoopPlot
+from tactile_lab.trace import FloatArray
 
 MAGNET = (
     ("r", "Distance magnet to pole face"),

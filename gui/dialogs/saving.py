@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,13 +13,10 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog
 
 from gui.lanes.card import CARD
-from gui.lanes.compare import MARKS, Comparison
-from gui.lanes.decimate import FloatArray
-from gui.lanes.derive import rate_of
-from gui.lanes.expected import starts
-from gui.lanes.lane import Kind, Lane
+from gui.lanes.compare import MARKS
+from gui.lanes.lane import Lane
 from gui.lanes.row import LaneRow
-from gui.lanes.source import Source
+from gui.lanes.source import Member, Source
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
@@ -26,9 +24,9 @@ from gui.look.tokens import LIGHT, Tokens
 from gui.session.messages import Level
 from gui.setup.texts import FieldError
 from tactile_lab.errors import TactileLabError
+from tactile_lab.trace import FloatArray
 
 if TYPE_CHECKING:
-    from gui.lanes.stored import RunSource
     from gui.panels import Panels
 
 TITLE = 34
@@ -57,7 +55,7 @@ def write_scene(panels: Panels, path: Path) -> None:
         panels.session.log(Level.GOOD, "scene", f"Saved {path}")
 
 
-def export_view(panels: Panels, run: RunSource | Comparison | None) -> None:
+def export_view(panels: Panels, run: Source | None) -> None:
     """Ask where, and export what the lanes show; `run` is from disk."""
     name, _ = QFileDialog.getSaveFileName(
         panels.centre.window(),
@@ -69,7 +67,7 @@ def export_view(panels: Panels, run: RunSource | Comparison | None) -> None:
         write_view(panels, run, Path(name))
 
 
-def write_view(panels: Panels, run: RunSource | Comparison | None, path: Path) -> None:
+def write_view(panels: Panels, run: Source | None, path: Path) -> None:
     """Write the visible time of all visible lanes; the ending chooses the format."""
     stack = panels.centre.stack
     simulated = panels.session.spec is None or panels.session.spec.simulated
@@ -127,7 +125,7 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
     painter.setPen(QColor(tokens.text))
     painter.setFont(sized(14, QFont.Weight.DemiBold))
     painter.drawText(QRectF(12, 6, size.width() - 24, 22), title)
-    if isinstance(stack.source, Comparison):
+    if len(stack.source.members) > 1:
         _legend(painter, stack.source, tokens, size.width() - 12)
     top = TITLE
     for row in stack.visible_rows():
@@ -142,13 +140,9 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
         top += row.height()
 
 
-def _legend(
-    painter: QPainter, comparison: Comparison, tokens: Tokens, right: int
-) -> None:
+def _legend(painter: QPainter, source: Source, tokens: Tokens, right: int) -> None:
     """Marker and name of each run, beside the title."""
-    names = [
-        f"{m} {one.name}" for m, one in zip(MARKS, comparison.members, strict=False)
-    ]
+    names = [f"{m} {one.name}" for m, one in zip(MARKS, source.members, strict=False)]
     for name, colour in zip(
         reversed(names), reversed(tokens.runs[: len(names)]), strict=True
     ):
@@ -160,16 +154,15 @@ def _legend(
 
 
 def _card(painter: QPainter, row: LaneRow, tokens: Tokens) -> None:
-    kind = row.lane.kind
-    name = "residual" if kind is Kind.RESIDUAL else row.lane.signal
+    lane = row.lane
     # in a comparison colour means run
-    grey = isinstance(row.plot.source, Comparison)
-    swatch = QColor(tokens.border_strong if grey else tokens.trace(name))
+    grey = len(row.plot.source.members) > 1
+    swatch = QColor(tokens.border_strong if grey else tokens.trace(lane.key))
     painter.fillRect(QRectF(12, 9, 10, 10), swatch)
     painter.setPen(QColor(tokens.text))
     painter.setFont(sized(13, QFont.Weight.DemiBold))
-    unit = f" / {row.lane.unit}" if row.lane.unit else ""
-    short = "Residual" if kind is Kind.RESIDUAL else row.lane.plain
+    unit = f" / {lane.unit}" if lane.unit else ""
+    short = lane.title if lane.key == "residual" else lane.plain
     painter.drawText(
         QRectF(29, 4, CARD - 32, 20), Qt.AlignmentFlag.AlignVCenter, short + unit
     )
@@ -181,19 +174,15 @@ def table(stack: LaneStack, title: str) -> str:
     Lanes have times of their own, so each has its own time column; shorter columns
     end early. Of compared runs each has columns, on the common time.
     """
-    source, columns = stack.source, []
-    runs: list[tuple[str, Source, float]] = [("", source, 0.0)]
-    if isinstance(source, Comparison):
-        runs = [
-            (f"run{k}_", m.source, m.shift) for k, m in enumerate(source.members, 1)
-        ]
-        names = (f"run{k} {m.name}" for k, m in enumerate(source.members, 1))
-        title = "; ".join([title, *names])
+    members, columns = stack.source.members, []
     for row in stack.visible_rows():
-        if row.lane.kind is not Kind.RESIDUAL:
-            for prefix, run, shift in runs:
-                found = _columns(row.lane, run, stack.view, shift)
-                columns += [(prefix + name, values) for name, values in found]
+        for number, member in enumerate(members, 1):
+            prefix = f"run{number}_" if len(members) > 1 else ""
+            found = _columns(row.lane, member, stack.view)
+            columns += [(prefix + name, values) for name, values in found]
+    if len(members) > 1:
+        names = (f"run{number} {one.name}" for number, one in enumerate(members, 1))
+        title = "; ".join([title, *names])
     height = max((values.size for _, values in columns), default=0)
     lines = [f"# {title}; SI units", ",".join(name for name, _ in columns)]
     for at in range(height):
@@ -204,23 +193,23 @@ def table(stack: LaneStack, title: str) -> str:
 
 
 def _columns(
-    lane: Lane, source: Source, view: TimeView, shift: float
+    lane: Lane, member: Member, view: TimeView
 ) -> list[tuple[str, FloatArray]]:
-    """Names and values of a lane's columns, `shift` s later than in the run."""
-    start, end = view.start - shift, view.end - shift
-    if lane.kind is Kind.RASTER:
-        first, last = np.searchsorted(source.spikes, [start, end])
-        return [("spikes_s", source.spikes[first:last] + shift)]
-    if lane.kind is Kind.RATE:
-        drawn = rate_of(source.spikes, start, end, 1 << 20, starts(source.holds))
-    else:
-        drawn = source.trace(lane.signal, start, end, CSV_POINTS)
+    """Names and values of a lane's columns, on the common time; the residual's none."""
+    if lane.key == "residual":
+        return []
+    if lane.raster:
+        first, last = np.searchsorted(member.spikes, [view.start, view.end])
+        return [("spikes_s", member.spikes[first:last])]
+    count = 1 << 20 if lane.key == "rate" else CSV_POINTS
+    si = replace(lane, scale=1.0)
+    found = member.trace(si, view.start, view.end, count)
     unit = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}.get(
         lane.unit, lane.unit
     )
     return [
-        (f"{lane.signal}_time_s", drawn.time + shift),
-        (f"{lane.signal}_mean_{unit}", drawn.mean),
-        (f"{lane.signal}_min_{unit}", drawn.low),
-        (f"{lane.signal}_max_{unit}", drawn.high),
+        (f"{lane.key}_time_s", found.time),
+        (f"{lane.key}_mean_{unit}", found.mean),
+        (f"{lane.key}_min_{unit}", found.low),
+        (f"{lane.key}_max_{unit}", found.high),
     ]

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout
 
 from gui.lanes.axis import number, signed
 from gui.lanes.compare import MARKS
-from gui.lanes.lane import Kind, Lane
+from gui.lanes.lane import Lane
 from gui.look.theme import Theme
 from gui.parts import label
 
@@ -37,7 +37,7 @@ class LaneCard(QFrame):
         self.setFixedWidth(CARD)
         self._swatch = QLabel()
         self._swatch.setFixedSize(QSize(10, 10))
-        self._flat = lane.kind in (Kind.RESIDUAL, Kind.RASTER)
+        self._flat = not lane.valued
         self._value = label("—", "flatvalue" if self._flat else "value")
         self._unit = label(lane.unit, "muted")
         self._more = label("", "small")
@@ -128,10 +128,9 @@ class LaneCard(QFrame):
 
     def tint(self, *, grey: bool) -> None:
         """Colour the swatch; `grey` where colour means something else."""
-        kind, tokens = self.lane.kind, self._theme.tokens
-        name = "residual" if kind is Kind.RESIDUAL else self.lane.signal
+        tokens = self._theme.tokens
         picture = QPixmap(20, 20)
-        picture.fill(tokens.border_strong if grey else tokens.trace(name))
+        picture.fill(tokens.border_strong if grey else tokens.trace(self.lane.key))
         picture.setDevicePixelRatio(2)
         self._swatch.setPixmap(picture)
         if self._runs is not None:
@@ -190,7 +189,7 @@ class LaneCard(QFrame):
     def _text(self, value: float | None, places: int | None = None) -> str:
         if value is None:
             return "—"
-        if self.lane.kind is Kind.RESIDUAL and value > 0.5:
+        if self.lane.symmetric and value > 0.5:
             return self._signed(value, places)
         return number(value, self.lane.places if places is None else places)
 

@@ -6,27 +6,19 @@ ones and the rate lie over each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtGui import QPainter
 
-from gui.lanes import paint
-from gui.lanes.axis import nice_range
-from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.derive import averaged, less, rate_of, scaled
 from gui.lanes.expected import Hold, starts
-from gui.lanes.ground import Place, ground, row_names, rows_of
-from gui.lanes.lane import Kind, Lane
-from gui.lanes.paint import Frame
-from gui.lanes.view import TimeView
-from gui.look.tokens import Tokens
+from gui.lanes.lane import Lane
+from gui.lanes.source import Member, Source
+from tactile_lab.trace import FloatArray, Trace
 
 if TYPE_CHECKING:
-    from gui.lanes.stored import RunSource
+    from gui.lanes.view import TimeView
 
 
 class Layout(Enum):
@@ -42,33 +34,31 @@ MARKS = ("●", "■", "▲")
 """Runs differ in marker too, not by colour alone."""
 
 
-@dataclass(frozen=True, eq=False)
-class Member:
-    """One of the compared runs; `shift` is added to its times, s."""
+class Comparison(Source):
+    """Compared runs as one source; what is asked of one run is answered by the first.
 
-    name: str
-    source: RunSource
-    shift: float = 0.0
-
-
-class Comparison:
-    """Compared runs as one source; what is asked of it is answered by the first.
+    Args:
+        members: two or three runs, the reference first.
 
     Attributes:
-        members: two or three runs, the reference first.
         layout: how they share a lane.
     """
 
-    running = False
-    model = None
-    followed = 0.0
-
     def __init__(self, members: list[Member]) -> None:
-        self.members = members
+        self._members = members
         self.layout = Layout.STACK
+        # what every one of the runs stored has a lane
+        common = set.intersection(*(set(m.source.signals) for m in members))
+        self.signals = tuple(common)
+        self.simulated = any(member.source.simulated for member in members)
 
     @property
-    def first(self) -> RunSource:
+    def members(self) -> list[Member]:
+        """The runs, shifted as they were aligned."""
+        return self._members
+
+    @property
+    def first(self) -> Source:
         """The reference."""
         return self.members[0].source
 
@@ -92,15 +82,18 @@ class Comparison:
         """Of the reference."""
         return self.first.spikes
 
-    @property
-    def twin_spikes(self) -> FloatArray:
-        """None: the model is not compared."""
-        return np.empty(0)
+    def measured(self, signal: str, start: float, end: float, count: int) -> Trace:
+        """Of the reference."""
+        return self.first.measured(signal, start, end, count)
 
-    @property
-    def signals(self) -> set[str]:
-        """What every one of the runs stored."""
-        return set.intersection(*(set(m.source.signals) for m in self.members))
+    def take_fetched(self) -> bool:
+        """Whether samples have arrived since this was last asked."""
+        return any([member.source.take_fetched() for member in self.members])
+
+    def close(self) -> None:
+        """Let go of all files."""
+        for member in self.members:
+            member.source.close()
 
     def align(self, how: str, at: float = 0.0) -> float:
         """Shift the runs; the reference stays.
@@ -118,7 +111,7 @@ class Comparison:
             return self._align_nearest(at)
         index = _index(self.first, at)
         agreed = _start(self.first, index) if how == "step" else 0.0
-        self.members = [
+        self._members = [
             replace(
                 member,
                 shift=agreed - _start(member.source, index) if how == "step" else 0.0,
@@ -138,58 +131,27 @@ class Comparison:
             found = _nearest(times, at - member.shift)
             shift = agreed - found if np.isfinite(found) else member.shift
             moved.append(replace(member, shift=shift))
-        self.members = moved
+        self._members = moved
         return agreed
-
-    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """Of the reference."""
-        return self.first.trace(signal, start, end, count)
-
-    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """Nothing: the model is not compared."""
-        return Drawn.nothing()
-
-    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
-        """Nothing."""
-        return np.empty(0), np.empty(0)
-
-    def take_fetched(self) -> bool:
-        """Whether samples have arrived since this was last asked."""
-        return any([member.source.take_fetched() for member in self.members])
-
-    @property
-    def simulated(self) -> bool:
-        """Whether any of them is simulated."""
-        return any(member.source.simulated for member in self.members)
-
-    @property
-    def path(self) -> Path:
-        """Folder of the reference."""
-        return self.first.path
-
-    def close(self) -> None:
-        """Let go of all files."""
-        for member in self.members:
-            member.source.close()
 
     def stacks(self, lane: Lane) -> bool:
         """Whether the runs lie above each other in a lane."""
-        return self.layout is not Layout.OVERLAY and lane.signal in STACKED
+        return self.layout is not Layout.OVERLAY and lane.key in STACKED
 
     def subtracts(self, lane: Lane) -> bool:
         """Whether the reference is taken from the runs in a lane.
 
         Not from the rate: that of a run is not defined at another run's spikes.
         """
-        slow = lane.signal not in STACKED and lane.kind is not Kind.RATE
+        slow = lane.key not in STACKED and lane.key != "rate"
         return self.layout is Layout.DIFFERENCE and slow
 
-    def drawn(self, lane: Lane, start: float, end: float, count: int) -> list[Drawn]:
-        """Each run's trace of a lane, in shown units and on the common time."""
-        found = [self._of(member, lane, start, end, count) for member in self.members]
+    def shown(self, lane: Lane, start: float, end: float, count: int) -> list[Trace]:
+        """Each run's trace in a lane's unit, on the common time."""
+        found = super().shown(lane, start, end, count)
         if self.subtracts(lane):
             grid = np.linspace(start, end, count)
-            return [less(one, found[0], grid) for one in found]
+            return [one.minus(found[0], grid) for one in found]
         return found
 
     def right_edge(self, view: TimeView) -> float:
@@ -200,26 +162,12 @@ class Comparison:
         ends = [m.source.reach + m.shift for m in self.members]
         return min([view.end, *(e for e in ends if e > view.end - 0.1 * view.width)])
 
-    def _of(
-        self, member: Member, lane: Lane, start: float, end: float, count: int
-    ) -> Drawn:
-        a, b = start - member.shift, end - member.shift
-        if lane.kind is Kind.RATE:
-            steps = starts(member.source.holds)
-            found = rate_of(member.source.spikes, a, b, count, steps)
-        else:
-            found = member.source.trace(lane.signal, a, b, count)
-        found = scaled(found, lane.scale)
-        if member.shift and not found.empty:
-            return replace(found, time=found.time + member.shift)
-        return found
 
-
-def _index(source: RunSource, time: float) -> int:
+def _index(source: Source, time: float) -> int:
     return max(0, int(np.searchsorted(starts(source.holds), time, side="right")) - 1)
 
 
-def _start(source: RunSource, index: int) -> float:
+def _start(source: Source, index: int) -> float:
     """Start of a step, or of the last if there are fewer, s."""
     found = starts(source.holds)
     return float(found[min(index, found.size - 1)]) if found.size else 0.0
@@ -228,58 +176,3 @@ def _start(source: RunSource, index: int) -> float:
 def _nearest(times: FloatArray, at: float) -> float:
     """Of `times`, s, the one nearest to `at`; infinite without any."""
     return float(times[np.argmin(np.abs(times - at))]) if times.size else float("inf")
-
-
-def paint_lane(
-    painter: QPainter,
-    frame: Frame,
-    lane: Lane,
-    place: Place,
-    source: Comparison,
-    tokens: Tokens,
-) -> tuple[tuple[float, float], list[Drawn]]:
-    """Draw one lane of a comparison; the value range it used, and each run's trace."""
-    count = max(50, int(frame.right - frame.left))
-    stacked = source.stacks(lane)
-    drawn = source.drawn(lane, frame.start, frame.end, count)
-    least = 0.1 * lane.least if source.subtracts(lane) else lane.least
-    extents = [d.extent for d in drawn if d.extent is not None]
-    if lane.kind in (Kind.FORCE, Kind.RATE):
-        extents.append((0.0, 0.0))
-    low, high = nice_range(
-        min((e[0] for e in extents), default=0.0),
-        max((e[1] for e in extents), default=1.0),
-        least,
-    )
-    raster = lane.kind is Kind.RASTER
-    whole = Frame(
-        frame.left, frame.right, frame.top, frame.bottom, frame.start, frame.end,
-        low, high,
-    )  # fmt: skip
-    ground(
-        painter, whole, source, tokens,
-        Place(place.top, place.bottom, not (stacked or raster)),
-    )  # fmt: skip
-    names = MARKS[: len(source.members)]
-    rows = rows_of(whole, len(names)) if stacked or raster else []
-    if rows:
-        row_names(painter, whole, tokens, names, tokens.runs)
-    painter.save()
-    painter.setClipRect(whole.area.adjusted(0, -5, 0, 4))
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing, not raster)
-    for number, (member, found) in enumerate(zip(source.members, drawn, strict=True)):
-        line = paint.pen(tokens.runs[number])
-        if raster:
-            times = member.source.spikes + member.shift
-            paint.bars(painter, whole, times, rows[number], line)
-            continue
-        own = whole
-        if rows:
-            top, bottom = rows[number]
-            own = Frame(
-                whole.left, whole.right, top, bottom, whole.start, whole.end, low, high
-            )
-        plain = found if lane.signal == "V_K" else averaged(found)
-        paint.trace(painter, own, plain, line)
-    painter.restore()
-    return (low, high), drawn

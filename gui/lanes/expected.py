@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn, FloatArray, line_between
 from gui.lanes.phase import Phase
+from tactile_lab.trace import FloatArray, Trace
 from tactile_lab.waveform import Waveform
 
 
@@ -111,10 +111,10 @@ class Aligned:
         count: int,
         phase: Phase,
         since: float,
-    ) -> Drawn:
+    ) -> Trace:
         """What the model has in [start, end] s, moved by `phase`, `since` a time on."""
         if signal not in self.preview.traces:
-            return Drawn.nothing()
+            return Trace.nothing()
         time, value = self.preview.traces[signal]
         time = self.times(signal, time)
         # a preview has up to 4e5 points: move only those that may come into view
@@ -122,7 +122,7 @@ class Aligned:
         near = slice(max(0, first - 1), last + 1)
         time, value = phase.moved(time[near]), value[near]
         seam = int(np.searchsorted(time, since))
-        return line_between(time[seam:], value[seam:], start, end, count)
+        return Trace.line(time[seam:], value[seam:]).around(start, end).thin(count)
 
     @property
     def spikes(self) -> FloatArray:
@@ -133,57 +133,3 @@ class Aligned:
         """Times and forces of the plan, N."""
         force = self.preview.force
         return self.times("force", force.time), force.value
-
-
-class Nothing:
-    """A source without data: the lanes of the empty state."""
-
-    reach = followed = 0.0
-    length = 5.0
-    running = False
-
-    def __init__(self) -> None:
-        self.holds: list[Hold] = []
-        self.spikes = np.empty(0)
-        self.twin_spikes = np.empty(0)
-
-    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """No points."""
-        return Drawn.nothing()
-
-    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """No points."""
-        return Drawn.nothing()
-
-    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
-        """No plan."""
-        return np.empty(0), np.empty(0)
-
-
-class PlanSource:
-    """No data yet: the plan and what the model expects of it."""
-
-    reach = followed = 0.0
-    running = True
-
-    def __init__(self, preview: Preview) -> None:
-        self.preview = preview
-        self.length = preview.length
-        self.holds = preview.holds
-        self.spikes = np.empty(0)
-        self.twin_spikes = preview.spikes
-
-    def trace(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """Nothing is measured."""
-        return Drawn.nothing()
-
-    def twin(self, signal: str, start: float, end: float, count: int) -> Drawn:
-        """The model's."""
-        if signal not in self.preview.traces:
-            return Drawn.nothing()
-        time, value = self.preview.traces[signal]
-        return line_between(time, value, start, end, count)
-
-    def planned(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
-        """The planned force."""
-        return self.preview.force.time, self.preview.force.value

@@ -21,8 +21,6 @@ from PySide6.QtWidgets import QWidget
 from gui.lanes import paint
 from gui.lanes.axis import decimals, number, step_of, ticks
 from gui.lanes.card import CARD
-from gui.lanes.derive import rate_of
-from gui.lanes.expected import Nothing, starts
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.paint import Frame
 from gui.lanes.source import Source
@@ -41,7 +39,7 @@ class Navigator(QWidget):
 
     def __init__(self, view: TimeView, theme: Theme) -> None:
         super().__init__()
-        self.source: Source = Nothing()
+        self.source = Source()
         self._view, self._theme = view, theme
         self._grabbed: tuple[str, float, float, float] | None = None
         self._run = QPixmap()
@@ -125,19 +123,12 @@ class Navigator(QWidget):
             paint.polyline(painter, frame.x(planned), y, line)
         if measured.empty:
             return
-        shown = type(measured)(
-            measured.time,
-            measured.low / peak,
-            measured.high / peak,
-            measured.mean / peak,
-            measured.gap,
-        )
+        shown = measured.scaled(1 / peak)
         paint.outline(painter, frame, shown, tokens.force, tokens.sunken)
 
     def _rate(self, painter: QPainter, frame: Frame) -> None:
         source = self.source
-        steps = starts(source.holds)
-        rate = rate_of(source.spikes, 0.0, source.length, 400, steps)
+        rate = source.trace("rate", 0.0, source.length, 400)
         if rate.empty:
             return
         top = max(float(rate.high.max()), 1e-9) * 1.1

@@ -22,8 +22,8 @@ from PySide6.QtGui import (
     QTransform,
 )
 
-from gui.lanes.decimate import Drawn, FloatArray, middle, zigzag
 from gui.look.fonts import sized
+from tactile_lab.trace import FloatArray, Trace, middle
 
 FAR = 1e5
 """Pixels beyond which coordinates are clamped: Qt's rasteriser loses precision."""
@@ -96,14 +96,32 @@ def pen(colour: str, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
     return QPen(QColor(colour), 1, style)
 
 
-def trace(painter: QPainter, frame: Frame, drawn: Drawn, line: QPen) -> None:
+def zigzag(shown: Trace) -> tuple[FloatArray, FloatArray]:
+    """One polyline through all columns: down to the low, up to the high, and on.
+
+    The nearer extreme comes first, so that the line does not cross itself needlessly.
+    """
+    x = np.repeat(shown.time, 2)
+    y = np.empty(x.size)
+    y[0::2], y[1::2] = shown.low, shown.high
+    if len(shown) > 1:
+        centre = (shown.low + shown.high) / 2
+        falling = np.empty(centre.size, np.bool_)
+        falling[1:] = centre[1:] < centre[:-1]
+        falling[0] = falling[1]
+        y[0::2] = np.where(falling, shown.high, shown.low)
+        y[1::2] = np.where(falling, shown.low, shown.high)
+    return x, y
+
+
+def trace(painter: QPainter, frame: Frame, shown: Trace, line: QPen) -> None:
     """Draw a decimated trace, broken at gaps."""
-    if drawn.empty:
+    if shown.empty:
         return
-    x, y = zigzag(drawn)
-    starts = 2 * np.flatnonzero(drawn.gap)
-    if np.array_equal(drawn.low, drawn.high):
-        x, y, starts = drawn.time, drawn.low, starts // 2
+    x, y = zigzag(shown)
+    starts = 2 * np.flatnonzero(shown.gap)
+    if np.array_equal(shown.low, shown.high):
+        x, y, starts = shown.time, shown.low, starts // 2
     polyline(painter, frame.x(x), frame.y(y), line, starts)
 
 
@@ -125,11 +143,11 @@ def polyline(
         painter.drawPolyline(polygon(x[first:last], y[first:last]))
 
 
-def fill(painter: QPainter, frame: Frame, drawn: Drawn, colour: QColor) -> None:
+def fill(painter: QPainter, frame: Frame, shown: Trace, colour: QColor) -> None:
     """Fill between a trace and the value 0; its line hides the jagged edge."""
-    if drawn.empty:
+    if shown.empty:
         return
-    x, y = frame.x(drawn.time), frame.y(drawn.high)
+    x, y = frame.x(shown.time), frame.y(shown.high)
     zero = frame.y1(min(max(0.0, frame.low), frame.high))
     x = np.concatenate([[x[0]], x, [x[-1]]])
     y = np.concatenate([[zero], y, [zero]])
@@ -140,21 +158,21 @@ def fill(painter: QPainter, frame: Frame, drawn: Drawn, colour: QColor) -> None:
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
 
-def envelope(painter: QPainter, frame: Frame, drawn: Drawn, colour: str) -> None:
+def envelope(painter: QPainter, frame: Frame, shown: Trace, colour: str) -> None:
     """Fill between least and largest, so that averaging hides nothing.
 
     A line up and down through every pixel column: Qt fills polygons of so many corners
     ten times more slowly.
     """
-    if drawn.empty or np.array_equal(drawn.low, drawn.high):
+    if shown.empty or np.array_equal(shown.low, shown.high):
         return
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-    trace(painter, frame, drawn, pen(colour))
+    trace(painter, frame, shown, pen(colour))
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
 
 def outline(
-    painter: QPainter, frame: Frame, drawn: Drawn, colour: str, ground: str
+    painter: QPainter, frame: Frame, shown: Trace, colour: str, ground: str
 ) -> None:
     """Fill a trace down to 0 and draw its line; a tint where columns hold many values.
 
@@ -162,11 +180,11 @@ def outline(
     """
     soft = QColor(colour)
     soft.setAlpha(38)
-    fill(painter, frame, drawn, soft)
-    if np.count_nonzero(drawn.low != drawn.high) > drawn.time.size // 2:
-        envelope(painter, frame, drawn, mixed(colour, ground, 0.45))
+    fill(painter, frame, shown, soft)
+    if np.count_nonzero(shown.low != shown.high) > shown.time.size // 2:
+        envelope(painter, frame, shown, mixed(colour, ground, 0.45))
     else:
-        trace(painter, frame, drawn, pen(colour))
+        trace(painter, frame, shown, pen(colour))
 
 
 @lru_cache(maxsize=64)
@@ -180,16 +198,16 @@ def mixed(colour: str, ground: str, share: float) -> str:
     return QColor(*parts).name()
 
 
-def pulses(painter: QPainter, frame: Frame, drawn: Drawn, colour: str) -> None:
+def pulses(painter: QPainter, frame: Frame, shown: Trace, colour: str) -> None:
     """Draw columns that stand out of the noise from least to largest value."""
-    if drawn.empty:
+    if shown.empty:
         return
-    reach = drawn.high - drawn.low
+    reach = shown.high - shown.low
     stands = reach > 4 * middle(reach) + 1e-12
-    x = frame.x(drawn.time[stands]).tolist()
+    x = frame.x(shown.time[stands]).tolist()
     low, high = (
-        frame.y(drawn.low[stands]).tolist(),
-        frame.y(drawn.high[stands]).tolist(),
+        frame.y(shown.low[stands]).tolist(),
+        frame.y(shown.high[stands]).tolist(),
     )
     painter.setPen(pen(colour))
     painter.drawLines(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gui.lanes.decimate import FloatArray
-from gui.lanes.derive import LEAST_SILENCE, SILENCE, begins
+from gui.lanes.rate import LEAST_SILENCE, SILENCE, begins
+from tactile_lab.trace import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
@@ -10,17 +10,16 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from gui.lanes import paint
 from gui.lanes.axis import nice_range, number
-from gui.lanes.compare import Comparison, paint_lane
-from gui.lanes.decimate import Drawn
-from gui.lanes.derive import BAND, averaged
+from gui.lanes.compare import MARKS
 from gui.lanes.ground import AXIS, GUTTER, TIME_AXIS, Place, ground, row_names, rows_of
-from gui.lanes.lane import Kind, Lane
+from gui.lanes.lane import BAND, Lane
 from gui.lanes.paint import Frame
-from gui.lanes.readings import Painted, right_edge, traces, values_at
+from gui.lanes.readings import Painted, values_at
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
+from tactile_lab.trace import Trace
 
 DOTS = 160
 """Most rate markers drawn; more would be a smear and slow."""
@@ -64,50 +63,35 @@ class LanePainter:
         below = TIME_AXIS if self.bottom else 0
         right = max(size.width() - GUTTER, AXIS + 20)
         bottom = max(size.height() - below - 5, 12)
-        view = self.view
-        if isinstance(source, Comparison):
-            self._compare(painter, size, QSize(right, bottom), source, tokens)
-            return
+        lane, view = self.lane, self.view
         count = max(50, int(right - AXIS))
-        measured, twin = traces(
-            self.lane, source, view.start, view.end, count, model=self.options.twin
-        )
-        self.painted = Painted(view.start, view.end, (measured,))
+        runs = source.shown(lane, view.start, view.end, count)
+        twin = Trace.nothing()
+        if self.options.twin:
+            twin = source.twin(lane.key, view.start, view.end, count)
+            twin = twin.scaled(lane.scale, lane.unit)
+        self.painted = Painted(view.start, view.end, tuple(runs))
         room = min(NAMES / max(bottom - 5 - NAMES, NAMES), 1.0) if self.top else 0.0
-        self._fit(measured, twin, source, room)
+        self._fit([*runs, twin], source, room)
         low, high = self.range
         frame = Frame(AXIS, right, 5, bottom, view.start, view.end, low, high)
         painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        place = Place(self.top, self.bottom, self.lane.kind is not Kind.RASTER)
-        ground(painter, frame, source, tokens, place)
+        rows = lane.raster or source.stacks(lane)
+        ground(painter, frame, source, tokens, Place(self.top, self.bottom, not rows))
         painter.save()
         painter.setClipRect(QRectF(frame.left, 0, right - frame.left, bottom + 4))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
-        self._traces(painter, frame, source, measured, twin, tokens)
+        if len(runs) > 1:
+            self._runs(painter, frame, source, runs, tokens)
+        else:
+            self._traces(painter, frame, source, runs[0], twin, tokens)
         painter.restore()
         self._cursors(painter, frame, tokens, size)
-        self._tag(painter, frame, source, tokens)
+        if len(runs) == 1:
+            self._tag(painter, frame, source, tokens)
 
-    def _compare(
-        self,
-        painter: QPainter,
-        size: QSize,
-        corner: QSize,
-        source: Comparison,
-        tokens: Tokens,
-    ) -> None:
-        """Draw two or three runs instead of one."""
-        view, right, bottom = self.view, corner.width(), corner.height()
-        frame = Frame(AXIS, right, 5, bottom, view.start, view.end, 0.0, 1.0)
-        painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        place = Place(self.top, self.bottom, True)
-        self.range, runs = paint_lane(painter, frame, self.lane, place, source, tokens)
-        self.painted = Painted(view.start, view.end, tuple(runs))
-        self._cursors(painter, frame, tokens, size)
-
-    def _fit(self, measured: Drawn, twin: Drawn, source: Source, room: float) -> None:
+    def _fit(self, traces: list[Trace], source: Source, room: float) -> None:
         """Choose the value range: round, and steady while the data allows it.
 
         `room` is left free above the data, as a share of its range.
@@ -115,64 +99,95 @@ class LanePainter:
         if self.manual is not None:
             self.range = self.manual
             return
-        extents = [e for e in (measured.extent, twin.extent) if e is not None]
-        if self.lane.kind is Kind.FORCE:
+        lane = self.lane
+        least = 0.1 * lane.least if source.subtracts(lane) else lane.least
+        extents = [one.extent for one in traces if one.extent is not None]
+        if lane.key == "force":
             _, force = source.planned(self.view.start, self.view.end)
             if force.size:
                 extents.append((float(force.min()) * 1e3, float(force.max()) * 1e3))
-        if self.lane.kind in (Kind.FORCE, Kind.RATE):
+        if lane.zero:
             extents.append((0.0, 0.0))
-        if self.lane.kind is Kind.RESIDUAL:
-            reach = max([abs(v) for e in extents for v in e] + [self.lane.least / 2])
+        if lane.symmetric:
+            reach = max([abs(v) for e in extents for v in e] + [least / 2])
             extents = [(-reach, reach)]
         if not extents:
             return
         low, high = min(e[0] for e in extents), max(e[1] for e in extents)
         high += room * (high - low)
         if low == high == 0.0:
-            self.range = (0.0, self.lane.least)
+            self.range = (0.0, least)
             return
-        wanted = nice_range(low, high, self.lane.least)
+        wanted = nice_range(low, high, least)
         now = self.range
         roomy = (now[1] - now[0]) > 1.6 * (wanted[1] - wanted[0])
         if low < now[0] or high > now[1] or roomy or now == (0.0, 1.0):
             self.range = wanted
+
+    def _runs(
+        self,
+        painter: QPainter,
+        frame: Frame,
+        source: Source,
+        runs: list[Trace],
+        tokens: Tokens,
+    ) -> None:
+        """Several runs, each in its colour; stacked ones in rows of their own."""
+        raster = self.lane.raster
+        rows: list[tuple[float, float]] = []
+        if raster or source.stacks(self.lane):
+            rows = rows_of(frame, len(runs))
+            painter.setClipping(False)
+            row_names(painter, frame, tokens, MARKS[: len(runs)], tokens.runs)
+            painter.setClipping(True)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, not raster)
+        for number_, (member, run) in enumerate(zip(source.members, runs, strict=True)):
+            line = paint.pen(tokens.runs[number_])
+            if raster:
+                paint.bars(painter, frame, member.spikes, rows[number_], line)
+                continue
+            own = frame
+            if rows:
+                top, bottom = rows[number_]
+                own = replace(frame, top=top, bottom=bottom)
+            shown = run if self.lane.key == "V_K" else run.means()
+            paint.trace(painter, own, shown, line)
 
     def _traces(
         self,
         painter: QPainter,
         frame: Frame,
         source: Source,
-        measured: Drawn,
-        twin: Drawn,
+        measured: Trace,
+        twin: Trace,
         tokens: Tokens,
     ) -> None:
-        kind = self.lane.kind
-        colour = tokens.trace("residual" if kind is Kind.RESIDUAL else self.lane.signal)
-        if kind is Kind.RASTER:
+        lane, force = self.lane, self.lane.key == "force"
+        colour = tokens.trace(lane.key)
+        if lane.raster:
             self._raster(painter, frame, source, tokens)
-        elif kind is Kind.RESIDUAL:
+        elif lane.symmetric:
             self._tolerance(painter, frame, tokens)
-        elif kind is Kind.FORCE:
+        elif force:
             paint.outline(painter, frame, measured, colour, tokens.plot)
             self._plan(painter, frame, source, tokens)
-            measured = Drawn.nothing()
-        if self.lane.averaged:
-            spiky = self.lane.signal == "V_K"
+            measured = Trace.nothing()
+        if lane.averaged:
+            spiky = lane.key == "V_K"
             if not spiky:
                 tint = paint.mixed(tokens.twin, tokens.plot, 0.2)
                 paint.envelope(painter, frame, twin, tint)
             tint = paint.mixed(colour, tokens.plot, 0.3)
             paint.envelope(painter, frame, measured, tint)
-            shown = twin if spiky else averaged(twin)
+            shown = twin if spiky else twin.means()
             paint.trace(painter, frame, shown, paint.pen(tokens.twin))
-            paint.trace(painter, frame, averaged(measured), paint.pen(colour))
+            paint.trace(painter, frame, measured.means(), paint.pen(colour))
             if spiky:
                 paint.pulses(painter, frame, measured, colour)
         else:
             paint.trace(painter, frame, twin, paint.pen(tokens.twin))
             paint.trace(painter, frame, measured, paint.pen(colour))
-        if kind in (Kind.RATE, Kind.TRACE):
+        if lane.valued and not force:
             self._dots(painter, frame, measured, colour)
         if source.running and frame.start <= source.reach <= frame.end:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
@@ -181,12 +196,12 @@ class LanePainter:
             painter.drawLine(QPointF(at, 0), QPointF(at, frame.bottom + 3))
 
     def _dots(
-        self, painter: QPainter, frame: Frame, measured: Drawn, colour: str
+        self, painter: QPainter, frame: Frame, measured: Trace, colour: str
     ) -> None:
         """Mark rates, and samples where they lie apart: between them nobody looked."""
         inside = (measured.time >= frame.start) & (measured.time <= frame.end)
         x, y = frame.x(measured.time[inside]), frame.y(measured.mean[inside])
-        rates = self.lane.kind is Kind.RATE and x.size <= DOTS
+        rates = self.lane.key == "rate" and x.size <= DOTS
         samples = bool(np.all((measured.low == measured.high)[inside]))
         if rates or (samples and x.size > 1 and np.diff(x).min() >= APART):
             paint.dots(painter, x, y, colour)
@@ -255,9 +270,9 @@ class LanePainter:
         self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
     ) -> None:
         """The value at the right edge of the data in view, beside where it is."""
-        if self.lane.kind in (Kind.RESIDUAL, Kind.RASTER):
+        if not self.lane.valued:
             return
-        edge = right_edge(source, self.view)
+        edge = source.right_edge(self.view)
         value = values_at(self.lane, source, edge, self.painted)[0]
         if value is None or edge < frame.start:
             return
@@ -266,7 +281,7 @@ class LanePainter:
         box = QRectF(frame.right + 4, y - 9, GUTTER - 9, 18)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(tokens.trace(self.lane.signal)))
+        painter.setBrush(QColor(tokens.trace(self.lane.key)))
         painter.drawRoundedRect(box, 3, 3)
         painter.setPen(QColor(tokens.plot))
         painter.setFont(sized(11, QFont.Weight.DemiBold))

@@ -7,22 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gui.lanes.axis import number
-from gui.lanes.compare import Comparison
-from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.derive import (
-    LEAST_SILENCE,
-    NEVER,
-    SILENCE,
-    begins,
-    difference,
-    rate_at,
-    rate_of,
-    scaled,
-)
 from gui.lanes.expected import starts
-from gui.lanes.lane import Kind, Lane
+from gui.lanes.lane import Lane
+from gui.lanes.rate import LEAST_SILENCE, NEVER, SILENCE, begins, rate_at
 from gui.lanes.source import Source
-from gui.lanes.view import TimeView
+from tactile_lab.trace import FloatArray, Trace
 
 NEAR = 0.02
 """So much is read on either side of a time, s."""
@@ -36,24 +25,17 @@ def newest(lane: Lane, source: Source) -> float | None:
     reach = source.reach
     if reach <= 0:
         return None
-    if lane.kind is Kind.RASTER:
+    if lane.raster:
         return float(source.spikes.size)
-    if lane.kind is Kind.RATE:
+    if lane.key == "rate":
         spikes = source.spikes
         # spikes may be told before the samples they were found in
         now = max(reach, float(spikes[-1])) if spikes.size else reach
         return rate_at(spikes, now, starts(source.holds))
-    if lane.kind is Kind.RESIDUAL:
+    if lane.symmetric:
         reach = min(reach, source.followed)
-    drawn = traces(lane, source, reach - 0.05, reach, 50, model=False)[0]
-    return None if drawn.empty else float(drawn.mean[-1])
-
-
-def right_edge(source: Source, view: TimeView) -> float:
-    """The time that is read on the right: the view's end, or where the data end, s."""
-    if isinstance(source, Comparison):
-        return source.right_edge(view)
-    return min(view.end, source.reach)
+    (shown,) = source.shown(lane, reach - 0.05, reach, 50)
+    return None if shown.empty else float(shown.mean[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,37 +49,13 @@ class Painted:
 
     start: float = 0.0
     end: float = 0.0
-    runs: tuple[Drawn, ...] = ()
+    runs: tuple[Trace, ...] = ()
 
     def close(self, lane: Lane, time: float) -> bool:
         """Whether the value at a time can be read from it."""
         inside = bool(self.runs) and self.start <= time <= self.end
-        fine = all(run.column <= 2 * NEAR / FEW for run in self.runs)
-        return inside and (fine or lane.kind is Kind.RESIDUAL)
-
-
-def traces(
-    lane: Lane, source: Source, start: float, end: float, count: int, *, model: bool
-) -> tuple[Drawn, Drawn]:
-    """What is measured, and what the model has if wanted, in shown units."""
-    none = Drawn.nothing()
-    if lane.kind is Kind.RASTER:
-        return none, none
-    if lane.kind is Kind.RATE:
-        steps = starts(source.holds)
-        twin = rate_of(source.twin_spikes, start, end, count, steps) if model else none
-        return rate_of(source.spikes, start, end, count, steps), twin
-    if lane.kind is Kind.RESIDUAL:
-        # ahead of the twin is the plan: measured less that is no error of the model
-        end = max(start, min(end, source.followed))
-    measured = source.trace(lane.signal, start, end, count)
-    if lane.kind is Kind.RESIDUAL:
-        expected = source.twin(lane.signal, start, end, 4 * count)
-        return scaled(difference(measured, expected), lane.scale), none
-    twin = none
-    if model and lane.kind is not Kind.FORCE:
-        twin = scaled(source.twin(lane.signal, start, end, count), lane.scale)
-    return scaled(measured, lane.scale), twin
+        fine = all(run.step <= 2 * NEAR / FEW for run in self.runs)
+        return inside and (fine or lane.symmetric)
 
 
 def values_at(
@@ -108,28 +66,18 @@ def values_at(
     They are those of the picture, so that numbers and traces do not disagree, but where
     a column of it is a mean over long.
     """
-    start, end = time - NEAR, time + NEAR
-    if not painted.close(lane, time):
-        painted = Painted()
-    if isinstance(source, Comparison):
-        drawn = painted.runs or source.drawn(lane, start, end, FEW)
-        return tuple(
-            _value(lane, member.source, time, time - member.shift, one)
-            for member, one in zip(source.members, drawn, strict=True)
-        )
-    (one,) = painted.runs or traces(lane, source, start, end, FEW, model=False)[:1]
-    return (_value(lane, source, time, time, one),)
-
-
-def _value(
-    lane: Lane, source: Source, time: float, own: float, drawn: Drawn
-) -> float | None:
-    """At `time` of the picture, which is `own` of the run."""
-    if source.reach <= 0 or not 0 <= own <= source.reach:
-        return None
-    if lane.kind is Kind.RATE:
-        return rate_at(source.spikes, own, starts(source.holds))
-    return drawn.at(time)
+    runs = painted.runs if painted.close(lane, time) else ()
+    values: list[float | None] = []
+    shown = runs or source.shown(lane, time - NEAR, time + NEAR, FEW)
+    for member, trace in zip(source.members, shown, strict=True):
+        run, own = member.source, time - member.shift
+        if run.reach <= 0 or not 0 <= own <= run.reach:
+            values.append(None)
+        elif lane.key == "rate":
+            values.append(rate_at(run.spikes, own, starts(run.holds)))
+        else:
+            values.append(trace.at(time))
+    return tuple(values)
 
 
 def count_between(spikes: FloatArray, start: float, end: float) -> int:

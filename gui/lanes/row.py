@@ -8,16 +8,15 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
 
 from gui.lanes.axis import number, signed
 from gui.lanes.card import LaneCard
-from gui.lanes.compare import MARKS, Comparison
+from gui.lanes.compare import MARKS
 from gui.lanes.expected import starts
 from gui.lanes.ground import AXIS, GUTTER
-from gui.lanes.lane import Kind, Lane
+from gui.lanes.lane import Lane
 from gui.lanes.plot import LanePainter, Options
 from gui.lanes.readings import (
     count_between,
     interval_text,
     newest,
-    right_edge,
     values_at,
     view_text,
 )
@@ -37,7 +36,7 @@ class LanePlot(QWidget):
     ) -> None:
         super().__init__()
         self.painter = LanePainter(lane, view, options)
-        self.source: Source | None = None
+        self.source = Source()
         self.zoom_box = False
         self._view, self._theme = view, theme
         self._from: tuple[QPoint, float] | None = None
@@ -51,8 +50,6 @@ class LanePlot(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the lane and the zoom box."""
-        if self.source is None:
-            return
         painter = QPainter(self)
         self.painter.paint(painter, self.size(), self.source, self._theme.tokens)
         if self.zoom_box and self._from is not None and self._to is not None:
@@ -151,18 +148,15 @@ class LaneRow(QFrame):
         edge of the view, as the tag has it, and of spikes how many are in view.
         """
         lane, card, view = self.lane, self.card, self._view
-        edge = right_edge(source, view)
-        if isinstance(source, Comparison):
-            self._compare(source)
-            return
-        if lane.kind is Kind.RASTER:
+        edge = source.right_edge(view)
+        if len(source.members) > 1:
+            self._show_runs(source, edge)
+        elif lane.raster:
             self._show_spikes(source, edge)
-            return
-        if source.running:
-            card.show_value(newest(lane, source))
         else:
-            card.show_value(self._values(source, edge)[0])
-        card.show_more("" if view.cursors is None else self._at_cursors(source))
+            known = None if source.running else self._values(source, edge)[0]
+            card.show_value(newest(lane, source) if source.running else known)
+            card.show_more("" if view.cursors is None else self._at_cursors(source))
 
     def _show_spikes(self, source: Source, edge: float) -> None:
         spikes, steps, view = source.spikes, starts(source.holds), self._view
@@ -177,19 +171,15 @@ class LaneRow(QFrame):
             words = f"{count_between(spikes, *sorted(view.cursors))} between A and B"
         self.card.show_more(words)
 
-    def _compare(self, source: Comparison) -> None:
+    def _show_runs(self, source: Source, edge: float) -> None:
         """One line per run."""
         cursors = self._view.cursors
         less = f"less {MARKS[0]}" if source.subtracts(self.lane) else ""
-        if self.lane.kind is Kind.RASTER:
+        if self.lane.raster:
             low, high = sorted(cursors or (self._view.start, self._view.end))
-            counts = [
-                float(count_between(m.source.spikes + m.shift, low, high))
-                for m in source.members
-            ]
+            counts = [float(count_between(m.spikes, low, high)) for m in source.members]
             self.card.show_runs(counts, None, "A to B" if cursors else "in view")
         elif cursors is None:
-            edge = right_edge(source, self._view)
             self.card.show_runs(self._values(source, edge), None, less)
         else:
             a, b = (self._values(source, time) for time in cursors)
@@ -215,14 +205,13 @@ class LaneRow(QFrame):
 
     def _follow_picture(self) -> None:
         """What is at the right edge has moved with the picture."""
-        source = self.plot.source
-        if source is not None and not source.running:
-            self.show_numbers(source)
+        if not self.plot.source.running:
+            self.show_numbers(self.plot.source)
 
     def tint(self) -> None:
         """Colour the swatch as theme and source want it."""
         # in a comparison colour means run, so the lane's own colour steps back
-        self.card.tint(grey=isinstance(self.plot.source, Comparison))
+        self.card.tint(grey=len(self.plot.source.members) > 1)
         self.plot.update()
 
 

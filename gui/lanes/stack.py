@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame
 
-from gui.lanes.expected import Nothing
-from gui.lanes.lane import Kind, Lane
+from gui.lanes.lane import Lane
 from gui.lanes.navigator import Navigator
 from gui.lanes.plot import Options
 from gui.lanes.readings import Painted
@@ -28,7 +27,7 @@ class LaneStack(QFrame):
         super().__init__()
         self.view = view
         self.options = Options()
-        self.source: Source = Nothing()
+        self.source = Source()
         self.rows: list[LaneRow] = []
         self.navigator = Navigator(view, theme)
         self.show_residual = True
@@ -88,7 +87,7 @@ class LaneStack(QFrame):
         shown = []
         for row in self.rows:
             wanted = row.lane.key not in self._hidden
-            if row.lane.kind is Kind.RESIDUAL:
+            if row.lane.key == "residual":
                 wanted = wanted and self.show_residual
             row.setVisible(wanted)
             row.plot.zoom_box = self.zoom_box

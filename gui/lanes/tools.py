@@ -8,7 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QWidget
 
 from gui.lanes.axis import decimals
-from gui.lanes.compare import MARKS, Comparison
+from gui.lanes.compare import MARKS
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
@@ -198,7 +198,7 @@ class Tools(QWidget):
         spikes = self._stack.source.spikes
         count = int(np.diff(np.searchsorted(spikes, [low, high]))[0])
         span = high - low
-        whose = f"{MARKS[0]} " if isinstance(self._stack.source, Comparison) else ""
+        whose = f"{MARKS[0]} " if len(self._stack.source.members) > 1 else ""
         rate = f" · {whose}<b>{count / span:.3g} Hz</b>" if span > 0 else ""
         boxes = [
             f'<span style="background:{colour};color:{tokens.on_accent};'

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QObject, Signal
 
-from gui.lanes.compare import Comparison
 from gui.lanes.source import Source
 from gui.session.finding import Finding
 from gui.session.fit import Beside, beside
@@ -37,7 +36,7 @@ class Fitting(QObject):
     def ask(self, findings: Sequence[Finding], source: Source | None) -> None:
         """Fit `findings`, and compare `source` with the model beside it."""
         self._serial += 1
-        if source is None or isinstance(source, Comparison):
+        if source is None or len(source.members) > 1:
             self._next = None
             self.fitted.emit(None)
             return

@@ -9,11 +9,11 @@ from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
 from gui.lanes.axis import decimals, nice_range, number, step_of, ticks
-from gui.lanes.decimate import FloatArray
 from gui.lanes.paint import Frame
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.look.tokens import Tokens
+from tactile_lab.trace import FloatArray
 
 
 class LoopPlot(QWidget):

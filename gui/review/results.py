@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gui.lanes.decimate import FloatArray
 from gui.look.theme import Theme
 from gui.parts import (
     column,
@@ -34,6 +33,7 @@ from gui.review.rate_plot import RatePlot
 from gui.review.wording import unbroken
 from gui.session.finding import Finding
 from gui.session.fit import Fit
+from tactile_lab.trace import FloatArray
 
 HEAD, ROW, MOST = 52, 26, 12
 """Heights of the table's head and of a row, px; rows that always have room."""

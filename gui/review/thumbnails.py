@@ -14,11 +14,11 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPolygonF
 from PySide6.QtWidgets import QWidget
 from shiboken6 import isValid
 
-from gui.lanes.decimate import FloatArray
 from gui.look.theme import Theme
 from gui.session.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.store.run import Run
+from tactile_lab.trace import FloatArray
 
 POINTS = 72
 """Points of the force, and places a spike can be drawn at."""

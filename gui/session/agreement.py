@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gui.lanes.derive import BAND
+from gui.lanes.lane import BAND
 
 
 @dataclass(frozen=True)

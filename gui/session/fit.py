@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gui.lanes.axis import number
-from gui.lanes.decimate import Drawn, FloatArray
-from gui.lanes.derive import difference
 from gui.lanes.source import Source
 from gui.session.agreement import Agreement
 from gui.session.finding import Finding, finding
@@ -21,6 +19,7 @@ from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.trace import FloatArray, Trace
 
 COLUMNS = 2000
 """Columns in which measured and modelled voltages are compared."""
@@ -72,7 +71,7 @@ class Beside:
 
     spikes: FloatArray
     twin_spikes: FloatArray
-    voltages: dict[str, tuple[Drawn, Drawn]]
+    voltages: dict[str, tuple[Trace, Trace]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,9 +215,9 @@ def _fall(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
     return Card("Fall in the hold", value, text, beside)
 
 
-def _agreement(measured: Drawn, model: Drawn) -> Agreement | None:
+def _agreement(measured: Trace, model: Trace) -> Agreement | None:
     """How well the model follows one voltage, over the range that was measured."""
-    rest, extent = difference(measured, model), measured.extent
+    rest, extent = measured.residual(model), measured.extent
     if rest.empty or extent is None or extent[1] <= extent[0]:
         return None
     rms = float(np.sqrt(np.mean(rest.mean**2)))

@@ -123,7 +123,7 @@ class Incoming(Core):
                 self.reported.emit(folder)
             case Twinned(part=part):
                 if self.source is not None:
-                    self.source.tracks.add(part)
+                    self.source.model.add(part)
             case Errand():
                 self.errand = told
                 self.log(Level.WARNING, "runner", f"{told.doubt} {told.text}".strip())

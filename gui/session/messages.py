@@ -8,12 +8,12 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gui.lanes.twinned import TwinSlice
+from gui.lanes.twin import TwinSlice
 from gui.session.request import Request
 from gui.state import Fault
 from tactile_lab.acquisition.events import Event
-from tactile_lab.acquisition.live import Bins
 from tactile_lab.bench import CoilLimits, OffReport
+from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
@@ -106,7 +106,7 @@ class Begun:
 class Samples:
     """The newest samples of a run by signal, decimated, and the coil just now."""
 
-    bins: dict[str, Bins]
+    bins: dict[str, Trace]
     coil: CoilState
 
 

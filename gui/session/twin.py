@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gui.lanes.twinned import TwinSlice
-from tactile_lab.acquisition.live import Bins
+from gui.lanes.twin import TwinSlice
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.scene import Scene
+from tactile_lab.trace import Trace
 
 EVERY = 0.3
 """Seconds between slices."""
@@ -46,7 +46,8 @@ class LiveTwin:
         grid = np.linspace(begin, end, count, endpoint=False)
         bins = {}
         for signal in KEPT:
-            value = out.sample(signal, grid).astype(np.float32)
-            bins[signal] = Bins(grid, (end - begin) / count, value, value, value)
+            value = out.sample(signal, grid)
+            step = (end - begin) / count
+            bins[signal] = Trace.bins(grid, value, value, value, step)
         spikes = np.empty(0) if out.spike_times is None else out.spike_times
         return TwinSlice(bins, spikes, end)

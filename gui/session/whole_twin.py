@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gui.lanes.decimate import FloatArray
-from gui.lanes.twinned import TwinSlice
-from tactile_lab.acquisition.live import Bins
+from gui.lanes.twin import TwinSlice
 from tactile_lab.model.simulate import Result
 from tactile_lab.planning.preview import model
 from tactile_lab.store.run import Run
+from tactile_lab.trace import FloatArray, Trace
 
 MODELLED = ("V_C1", "V_C2", "V_K")
 STEP = 1e-3
@@ -72,7 +71,7 @@ def binned(
     start: float,
     end: float,
     count: int,
-) -> Bins:
+) -> Trace:
     """A model's signal in `count` bins of [start, end] s; no spike falls between."""
     bins = np.linspace(start, end, count, endpoint=False)
     width = (end - start) / count
@@ -86,5 +85,4 @@ def binned(
             value = result.sample(signal, when)
             np.minimum.at(low, at, value)
             np.maximum.at(high, at, value)
-    low, high, mean = (v.astype(np.float32) for v in (low, high, regular.mean(axis=1)))
-    return Bins(bins, width, low, high, mean)
+    return Trace.bins(bins, low, high, regular.mean(axis=1), width)

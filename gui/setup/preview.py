@@ -9,11 +9,11 @@ from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
 from gui.lanes.axis import decimals, number, step_of, ticks
-from gui.lanes.decimate import line_between
 from gui.lanes.expected import Preview
 from gui.lanes.paint import Frame
 from gui.look.fonts import sized
 from gui.look.theme import Theme
+from tactile_lab.trace import Trace
 
 HEIGHT = 118
 LEFT, RIGHT = 38, 8
@@ -119,7 +119,7 @@ class WaveformPreview(QWidget):
                 number(value, decimals(step_of(preview.length, 6))),
             )
         count = max(50, self.width())
-        drawn = line_between(preview.force.time, force, 0.0, preview.length, count)
+        drawn = Trace.line(preview.force.time, force).thin(count)
         soft = QColor(tokens.force)
         soft.setAlpha(50)
         paint.fill(painter, frame, drawn, soft)

@@ -13,11 +13,11 @@ from tactile_lab.acquisition.alignment import CLUSTER, Edge, align, find_edges
 from tactile_lab.acquisition.coil_thread import Applied
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.journal import Journal
-from tactile_lab.acquisition.live import Bins
 from tactile_lab.acquisition.rate import Rate
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
+from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome
 
 
@@ -131,7 +131,7 @@ class Account:
             self.journal.field(time, tesla)
         self.emit(events.FieldRead(time, tesla))
 
-    def note_edges(self, shunt: Bins) -> None:
+    def note_edges(self, shunt: Trace) -> None:
         """Find the newest set-points' edges in the binned coil current."""
         if self._origin is not None:
             found = find_edges(self._current, self._origin, shunt)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.acquisition.coil_thread import Applied
-from tactile_lab.acquisition.live import Bins
+from tactile_lab.trace import Trace
 
 SMALLEST = 0.03
 """Smallest step of the current that counts as an edge, A (two codes of the shunt)."""
@@ -64,7 +64,7 @@ class Alignment:
     uncertainty: float
 
 
-def find_edges(applied: Sequence[Applied], zero: float, shunt: Bins) -> list[Edge]:
+def find_edges(applied: Sequence[Applied], zero: float, shunt: Trace) -> list[Edge]:
     """Edges of the set-points in `applied`, as the binned coil current shows them.
 
     Args:

@@ -8,12 +8,14 @@ that is too slow loses old bins from the picture, never from the record.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.pyramid import Level
+from tactile_lab.trace import Trace
 
 BIN = 1e-3
 """Length of one bin, s (at least one sample)."""
@@ -22,38 +24,19 @@ CAPACITY = 1 << 17
 """Bins kept per channel: 131 s at 1 ms."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bins:
-    """Consecutive bins of one channel in the signal's SI unit.
-
-    Attributes:
-        time: shape (n,), start of each bin on the run's time axis, s.
-        width: of one bin, s.
-        low, high, mean: shape (n,), of the samples in each bin.
-    """
-
-    time: NDArray[np.float64]
-    width: float
-    low: NDArray[np.float32]
-    high: NDArray[np.float32]
-    mean: NDArray[np.float32]
-
-
 class Live:
-    """A ring of bins per channel."""
+    """The newest bins of each channel."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._channels: tuple[Channel, ...] = ()
-        self._written = 0
+        self._levels: list[Level] = []
         self._per_bin = 1
         self._interval = 0.0
         self._start = 0.0
         self._gapless = True
         self._scale: list[tuple[float, float]] = []
         self._rest: NDArray[np.int16] = np.empty((0, 0), np.int16)
-        self._ring: NDArray[np.float32] = np.empty((3, 0, 0), np.float32)
-        self._time: NDArray[np.float64] = np.empty(0)
         self._next_time = 0.0
 
     @property
@@ -64,7 +47,7 @@ class Live:
     @property
     def written(self) -> int:
         """Bins written so far; grows by one per bin and never falls."""
-        return self._written
+        return self._levels[0].count if self._levels else 0
 
     @property
     def reach(self) -> float:
@@ -76,10 +59,7 @@ class Live:
         with self._lock:
             if stream.channels != self._channels:
                 self._channels = stream.channels
-                count = len(stream.channels)
-                self._written = 0
-                self._ring = np.zeros((3, count, CAPACITY), np.float32)
-                self._time = np.zeros(CAPACITY)
+                self._levels = [Level(CAPACITY) for _ in stream.channels]
             self._interval = stream.interval
             self._per_bin = max(1, round(BIN / stream.interval))
             self._scale = [
@@ -114,16 +94,15 @@ class Live:
         kind = np.int32 if per_bin < 1 << 16 else np.int64
         mean = cells.sum(axis=2, dtype=kind) / np.float32(per_bin)
         width = per_bin * self._interval
+        time = self._next_time + width * np.arange(bins)
+        whole = self._per_bin * self._interval
         with self._lock:
-            at = (self._written + np.arange(bins)) % CAPACITY
-            self._time[at] = self._next_time + width * np.arange(bins)
             for row, (gain, offset) in enumerate(self._scale):
-                for part, values in enumerate((low, high, mean)):
-                    self._ring[part, row, at] = values[row] * gain + offset
-            self._written += bins
+                a, b, c = (part[row] * gain + offset for part in (low, high, mean))
+                self._levels[row].add(Trace.bins(time, a, b, c, whole))
             self._next_time += bins * width
 
-    def since(self, written: int, signal: str) -> Bins:
+    def since(self, written: int, signal: str) -> Trace:
         """Bins of `signal` from number `written` on, as far as they are still kept.
 
         Raises:
@@ -131,13 +110,9 @@ class Live:
         """
         if signal not in self.signals:
             raise KeyError(signal)
-        row = self.signals.index(signal)
         with self._lock:
-            first = max(written, self._written - CAPACITY, 0)
-            at = np.arange(first, self._written) % CAPACITY
-            low, high, mean = self._ring[:, row, at]
-            width = self._per_bin * self._interval
-            return Bins(self._time[at], width, low, high, mean)
+            found = self._levels[self.signals.index(signal)].since(written)
+        return replace(found, signal=signal)
 
     def levels(self, start: float, end: float) -> dict[str, float]:
         """Mean of each measured signal over [start, end) s, where there is any."""
@@ -164,14 +139,6 @@ class Live:
             found[signal] = np.column_stack([time, bins.mean[::every]])
         return found
 
-    def between(self, start: float, end: float, signal: str) -> Bins:
+    def between(self, start: float, end: float, signal: str) -> Trace:
         """Bins of `signal` that start in [start, end) s on the run's axis."""
-        bins = self.since(0, signal)
-        inside = slice(*np.searchsorted(bins.time, [start, end]))
-        return Bins(
-            bins.time[inside],
-            bins.width,
-            bins.low[inside],
-            bins.high[inside],
-            bins.mean[inside],
-        )
+        return self.since(0, signal).cut(start, end)

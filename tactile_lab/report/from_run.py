@@ -146,7 +146,7 @@ def _clock_uncertainty(segments: Records, time: float) -> float | None:
 
 def _trace(run: Run, name: str) -> Trace:
     signal = run.signal(name)
-    cells = signal.envelope(cells=CELLS)
+    cells = signal.trace(cells=CELLS)
     half = np.diff(cells.time, append=cells.time[-1:]) / 2
     half[-1:] = half[-2:-1]
     return Trace(

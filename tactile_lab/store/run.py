@@ -266,7 +266,7 @@ class Run:
         def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
             part = signal.between(start, end)
             cells = max(1, (part.stop - part.start) // together)
-            found = signal.envelope(part.start, part.stop, cells=cells)
+            found = signal.trace(part.start, part.stop, cells=cells)
             step = np.diff(found.time[-2:]) if found.time.size > 1 else 0.0
             return found.time[:-1] + step / 2, found.mean[:-1]  # the last may be short
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.layout import BIN
+from tactile_lab.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
@@ -51,20 +52,10 @@ class Axis:
             return min(index, int(self.first[which + 1]))
         return index
 
-
-@dataclass(frozen=True, eq=False)
-class Envelope:
-    """Extremes and mean of consecutive cells, for drawing and averaging.
-
-    Attributes:
-        time: shape (n,), start of each cell, s on the run's axis.
-        low, high, mean: shape (n,), SI unit of the signal.
-    """
-
-    time: FloatArray
-    low: FloatArray
-    high: FloatArray
-    mean: FloatArray
+    def after_gaps(self, least: float) -> NDArray[np.int64]:
+        """Samples before which more than `least` s were not sampled, ascending."""
+        ends = self.time[:-1] + np.diff(self.first) * self.step[:-1]
+        return self.first[1:][self.time[1:] - ends > least]
 
 
 class StoredSignal:
@@ -146,9 +137,9 @@ class StoredSignal:
         first = self.axis.sample_at(start)
         return slice(min(first, self._length), min(last, self._length))
 
-    def envelope(
+    def trace(
         self, start: int = 0, stop: int | None = None, *, cells: int = 1000
-    ) -> Envelope:
+    ) -> Trace:
         """Samples start to stop in about `cells` cells, at once for any length.
 
         Wide views come from the stored pyramid (their ends fall on its bins), narrow
@@ -156,8 +147,7 @@ class StoredSignal:
         """
         start, stop, _ = slice(start, stop).indices(self._length)
         if start >= stop:
-            nothing = np.empty(0)
-            return Envelope(nothing, nothing, nothing, nothing)
+            return Trace.nothing(self.name, self.unit)
         per = max(1, -(-(stop - start) // max(cells, 1)))
         size = BIN
         if per < size:
@@ -171,8 +161,10 @@ class StoredSignal:
 
     def _cells(
         self, first: int, per: int, size: int, end: int, columns: tuple[Any, Any, Any]
-    ) -> Envelope:
+    ) -> Trace:
         """Join `per` entries of `size` samples each, the first of them number `first`.
+
+        After a gap as long as a cell a new one begins.
 
         Args:
             first: number of the first entry.
@@ -182,7 +174,13 @@ class StoredSignal:
             columns: smallest, largest and sum of each entry.
         """
         low, high, total = columns
+        width = per * size * self.interval
+        late = self.axis.after_gaps(width - self.interval / 2)
+        late = -(-late // size) - first
+        late = late[(late > 0) & (late < low.size)]
         edges = np.arange(0, low.size, per)
+        if late.size:
+            edges = np.union1d(edges, late)
         starts = (first + edges) * size
         stops = np.minimum((first + np.append(edges[1:], low.size)) * size, end)
         mean = np.add.reduceat(total, edges, dtype=np.int64) / (stops - starts)
@@ -191,7 +189,10 @@ class StoredSignal:
         one, other, mean = (v * self.gain + self.offset for v in (one, other, mean))
         # a negative gain turns smallest into largest
         least, most = np.minimum(one, other), np.maximum(one, other)
-        return Envelope(self.axis.time_of(starts), least, most, mean)
+        gap = np.isin(edges, late)
+        gap[0] = True
+        time = self.axis.time_of(starts)
+        return Trace(time, least, most, mean, gap, width, self.name, self.unit)
 
     def _bins_between(self, first: int, last: int) -> NDArray[Any]:
         """Entries of the pyramid. A small part is read, the whole is read and kept."""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tactile_lab.acquisition.alignment import CLOCK_ERROR, Edge, align, find_edges
 from tactile_lab.acquisition.coil_thread import Applied
-from tactile_lab.acquisition.live import Bins
+from tactile_lab.trace import Trace
 
 
 def edges(times, offset, drift, before, after):
@@ -70,7 +70,7 @@ def test_edges_worse_than_the_host_clock_change_nothing():
 def test_an_edge_is_found_where_the_shunt_shows_it():
     time = np.arange(2000) * 1e-3
     current = np.where(time < 0.5, 0.1, 0.4).astype(np.float32)
-    bins = Bins(time, 1e-3, current, current, current)
+    bins = Trace.bins(time, current, current, current, 1e-3)
     applied = [
         Applied(3.3, 3.31, 0.1, None),
         Applied(3.488, 3.505, 0.4, None),

@@ -34,8 +34,9 @@ from gui.session.session import Session
 from gui.state import State
 from gui.window import Window
 from tactile_lab.acquisition.ending import CoilState
-from tactile_lab.acquisition.live import Bins, Live
+from tactile_lab.acquisition.live import Live
 from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.trace import Trace
 
 OFF = CoilState(False, None, None, None)
 SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
@@ -161,7 +162,7 @@ def hour(source: LiveSource) -> None:
         time_ = 1e-3 * np.arange(first, first + 100_000)
         for signal in SIGNALS:
             mean = (np.sin(time_) + rng.normal(0, 0.05, time_.size)).astype(np.float32)
-            bins = Bins(time_, 1e-3, mean - 0.05, mean + 0.05, mean)
+            bins = Trace.bins(time_, mean - 0.05, mean + 0.05, mean, 1e-3)
             source.add_bins({signal: bins})
     source.add_spikes(tuple(np.sort(rng.uniform(0, 3600, 36_000)).tolist()))
 

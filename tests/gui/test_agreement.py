@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from gui.lanes.decimate import Drawn
 from gui.session.agreement import Agreement
 from gui.session.fit import Beside, fit
 from gui.state import Lamp
+from tactile_lab.trace import Trace
 
 
 def model_chip(lab):
@@ -53,7 +53,7 @@ def test_in_step_is_a_residual_within_its_band() -> None:
     time = np.linspace(0, 10, 200)
     model = 4 + 0.5 * np.sin(time)
     for off, in_step in ((0.049, True), (0.051, False)):
-        both = (Drawn.line(time, model + off), Drawn.line(time, model))
+        both = (Trace.line(time, model + off), Trace.line(time, model))
         found = fit([], Beside(np.empty(0), np.empty(0), {"V_C1": both})).agreement
         assert found is not None and found.in_step is in_step
         assert abs(found.rms - off) < 1e-6

@@ -7,12 +7,12 @@ import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QLabel
 
-from gui.lanes.decimate import Drawn
 from gui.lanes.readings import interval_text
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.wording import unbroken
 from gui.session.finding import Finding, finding
 from gui.session.fit import Beside, fit
+from tactile_lab.trace import Trace
 
 HOLD = (0.0, 2.0)
 
@@ -31,7 +31,7 @@ TRAIN = np.concatenate([s.start + s.times for s in STEPS])
 def seen(late: float = 0.0, off: float = 0.0) -> Beside:
     time = np.linspace(0, 12, 500)
     model = 4 + 0.5 * np.sin(time)
-    both = (Drawn.line(time, model + off), Drawn.line(time, model))
+    both = (Trace.line(time, model + off), Trace.line(time, model))
     return Beside(TRAIN + late, TRAIN, {"V_C1": both})
 
 
@@ -60,7 +60,7 @@ def test_bars_measure_the_distance_to_the_model() -> None:
 
 
 def test_no_model_no_bars() -> None:
-    alone = Beside(TRAIN, np.empty(0), {"V_C1": (Drawn.nothing(), Drawn.nothing())})
+    alone = Beside(TRAIN, np.empty(0), {"V_C1": (Trace.nothing(), Trace.nothing())})
     found = fit(STEPS, alone)
     assert found.bars == () and found.model == ()
     assert found.cards[0].model == ""

@@ -3,17 +3,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.axis import decimals, nice_range, number, signed, ticks
-from gui.lanes.decimate import columns, line_between, zigzag
-from gui.lanes.derive import rate_at, rate_of
 from gui.lanes.expected import Aligned, Hold, Preview
-from gui.lanes.history import COARSE, FINE, SlowTrack, Track
-from tactile_lab.acquisition.live import Bins
+from gui.lanes.paint import zigzag
+from gui.lanes.rate import rate_at, rate_of
+from gui.lanes.source import Readings
+from tactile_lab.pyramid import COARSE, FINE, Pyramid
+from tactile_lab.trace import Trace
 from tactile_lab.waveform import Waveform
 
 
-def bins(first: int, values: np.ndarray, width: float = 1e-3) -> Bins:
+def bins(first: int, values: np.ndarray, width: float = 1e-3) -> Trace:
     low = values.astype(np.float32)
-    return Bins(width * np.arange(first, first + values.size), width, low, low + 1, low)
+    time = width * np.arange(first, first + values.size)
+    return Trace.bins(time, low, low + 1, low, width)
 
 
 @given(st.integers(1, 5000), st.integers(1, 300), st.integers(0, 1000))
@@ -21,7 +23,7 @@ def test_columns_keep_every_extreme(n: int, count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     value = rng.normal(size=n)
     time = np.arange(n) * 1e-3
-    drawn = columns(np.array([time, value, value, value]), count, 1e-3)
+    drawn = Trace.bins(time, value, value, value, 1e-3).thin(count)
     assert drawn.low.min() == value.min()
     assert drawn.high.max() == value.max()
     assert drawn.time.size <= max(count, n if n <= count else 0) + 2
@@ -30,9 +32,8 @@ def test_columns_keep_every_extreme(n: int, count: int, seed: int) -> None:
 def test_columns_do_not_wander_when_the_view_scrolls() -> None:
     time = np.arange(10_000) * 1e-3
     value = np.sin(time * 40)
-    rows = np.array([time, value, value, value])
-    one = columns(rows[:, 100:5100], 500, 1e-3)
-    two = columns(rows[:, 103:5103], 500, 1e-3)
+    whole = Trace.bins(time, value, value, value, 1e-3)
+    one, two = whole[100:5100].thin(500), whole[103:5103].thin(500)
     both = np.intersect1d(one.time[1:-1], two.time[1:-1])
     assert both.size > 0.95 * one.time.size
 
@@ -40,7 +41,7 @@ def test_columns_do_not_wander_when_the_view_scrolls() -> None:
 def test_dense_line_keeps_extremes_and_means() -> None:
     time = np.arange(0.0, 100.0, 0.01)
     saw = (time % 0.5) * 2  # from 0 to 1, 0.49 in the mean
-    drawn = line_between(time, saw, 0.0, 100.0, 25)
+    drawn = Trace.line(time, saw).around(0.0, 100.0).thin(25)
     assert drawn.time.size <= 100
     assert drawn.low.min() == 0.0 and drawn.high.max() == saw.max()
     assert np.allclose(drawn.mean, 0.49, atol=1e-9), "columns of whole periods"
@@ -49,13 +50,13 @@ def test_dense_line_keeps_extremes_and_means() -> None:
 def test_gap_breaks_the_line() -> None:
     time = np.concatenate([np.arange(100), np.arange(150, 250)]) * 1e-3
     value = np.ones(200)
-    drawn = columns(np.array([time, value, value, value]), 1000, 1e-3)
+    drawn = Trace.bins(time, value, value, value, 1e-3).thin(1000)
     assert np.flatnonzero(drawn.gap).tolist() == [0, 100]
 
 
 def test_zigzag_passes_through_both_extremes() -> None:
     rows = np.array([np.arange(4.0), [0, 1, 0, 1], [2, 3, 2, 3], [1, 2, 1, 2]])
-    x, y = zigzag(columns(rows, 10, 1.0))
+    x, y = zigzag(Trace.bins(*rows, 1.0).thin(10))
     assert x.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
     for k in range(4):
         assert sorted(y[2 * k : 2 * k + 2]) == [rows[1, k], rows[2, k]]
@@ -64,7 +65,7 @@ def test_zigzag_passes_through_both_extremes() -> None:
 @settings(max_examples=30)
 @given(st.lists(st.integers(1, 4000), min_size=1, max_size=40))
 def test_track_shows_what_was_added(pieces: list[int]) -> None:
-    track, first = Track(), 0
+    track, first = Pyramid(), 0
     for size in pieces:
         track.add(bins(first, np.arange(first, first + size, dtype=float)))
         first += size
@@ -75,7 +76,7 @@ def test_track_shows_what_was_added(pieces: list[int]) -> None:
 
 
 def test_history_is_bounded_and_keeps_a_single_spike() -> None:
-    track = Track()
+    track = Pyramid()
     total = 3_600_000
     step = 20_000
     for first in range(0, total, step):
@@ -85,7 +86,9 @@ def test_history_is_bounded_and_keeps_a_single_spike() -> None:
         track.add(bins(first, values))
     drawn = track.between(0.0, 3600.0, 1000)
     assert drawn.high.max() >= 500.0
-    held = sum(v.nbytes for v in vars(track).values() if isinstance(v, np.ndarray))
+    parts = [part for level in track._levels for part in vars(level).values()]
+    held = sum(part.nbytes for part in parts if isinstance(part, np.ndarray))
+    assert held > 8 * 4 * FINE, "this is where it is"
     assert held <= 8 * 4 * (2 * FINE + COARSE)
     newest = track.between(3595.0, 3600.0, 10_000)
     assert newest.time.size == 5000 or newest.time.size == 5001
@@ -183,7 +186,7 @@ def test_model_moves_to_where_each_trial_really_started() -> None:
 
 
 def test_slow_track_is_bounded() -> None:
-    track = SlowTrack()
+    track = Readings()
     for k in range(450_000):
         track.add(k * 0.01, float(k))
     assert track.between(0.0, 1e9, 1000).time.size <= 4000
@@ -191,7 +194,7 @@ def test_slow_track_is_bounded() -> None:
 
 
 def test_set_points_hold_until_the_next_and_to_now() -> None:
-    track = SlowTrack()
+    track = Readings()
     for time, value in ((1.0, 0.0), (1.1, 0.3), (1.2, 0.6)):
         track.add(time, value)
     held = track.between(0.0, 9.0, 100, hold=2.0)

@@ -5,7 +5,6 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from gui.lanes.card import LINE, TITLE, LaneCard
-from gui.lanes.decimate import HOLDS, Drawn
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.readings import (
     Painted,
@@ -17,7 +16,7 @@ from gui.lanes.readings import (
 )
 from gui.lanes.source import LiveSource
 from gui.look.theme import Theme
-from tactile_lab.acquisition.live import Bins
+from tactile_lab.trace import HOLDS, Trace
 
 LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "spikes"})}
 
@@ -25,14 +24,14 @@ LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "spikes"})}
 def test_value_of_a_trace_is_between_its_points_and_nothing_in_a_gap() -> None:
     value = np.array([0.0, 1.0, 2.0, 9.0, 9.0])
     gap = np.array([True, False, False, True, False])
-    drawn = Drawn(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), value, value, value, gap)
+    drawn = Trace(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), value, value, value, gap)
     assert [drawn.at(t) for t in (-0.01, 0.05, 0.2, 0.21)] == [None, 0.5, 2.0, 2.0]
     assert drawn.at(2.0) is None and drawn.at(5.05) == 9.0
     assert drawn.at(5.25) == 9.0 and drawn.at(5.4) is None
-    alone = Drawn.line(np.array([1.0]), np.array([7.0]))
+    alone = Trace.line(np.array([1.0]), np.array([7.0]))
     assert alone.at(1.0) == 7.0 and alone.at(1.1) is None
     assert alone.at(1.0 + HOLDS / 2) == 7.0
-    assert Drawn.nothing().at(0.0) is None
+    assert Trace.nothing().at(0.0) is None
 
 
 def test_spikes_of_a_stored_run_are_those_in_view() -> None:
@@ -94,9 +93,9 @@ def test_low_card_gives_up_decimals_not_runs(theme) -> None:
 
 def test_a_wide_column_is_not_read_as_a_value() -> None:
     time = np.linspace(0.0, 100.0, 201)
-    wide = Painted(0.0, 100.0, (Drawn.line(time, time),))
+    wide = Painted(0.0, 100.0, (Trace.line(time, time),))
     assert not wide.close(LANES["V_C1"], 50.0)
-    near = Painted(0.0, 1.0, (Drawn.line(time / 100 / 8, time),))
+    near = Painted(0.0, 1.0, (Trace.line(time / 100 / 8, time),))
     assert near.close(LANES["V_C1"], 0.5) and not near.close(LANES["V_C1"], 1.5)
     assert not Painted().close(LANES["V_C1"], 0.0), "nothing was painted"
 
@@ -117,8 +116,6 @@ def test_newest_rate_counts_a_spike_told_before_its_samples() -> None:
     rate = next(lane for lane in LANES.values() if lane.key == "rate")
     assert newest(rate, source) is None, "nothing was measured"
     assert values_at(rate, source, 0.0, Painted()) == (None,)
-    source.add_bins(
-        {"V_C1": Bins(np.array([0.0, 1.0]), 1.0, *[np.zeros(2, np.float32)] * 3)}
-    )
+    source.add_bins({"V_C1": Trace.bins(np.array([0.0, 1.0]), *[np.zeros(2)] * 3, 1.0)})
     source.add_spikes((1.8, 1.9, 2.01))
     assert abs(newest(rate, source) - 1 / 0.11) < 1e-9

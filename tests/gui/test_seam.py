@@ -4,12 +4,12 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from gui.lanes.derive import begins, rate_of
 from gui.lanes.expected import Hold, Preview
 from gui.lanes.phase import phase
+from gui.lanes.rate import begins, rate_of
 from gui.lanes.source import LiveSource
-from gui.lanes.twinned import TwinSlice
-from tactile_lab.acquisition.live import Bins
+from gui.lanes.twin import TwinSlice
+from tactile_lab.trace import Trace
 from tactile_lab.waveform import Waveform
 
 PERIOD = 4.5
@@ -57,8 +57,8 @@ def live(planned: np.ndarray, twin: np.ndarray, end: float) -> LiveSource:
     preview = Preview(force, {"V_C2": (time, value)}, planned, holds, 14.0)
     source = LiveSource(preview, 1.0)
     value = np.zeros(2, np.float32)
-    bins = Bins(np.array([end - 2e-3, end - 1e-3]), 1e-3, value, value, value)
-    source.tracks.add(TwinSlice({"V_C2": bins}, twin, end))
+    bins = Trace.bins(np.array([end - 2e-3, end - 1e-3]), value, value, value, 1e-3)
+    source.model.add(TwinSlice({"V_C2": bins}, twin, end))
     return source
 
 
@@ -115,9 +115,7 @@ def test_plan_lies_over_no_data_of_a_signal_without_a_twin() -> None:
     planned = stretch(0.2, 0.1, 1.0, 2.0)
     source = live(planned, planned[:5], 0.65)
     source.preview.traces["V_K"] = source.preview.traces["V_C2"]
-    source.add_bins(
-        {"V_K": Bins(np.array([0.8]), 1e-3, *[np.zeros(1, np.float32)] * 3)}
-    )
+    source.add_bins({"V_K": Trace.bins(np.array([0.8]), *[np.zeros(1)] * 3, 1e-3)})
     assert source.twin("V_K", 0.0, 2.0, 5000).time[0] >= source.reach == 0.801
     assert source.twin("V_C2", 0.66, 2.0, 5000).time[0] < 0.67
 

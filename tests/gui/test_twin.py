@@ -6,13 +6,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gui.lanes.decimate import Drawn
-from gui.lanes.recorded_twin import CLOSE, RecordedTwin
-from gui.lanes.twinned import TwinSlice, TwinTracks, joined
+from gui.lanes.twin import CLOSE, Twin, TwinSlice
 from gui.session.twin import LiveTwin
 from gui.session.whole_twin import binned
 from tactile_lab.model.simulate import simulate
 from tactile_lab.scene.load import load
+from tactile_lab.trace import Trace
 from tactile_lab.waveform import Waveform
 
 SCENE = load("demo")
@@ -32,7 +31,7 @@ def in_one_piece() -> TwinSlice:
 @given(st.lists(st.floats(0.01, 1.45), max_size=6))
 def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
     whole = in_one_piece()
-    twin, tracks = LiveTwin(SCENE), TwinTracks()
+    twin, tracks = LiveTwin(SCENE), Twin()
     fed = 0
     for end in [*sorted(cuts), 1.5]:
         while fed < len(POINTS) and POINTS[fed][0] <= end:
@@ -71,10 +70,10 @@ def test_late_set_point_moves_to_where_the_twin_is() -> None:
 
 
 def test_nothing_joined_to_something_is_that() -> None:
-    line = Drawn.line(np.array([0.0, 1.0]), np.array([2.0, 3.0]))
-    assert joined(Drawn.nothing(), line) is line
-    assert joined(line, Drawn.nothing()) is line
-    assert joined(line, line).time.size == 4
+    line = Trace.line(np.array([0.0, 1.0]), np.array([2.0, 3.0]))
+    assert Trace.nothing().join(line) is line
+    assert line.join(Trace.nothing()) is line
+    assert line.join(line).time.size == 4
 
 
 RESULT = simulate(
@@ -104,7 +103,7 @@ def test_bins_hold_all_the_model_does(start, width, count, signal) -> None:
 
 def parts(
     asked: list[tuple[float, float, int]],
-) -> tuple[RecordedTwin, Callable[[], None]]:
+) -> tuple[Twin, Callable[[], None]]:
     """A twin, and what answers its newest look."""
 
     def slice_(start: float, end: float, count: int) -> TwinSlice:
@@ -112,15 +111,16 @@ def parts(
         bins = {"V_C1": binned(RESULT, "V_C1", spikes, start, end, count)}
         return TwinSlice(bins, spikes, end)
 
-    twin = RecordedTwin(slice_(0.0, 1.5, 1500), lambda *part: asked.append(part))
-    return twin, lambda: twin.add(slice_(*asked[-1]))
+    twin = Twin(lambda *part: asked.append(part))
+    twin.add(slice_(0.0, 1.5, 1500))
+    return twin, lambda: twin.refine(slice_(*asked[-1]))
 
 
 def test_wide_views_ask_for_nothing() -> None:
     asked: list[tuple[float, float, int]] = []
-    drawn = parts(asked)[0].between("V_C1", 0.0, 1.5, 1000)
+    drawn = parts(asked)[0].trace("V_C1", 0.0, 1.5, 1000)
     assert not drawn.empty and not asked
-    assert parts(asked)[0].between("V_K", 0.0, 1e-3, 1000).empty and not asked
+    assert parts(asked)[0].trace("V_K", 0.0, 1e-3, 1000).empty and not asked
 
 
 @given(
@@ -131,13 +131,13 @@ def test_a_close_look_is_asked_for_once_and_then_exact(start, width, count) -> N
     asked: list[tuple[float, float, int]] = []
     twin, answer = parts(asked)
     end = start + width
-    twin.between("V_C1", start, end, count)
-    twin.between("V_C1", start, end, count)
+    twin.trace("V_C1", start, end, count)
+    twin.trace("V_C1", start, end, count)
     assert len(asked) == 1, "one look at a time"
     assert asked[0][0] <= start and asked[0][1] >= end and asked[0][2] == CLOSE
     answer()
     for _ in range(3):
-        drawn = twin.between("V_C1", start, end, count)
+        drawn = twin.trace("V_C1", start, end, count)
     assert len(asked) == 1, "the answer is as fine as another one would be"
     middle = (drawn.time >= start) & (drawn.time <= end)
     exact = RESULT.sample("V_C1", drawn.time[middle])
@@ -148,7 +148,7 @@ def test_a_close_look_is_asked_for_once_and_then_exact(start, width, count) -> N
 def test_nothing_is_asked_for_beyond_the_run(start, width) -> None:
     asked: list[tuple[float, float, int]] = []
     twin, _ = parts(asked)
-    twin.between("V_C1", start, start + width, 1000)
+    twin.trace("V_C1", start, start + width, 1000)
     beyond = start >= 1.5 or start + width <= 0
     assert len(asked) == (0 if beyond else 1)
     for first, last, _ in asked:
@@ -162,7 +162,7 @@ def test_looks_at_a_few_places_do_not_drive_each_other_out() -> None:
     for _ in range(4):
         for start, end in places:
             before = len(asked)
-            twin.between("V_C1", start, end, 1000)
+            twin.trace("V_C1", start, end, 1000)
             if len(asked) > before:
                 answer()
     assert len(asked) == len(places)

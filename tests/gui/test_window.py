@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPushButton, QToolButton
 
 from gui.dialogs.saving import table
-from gui.lanes.expected import PlanSource
+from gui.lanes.source import PlanSource
 from gui.session.session import Queued
 from gui.state import State, Truth
 from sim_backend.serial_line import wires as serial_wires

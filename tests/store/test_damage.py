@@ -189,7 +189,7 @@ def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, tmp_path, after):
             np.ceil(run.spikes["sample"][: spikes.size - 1]), spikes[:-1]
         )
         signal_ = run.signal("V_C1")
-        picture = signal_.envelope(cells=3)
+        picture = signal_.trace(cells=3)
         assert picture.high.max() == signal_[:].max()
     with pytest.raises(RunFolderError, match="not cut short"):
         recover(path)

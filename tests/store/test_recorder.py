@@ -235,15 +235,15 @@ def test_envelope_shows_every_spike_at_any_zoom(bench, recorder, folder):
         signal = run.signal("V_K")
         volts = made[1] / 32512 * 5.0 - 0.5
         for start, stop, cells in ((0, None, 50), (100, 59_000, 7), (690, 720, 1000)):
-            picture = signal.envelope(start, stop, cells=cells)
+            picture = signal.trace(start, stop, cells=cells)
             assert picture.low.size <= 2 * cells
             assert picture.high.max() == pytest.approx(volts[start:stop].max())
             assert picture.low.min() == pytest.approx(volts[start:stop].min())
             assert np.all(
                 (picture.low <= picture.mean) & (picture.mean <= picture.high)
             )
-        assert signal.envelope(cells=1).mean == pytest.approx(volts.mean())
-        whole = signal.envelope(cells=40)
+        assert signal.trace(cells=1).mean == pytest.approx(volts.mean())
+        whole = signal.trace(cells=40)
         spikes = np.searchsorted(
             whole.time, np.arange(701, 60_000, 701) * 1e-3, "right"
         )
@@ -260,10 +260,10 @@ def test_a_part_of_the_pyramid_is_that_of_the_whole(bench, recorder, folder, kep
         pyramid.resize((len(pyramid) - kept_out,))
     with Run.load(folder.path) as run:
         whole = run.signal("V_K")
-        whole.envelope(cells=50)
+        whole.trace(cells=50)
         for start, stop in ((0, 5120), (30_000, 40_000), (50_000, 60_000)):
-            one = run.signal("V_K").envelope(start, stop, cells=8)
-            other = whole.envelope(start, stop, cells=8)
+            one = run.signal("V_K").trace(start, stop, cells=8)
+            other = whole.trace(start, stop, cells=8)
             for name in ("time", "low", "high", "mean"):
                 np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
