@@ -138,7 +138,7 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
         uses=uses(scene, needed),
         leaves_out=leaves_out(scene, needed, drive),
         estimate=estimate(scene, needed, drive),
-        assumptions=assumptions(scene),
+        assumptions=assumptions(scene, needed),
         warnings=told,
         preview=result,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.estimate import resolution
 from tactile_lab.planning.needs import Needs
@@ -157,7 +158,7 @@ def _round_up(rate: float) -> float:
     return next(step * power for step in (1, 2, 5, 10) if step * power >= rate)
 
 
-def assumptions(scene: Scene) -> tuple[str, ...]:
+def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
     """What the numbers rest on, one line each."""
     bench, magnet = scene.bench, scene.bench.magnet
     per_ampere = f"{show(magnet.newtons_per_ampere, 'N', 4)} per ampere"
@@ -187,5 +188,8 @@ def assumptions(scene: Scene) -> tuple[str, ...]:
         f"{'3 MHz and 13 V/µs' if world.follower else 'infinitely fast'}"
     )
     noise = ", ".join(f"{name} {show(sd, 'V')}" for name, sd in world.noise.items())
-    lines.append(f"noise (seed {world.seed}): {noise}; 8-bit codes")
+    codes = ""
+    if needed.channels and bench.scope is not None:
+        codes = f"; {scope_capability(bench.scope).bits}-bit codes"
+    lines.append(f"noise (seed {world.seed}): {noise}{codes}")
     return tuple(lines)
