@@ -8,6 +8,8 @@ from pathlib import Path
 
 import click
 
+from tactile_lab.commands.options import runs_option
+
 INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
 
 
@@ -20,14 +22,7 @@ INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
     metavar="FILE|sim|none",
     help="Bench to connect to.",
 )
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("runs"),
-    show_default=True,
-    metavar="DIR",
-    help="Where run folders are put.",
-)
+@runs_option
 @click.option(
     "--theme", type=click.Choice(["system", "light", "dark"]), default="system",
     show_default=True, help="Colours.",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import print_json, refusing, say
 
 
 @click.command()
@@ -35,7 +37,7 @@ from tactile_lab.commands.terminal import print_json, refusing
     type=click.Path(path_type=Path, dir_okay=False),
     help="Append what the source is told, one JSON line each.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     coil: str | None,
     teslameter: str | None,
@@ -71,8 +73,8 @@ def command(
         print_json(served.addresses)
     else:
         for name, address in served.addresses.items():
-            click.echo(f"{name:12}{address}")
-        click.echo("Ctrl-C ends.", err=True)
+            say(f"{name:12}{address}")
+        say("Ctrl-C ends.", sys.stderr)
     try:
         wait_for_end()
     finally:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import click
 
+from tactile_lab.commands import terminal
 from tactile_lab.errors import nearest
 
 VERBS = {
@@ -88,7 +89,11 @@ class LazyVerbs(click.Group):
 )
 @click.version_option(package_name="tactile-lab")
 def cli() -> None:
-    """Instrument control for spiking, adapting piezoelectric tactile sensors."""
+    """Instrument control for spiking, adapting piezoelectric tactile sensors.
+
+    The shell completes verbs, scenes, runs and keys of --set once its start-up file has
+    eval "$(_TACTILE_LAB_COMPLETE=bash_source tactile-lab)" (or zsh_source).
+    """
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -98,8 +103,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="replace")  # a pipe's encoding may lack µ or −
     try:
         code = cli.main(arguments, prog_name="tactile-lab", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as asked:
+        asked.show()
+        code = asked.exit_code
     except click.ClickException as refused:
-        refused.show()
+        message = refused.format_message()
+        if isinstance(refused, click.UsageError) and refused.ctx is not None:
+            message += f" See `{refused.ctx.command_path} --help`."
+        terminal.say(f"tactile-lab: {message}", sys.stderr)
         code = refused.exit_code
     except click.Abort:
         code = INTERRUPTED

@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from tactile_lab.commands.terminal import fail, print_json, refusing
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import fail, print_json, refusing, say
 from tactile_lab.errors import TactileLabError
 
 FAULTED = 3
@@ -33,7 +34,7 @@ FAULTED = 3
     type=click.Path(path_type=Path, dir_okay=False),
     help="With --dialect: write every byte there.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     ports: tuple[str, ...],
     no_ask: bool,
@@ -62,19 +63,19 @@ def command(
         print_json({"devices": found})
         return
     if not found:
-        click.echo("Nothing is attached.")
+        say("Nothing is attached.")
     for one in found:
         _print(one)
 
 
 def _print(one: dict[str, Any]) -> None:
-    click.echo(f"{one['address']}  {one['title']}")
+    say(f"{one['address']}  {one['title']}")
     if one["identity"]:
-        click.echo(f"    answers   {one['identity']}")
+        say(f"    answers   {one['identity']}")
     if one["fits"]:
-        click.echo(f"    fits      {', '.join(one['fits'])}")
+        say(f"    fits      {', '.join(one['fits'])}")
     if one["problem"]:
-        click.echo(f"    problem   {one['problem']}")
+        say(f"    problem   {one['problem']}")
 
 
 def _try_out(
@@ -94,4 +95,4 @@ def _try_out(
             print_json(settings)
         else:
             for name, value in settings.items():
-                click.echo(f"{name:20}{value}")
+                say(f"{name:20}{value}")

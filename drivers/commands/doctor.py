@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import print_json, refusing, say
 
 PROBLEM = 1
 BYTES_PER_SAMPLE = 2
@@ -29,7 +30,7 @@ BYTES_PER_SAMPLE = 2
     metavar="SAMPLES/S",
     help="Samples a second over all channels that a run must store.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(out: Path, rate: float, as_json: bool) -> None:
     """Look at environment, drivers, permissions, timing and disk.
 
@@ -44,9 +45,9 @@ def command(out: Path, rate: float, as_json: bool) -> None:
         print_json({"problems": problems, "findings": findings})
     else:
         for one in findings:
-            click.echo(f"{one['state']:8} {one['topic']:9} {one['text']}")
+            say(f"{one['state']:8} {one['topic']:9} {one['text']}")
             if one["remedy"]:
-                click.echo(f"{'':18} remedy: {one['remedy']}")
-        click.echo(f"{problems or 'no'} problem{'' if problems == 1 else 's'}")
+                say(f"{'':18} remedy: {one['remedy']}")
+        say(f"{problems or 'no'} problem{'' if problems == 1 else 's'}")
     if problems:
         raise click.exceptions.Exit(PROBLEM)

@@ -7,13 +7,14 @@ from typing import Any
 
 import click
 
-from tactile_lab.commands.terminal import fail, print_json, refusing
+from tactile_lab.commands.options import json_option, run_argument
+from tactile_lab.commands.terminal import fail, print_json, refusing, say, working
 
 FORMATS = ("csv", "mat", "nwb")
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
+@run_argument
 @click.option("--to", "form", type=click.Choice(FORMATS), required=True)
 @click.option(
     "--out",
@@ -25,7 +26,7 @@ FORMATS = ("csv", "mat", "nwb")
 @click.option("--from", "start", metavar="TIME", help='Such as "2 s".')
 @click.option("--until", "end", metavar="TIME", help='Such as "4.5 s".')
 @click.option("--rate", metavar="RATE", help='Average down, such as "1 kS/s".')
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     run: Path,
     form: str,
@@ -51,7 +52,7 @@ def command(
         target = out or run / (
             "csv" if form == "csv" else f"{run.resolve().name}.{form}"
         )
-        with Run.load(run) as loaded:
+        with Run.load(run) as loaded, working(f"writing {target}"):
             try:
                 written = _exporter(form)(loaded, target, selection)
             except OSError as error:
@@ -61,7 +62,7 @@ def command(
         print_json({"run": str(run), "files": [str(file) for file in written]})
     else:
         for file in written:
-            click.echo(str(file))
+            say(str(file))
 
 
 def _exporter(form: str) -> Any:

@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing, warn
+from tactile_lab.commands.options import json_option, run_argument
+from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
 
 if TYPE_CHECKING:
     from tactile_lab.analysis.identify import Identified
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
+@run_argument
 @click.argument("parameters", nargs=-1, required=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
     """Fit PARAMETERS (such as V_GS tau) to V_C1 and the spikes of RUN.
 
@@ -27,17 +28,18 @@ def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
         from tactile_lab.report.from_run import read
         from tactile_lab.report.identified import identify_run
 
-        found = identify_run(read(run), parameters)
+        with working("fitting"):
+            found = identify_run(read(run), parameters)
     if as_json:
         print_json(answer(found))
         return
     for name, estimate in found.estimates.items():
-        click.echo(
+        say(
             f"{name:8} {estimate.value:.6g}  "
             f"({estimate.low:.6g} to {estimate.high:.6g}, 95 %)"
         )
     if found.scatter_V_C1 is not None:
-        click.echo(
+        say(
             f"V_C1 is left with {found.scatter_V_C1 * 1e3:.2g} mV of scatter. The "
             "intervals hold noise, one code of offset of its channel, and what the "
             "bench states of the force's uncertainty."

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, TextIO
 import click
 
 from tactile_lab.commands.attended import run_attended
-from tactile_lab.commands.run import noted
-from tactile_lab.commands.terminal import fail, refusing, scene_options, warn
+from tactile_lab.commands.options import noted, notes_option, runs_option, scene_options
+from tactile_lab.commands.terminal import StatusLine, fail, refusing, say, warn
 
 if TYPE_CHECKING:
     from tactile_lab.engine.monitor import Monitor
@@ -35,15 +35,8 @@ RECORD = "SIGUSR1"
     metavar="SECONDS",
     help="How much is held for Record.",
 )
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("runs"),
-    show_default=True,
-    metavar="DIR",
-    help="Where recorded runs are put.",
-)
-@click.option("--note", "notes", multiple=True, metavar="KEY=TEXT", help="As in run.")
+@runs_option
+@notes_option
 def command(
     scene: str | None,
     overrides: tuple[str, ...],
@@ -87,7 +80,7 @@ def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:
 
     try:
         folder = monitor.record(out, notes)
-        click.echo(f"run     {folder}")
+        say(f"run     {folder}")
         write(folder, read(folder))
     except (TactileLabError, OSError) as reason:
         warn(f"not recorded: {reason}")
@@ -98,30 +91,25 @@ class Sight:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._live = stream.isatty()
+        self._line = StatusLine(stream) if stream.isatty() else None
         self._next = 0.0
-        self._width = 0
 
     def show(self, text: str) -> None:
         """Show `text` if it is time to."""
         now = time.monotonic()
         if now < self._next:
             return
-        self._next = now + (SHOWN_EVERY if self._live else LINE_EVERY)
-        if not self._live:
-            self._stream.write(text + "\n")
+        if self._line is not None:
+            self._next = now + SHOWN_EVERY
+            self._line.show(f"{text}   Enter records, Ctrl-C ends")
         else:
-            text = f"{text}   Enter records, Ctrl-C ends"
-            self._stream.write("\r" + text.ljust(self._width))
-            self._width = len(text)
-        self._stream.flush()
+            self._next = now + LINE_EVERY
+            say(text, self._stream)
 
     def wipe(self) -> None:
         """Leave the terminal ready for other output."""
-        if self._live and self._width:
-            self._stream.write("\r" + " " * self._width + "\r")
-            self._stream.flush()
-            self._width = 0
+        if self._line is not None:
+            self._line.close()
 
 
 def _entered(stream: TextIO) -> SimpleQueue[str]:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing, scene_options, warn
+from tactile_lab.commands.options import json_option, scene_options
+from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
+
+if TYPE_CHECKING:
+    from tactile_lab.scene.scene import Scene
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -38,12 +43,16 @@ def check_target(path: Path) -> None:
     metavar="FILE",
     help="Draw the model's preview into FILE (.png, .svg or .pdf).",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option(
+    "--keys", "list_keys", is_flag=True, help="Only list all keys, as --set takes them."
+)
+@json_option
 def command(
     scene: str | None,
     overrides: tuple[str, ...],
     bench: str | None,
     picture: Path | None,
+    list_keys: bool,
     as_json: bool,
 ) -> None:
     """Show what SCENE (the demo unless given) needs, leaves out and costs.
@@ -57,7 +66,12 @@ def command(
 
         if picture is not None:
             check_target(picture)
-        planned = plan(load(scene, overrides, bench))
+        loaded = load(scene, overrides, bench)
+        if list_keys:
+            _list_keys(loaded, as_json)
+            return
+        with working("planning"):
+            planned = plan(loaded)
         if picture is not None:
             from tactile_lab.planning.figure import draw
 
@@ -65,8 +79,21 @@ def command(
     if as_json:
         print_json({**planned.to_dict(), "figure": str(picture) if picture else None})
     else:
-        click.echo(text(planned))
+        say(text(planned))
         if picture is not None:
-            click.echo(f"preview drawn into {picture}")
+            say(f"preview drawn into {picture}")
     for line in planned.warnings:
         warn(line)
+
+
+def _list_keys(scene: Scene, as_json: bool) -> None:
+    from tactile_lab.scene.keys import keys
+
+    found = keys(scene)
+    if as_json:
+        print_json({"keys": [vars(key) for key in found]})
+        return
+    width = min(max(len(key.name) for key in found), 30)
+    for key in found:
+        meaning = f"  # {key.meaning}" if key.meaning else ""
+        say(f"{key.name:<{width}} = {key.value or '...'}{meaning}")

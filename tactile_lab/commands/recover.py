@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.options import json_option, run_argument
+from tactile_lab.commands.terminal import print_json, refusing, say, working
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@run_argument
+@json_option
 def command(run: Path, as_json: bool) -> None:
     """Recover RUN after a crash: readable by any program, status and spikes restored.
 
@@ -20,7 +21,8 @@ def command(run: Path, as_json: bool) -> None:
     with refusing():
         from tactile_lab.store.recover import recover
 
-        done = recover(run)
+        with working("recovering"):
+            done = recover(run)
     if as_json:
         print_json(
             {
@@ -32,9 +34,9 @@ def command(run: Path, as_json: bool) -> None:
             }
         )
         return
-    click.echo(
+    say(
         f"{run}: {done.samples} samples per channel and {done.spikes} spikes "
         f"recovered, {done.dropped} samples dropped because not all channels had them"
     )
     if done.original is not None:
-        click.echo(f"the file as it was: {done.original} (delete it when content)")
+        say(f"the file as it was: {done.original} (delete it when content)")

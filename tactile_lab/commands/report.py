@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing, warn
+from tactile_lab.commands.options import run_argument
+from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
+@run_argument
 @click.option("--pdf", is_flag=True, help="Also write the figures as PDF.")
 @click.option(
     "--out",
@@ -27,10 +28,12 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
         from tactile_lab.report.table import table
         from tactile_lab.report.write import write
 
-        data, folder = read(run), out or run
+        folder = out or run
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            written = write(folder, data, pdf=pdf)
+            with working("writing the report"):
+                data = read(run)
+                folder.mkdir(parents=True, exist_ok=True)
+                written = write(folder, data, pdf=pdf)
         except OSError as reason:
             raise RunFolderError(
                 f"{folder} cannot be written: {reason.strerror}. Name another folder "
@@ -41,8 +44,8 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
     if as_json:
         print_json(results(written.findings))
         return
-    click.echo(table(written.findings).text)
+    say(table(written.findings).text)
     for sentence in written.findings.conclusion.sentences:
-        click.echo(sentence)
-    click.echo(f"figure  {written.png}")
-    click.echo(f"report  {written.html}")
+        say(sentence)
+    say(f"figure  {written.png}")
+    say(f"report  {written.html}")

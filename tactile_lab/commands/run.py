@@ -10,15 +10,23 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactile_lab.commands.attended import run_attended
+from tactile_lab.commands.options import (
+    json_option,
+    noted,
+    notes_option,
+    runs_option,
+    scene_options,
+)
 from tactile_lab.commands.read_off import field_reader
 from tactile_lab.commands.terminal import (
     Progress,
     fail,
     print_json,
     refusing,
-    scene_options,
+    say,
     somebody,
     warn,
+    working,
 )
 
 if TYPE_CHECKING:
@@ -35,21 +43,8 @@ if TYPE_CHECKING:
 @click.command()
 @scene_options
 @click.option("--realtime", is_flag=True, help="Pace the simulated bench by the clock.")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("runs"),
-    show_default=True,
-    metavar="DIR",
-    help="Where run folders are put.",
-)
-@click.option(
-    "--note",
-    "notes",
-    multiple=True,
-    metavar="KEY=TEXT",
-    help='Kept with the run, such as --note operator="A. Petaru".',
-)
+@runs_option
+@notes_option
 @click.option(
     "--temperature",
     metavar="VALUE",
@@ -75,7 +70,7 @@ if TYPE_CHECKING:
     help="What a manual teslameter showed at each hold, one a line, mT or with unit.",
 )
 @click.option("--no-report", is_flag=True, help="Leave out figure and report.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     scene: str | None,
     overrides: tuple[str, ...],
@@ -133,7 +128,7 @@ def command(
     else:
         _print(done, report, time.monotonic() - began)
         if changed is not None:
-            click.echo(f"against {again}\n{changed}")
+            say(f"against {again}\n{changed}")
     if done.exit_code:
         fail(_why(done), done.exit_code)
 
@@ -268,28 +263,14 @@ def _differences(again: Path, done: Executed) -> Differences | None:
         return None
 
 
-def noted(notes: tuple[str, ...]) -> dict[str, str]:
-    """What ``--note`` options say."""
-    from tactile_lab.errors import SceneError
-
-    found = {}
-    for note in notes:
-        key, equals, text = note.partition("=")
-        if not (key and equals):
-            raise SceneError(
-                f'--note "{note}": write KEY=TEXT, such as operator="Ada".'
-            )
-        found[key.strip()] = text
-    return found
-
-
 def _report(done: Executed) -> Report | None:
     from tactile_lab.errors import TactileLabError
     from tactile_lab.report.from_run import read
     from tactile_lab.report.write import write
 
     try:
-        report = write(done.folder, read(done.folder))
+        with working("writing the report"):
+            report = write(done.folder, read(done.folder))
     except (TactileLabError, OSError) as error:
         warn(f"the report could not be written: {error}")
         return None
@@ -303,21 +284,21 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
 
     if report is not None:
         run = report.findings.run
-        click.echo(table(report.findings).text)
-        click.echo()
+        say(table(report.findings).text)
+        say()
         for sentence in report.findings.conclusion.sentences:
-            click.echo(sentence)
-        click.echo(
+            say(sentence)
+        say(
             f"{done.duration:.1f} s of experiment in {took:.1f} s "
             f"({done.took:.1f} s of it running)."
         )
         if run.accuracy:
-            click.echo(run.accuracy)
+            say(run.accuracy)
         if run.loss is not None:
-            click.echo(run.loss.sentence)
-        click.echo(f"figure  {report.png}")
-        click.echo(f"report  {report.html}")
-    click.echo(f"run     {done.folder}")
+            say(run.loss.sentence)
+        say(f"figure  {report.png}")
+        say(f"report  {report.html}")
+    say(f"run     {done.folder}")
 
 
 def _why(done: Executed) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from datetime import datetime
 from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import print_json, refusing, say
 
 DAY = click.DateTime(["%Y-%m-%d"])
 
@@ -18,7 +20,7 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @click.option("--sensor", metavar="TEXT", help="Only runs whose noted sensor has this.")
 @click.option("--since", type=DAY, metavar="DATE", help="Not before this day.")
 @click.option("--until", type=DAY, metavar="DATE", help="Not after this day.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     root: Path,
     protocol: str | None,
@@ -45,9 +47,9 @@ def command(
         kind = {True: "sim", False: "real", None: "?"}[entry.simulated]
         length = "" if entry.duration is None else f"{entry.duration:.1f} s"
         spikes = "" if entry.spikes is None else f"{entry.spikes} spikes"
-        click.echo(
+        say(
             f"{entry.name:<44} {entry.status:<10} {kind:<4} {length:>9} {spikes:>12}"
             f"  {entry.trouble or entry.loss}".rstrip()
         )
     if not entries:
-        click.echo(f"No run in {root} matches.", err=True)
+        say(f"No run in {root} matches.", sys.stderr)

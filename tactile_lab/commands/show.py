@@ -7,14 +7,15 @@ from typing import Any
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.options import json_option, run_argument
+from tactile_lab.commands.terminal import print_json, refusing, say
 
 FIGURES = (".png", ".svg", ".pdf", ".html")
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@run_argument
+@json_option
 def command(run: Path, as_json: bool) -> None:
     """Show what RUN is, what it holds and where its figures are."""
     with refusing():
@@ -104,42 +105,40 @@ def _print(summary: dict[str, Any]) -> None:
     from tactile_lab.scene.tables import ZERO_CELSIUS
 
     kind = "simulated" if summary["simulated"] else "measured"
-    click.echo(f"{summary['run']}: {summary['status']}, {kind}")
+    say(f"{summary['run']}: {summary['status']}, {kind}")
     for key in ("reason", "started", "protocol", "scene", "bench"):
         if summary[key]:
-            click.echo(f"{key:<13}{summary[key]}")
+            say(f"{key:<13}{summary[key]}")
     for key, text in summary["notes"].items():
-        click.echo(f"{key:<13}{text}")
+        say(f"{key:<13}{text}")
     if summary["temperature_K"] is not None:
-        click.echo(f"temperature  {summary['temperature_K'] - ZERO_CELSIUS:.4g} °C")
+        say(f"temperature  {summary['temperature_K'] - ZERO_CELSIUS:.4g} °C")
     for name, identity in summary["instruments"].items():
-        click.echo(f"{name:<13}{identity}")
+        say(f"{name:<13}{identity}")
     for line in summary["instruments_changed"]:
-        click.echo(f"changed      {line}")
+        say(f"changed      {line}")
     if found := summary["detection"]:
         why = ", from the noise" if found["from"] == "noise" else ""
         threshold = show(found["threshold_V"], "V", 3)
-        click.echo(
-            f"detection    {found['signal']}, {found['kind']} at {threshold}{why}"
-        )
+        say(f"detection    {found['signal']}, {found['kind']} at {threshold}{why}")
     if summary["duration_s"] is not None:
-        click.echo(f"duration     {show(summary['duration_s'], 's')}")
+        say(f"duration     {show(summary['duration_s'], 's')}")
     for name, signal in summary["signals"].items():
         rate = show(signal["sample_rate_Hz"], "S/s")
         step = show(signal["resolution"], signal["unit"], 3)
-        click.echo(f"{name:<13}{signal['samples']} samples, {rate}, step {step}")
+        say(f"{name:<13}{signal['samples']} samples, {rate}, step {step}")
     if summary["spikes"] is not None:
-        click.echo(f"spikes       {summary['spikes']}")
+        say(f"spikes       {summary['spikes']}")
     for trial in summary["trials"]:
-        click.echo(
+        say(
             f"trial        {trial['label']:<12} {trial['start_s']:.3f} to "
             f"{trial['end_s']:.3f} s, {trial['spikes']} spikes"
         )
     if summary["overrange_blocks"]:
-        click.echo(f"over range   in {summary['overrange_blocks']} blocks")
+        say(f"over range   in {summary['overrange_blocks']} blocks")
     if summary["loss"]:
-        click.echo(summary["loss"]["text"])
+        say(summary["loss"]["text"])
     for name, digest in summary["inputs"].items():
-        click.echo(f"kept         {name}  sha256 {digest[:16]}")
+        say(f"kept         {name}  sha256 {digest[:16]}")
     for figure in summary["figures"]:
-        click.echo(f"figure       {figure}")
+        say(f"figure       {figure}")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing, scene_options, warn
+from tactile_lab.commands.options import json_option, scene_options
+from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
 
 if TYPE_CHECKING:
     from tactile_lab.model.simulate import Result
@@ -30,7 +31,7 @@ MOST_SAMPLES = 10_000_000
     metavar="SECONDS",
     help="Error of spike times aimed at, s (and of V_C1, V).",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     scene: str | None,
     overrides: tuple[str, ...],
@@ -52,7 +53,8 @@ def command(
         loaded = load(scene, overrides, bench)
         drive = timeline(loaded, through_coil=False)
         keep = [name for name in loaded.record.signals if name not in BENCH_ONLY]
-        result = model(loaded, drive.force, drive.duration, keep, tolerance)
+        with working("solving the model"):
+            result = model(loaded, drive.force, drive.duration, keep, tolerance)
         report = answer(loaded, result, samples)
     if as_json:
         for text in report["warnings"]:
@@ -101,11 +103,11 @@ def _sampled(scene: Scene, result: Result, samples: int) -> dict[str, list[float
 def _print(scene: Scene, result: Result, report: dict[str, Any]) -> None:
     from tactile_lab.quantity import show
 
-    click.echo(f"{scene.name}: {show(result.duration, 's')} of the model")
+    say(f"{scene.name}: {show(result.duration, 's')} of the model")
     spikes = report["spike_times_s"]
     if spikes is not None:
         when = f", first {spikes[0]:.9f} s, last {spikes[-1]:.9f} s" if spikes else ""
-        click.echo(f"spikes      {len(spikes)}{when}")
+        say(f"spikes      {len(spikes)}{when}")
     error = report["error_estimate"]
     known = [
         f"{show(value, unit, 2)} {what}"
@@ -116,9 +118,9 @@ def _print(scene: Scene, result: Result, report: dict[str, Any]) -> None:
         if value is not None
     ]
     if known:
-        click.echo(f"error       at most about {', '.join(known)}")
-    click.echo(f"run time    {show(report['run_time_s'], 's', 3)}")
+        say(f"error       at most about {', '.join(known)}")
+    say(f"run time    {show(report['run_time_s'], 's', 3)}")
     if report["left_out"]:
-        click.echo(f"left out    {', '.join(report['left_out'])}")
+        say(f"left out    {', '.join(report['left_out'])}")
     for text in report["warnings"]:
         warn(text)

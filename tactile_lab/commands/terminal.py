@@ -1,4 +1,8 @@
-"""What all verbs share: errors as one message and a code, progress, JSON."""
+"""What all verbs share at a terminal: text, colour, errors, progress, JSON.
+
+Colour, bars and spinners are rich's, imported where somebody looks; lines that are
+piped stay plain.
+"""
 
 from __future__ import annotations
 
@@ -8,38 +12,62 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from tactile_lab.errors import TactileLabError
+
+if TYPE_CHECKING:
+    from rich.text import Text
 
 REFUSED = 2
 LINE_EVERY = 0.1
 """Part of the whole after which progress writes a line where it is piped."""
 REDRAW_EVERY = 0.1
 """Seconds between redraws on a terminal."""
+STYLES = {
+    r"\bWRONG\b|\bREAL INSTRUMENTS\b|^damage\b|^problem\b|^tactile-lab:": "bold red",
+    r"\b(faulted|cut short|aborted)\b|loss: [1-9]\S*": "red",
+    r"^warning:|^changed\b": "yellow",
+    r"^sound$|^ok\b|\bcomplete\b|loss: 0 of": "green",
+    r"not identifiable|not determined": "dim",
+    r"^(needs|leaves out|takes|resolution, one code|rests on)$": "bold",
+}
+"""What is coloured, and how."""
 
 
-def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The argument and options of all verbs that take a scene."""
-    for option in (
-        click.argument("scene", required=False, type=click.Path()),
-        click.option(
-            "--set",
-            "overrides",
-            multiple=True,
-            metavar="KEY=VALUE",
-            help='Change one key, such as --set protocol.duration="2 s".',
-        ),
-        click.option(
-            "--bench",
-            metavar="FILE|sim",
-            help="Bench file to use instead of the scene's own.",
-        ),
-    ):
-        command = option(command)
-    return command
+def say(text: str = "", stream: TextIO | None = None) -> None:
+    """Write a line, or several, for a person; to stdout unless told otherwise."""
+    stream = sys.stdout if stream is None else stream
+    if not stream.isatty():
+        click.echo(text, file=stream)
+        return
+    from rich.console import Console
+
+    Console(file=stream).print(_coloured(text), soft_wrap=True)
+
+
+def _coloured(text: str) -> Text:
+    import re
+
+    from rich.text import Text
+
+    shown = Text(text)
+    for pattern, style in STYLES.items():
+        shown.highlight_regex(re.compile(pattern, re.MULTILINE), style)
+    return shown
+
+
+def warn(message: str) -> None:
+    """Write a warning to stderr."""
+    say(f"warning: {message}", sys.stderr)
+
+
+def fail(message: str, code: int) -> None:
+    """Write `message` to stderr and exit with `code`."""
+    say(f"tactile-lab: {message}", sys.stderr)
+    raise click.exceptions.Exit(code)
 
 
 @contextmanager
@@ -53,17 +81,6 @@ def refusing() -> Iterator[None]:
         yield
     except TactileLabError as error:
         fail(str(error), REFUSED)
-
-
-def fail(message: str, code: int) -> None:
-    """Write `message` to stderr and exit with `code`."""
-    click.echo(f"tactile-lab: {message}", err=True)
-    raise click.exceptions.Exit(code)
-
-
-def warn(message: str) -> None:
-    """Write a warning to stderr."""
-    click.echo(f"warning: {message}", err=True)
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -85,6 +102,54 @@ def somebody() -> Callable[[str], str] | None:
         return typed.decode(errors="replace").strip()
 
     return ask
+
+
+@contextmanager
+def working(text: str) -> Iterator[None]:
+    """A sign of life on a terminal, for work whose length is not known."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(f"{text} ..."):
+        yield
+
+
+class StatusLine:
+    """A line on a terminal that changes in place and leaves nothing behind."""
+
+    def __init__(self, stream: TextIO) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        self._live = Live(
+            console=Console(file=stream), auto_refresh=False, transient=True
+        )
+
+    def show(self, text: str, part: float | None = None) -> None:
+        """Show `text`, beside a bar where a part of a whole is given."""
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        row = Table.grid(padding=(0, 1))
+        line = Text(text, no_wrap=True, overflow="ellipsis")
+        if part is None:
+            row.add_row(line)
+        else:
+            row.add_row(ProgressBar(total=1.0, completed=part, width=24), line)
+        if not self._live.is_started:
+            self._live.start()
+        self._live.update(row, refresh=True)
+
+    def note(self, text: str) -> None:
+        """Write a line that stays, above the one that changes."""
+        self._live.console.print(_coloured(text), soft_wrap=True)
+
+    def close(self) -> None:
+        """Take the line away; it comes back when something is shown."""
+        self._live.stop()
 
 
 class Progress:
@@ -114,30 +179,34 @@ class Progress:
         self._first: tuple[float, float] | None = None
         self._drawn = -REDRAW_EVERY
         self._next_line = 0.0
-        self._width = 0
-        self._live = self._stream.isatty()
+        self._line = StatusLine(self._stream) if self._stream.isatty() else None
+        if self._line is not None:
+            self._line.show(f"{label}: getting ready", 0.0)
 
     def update(self, done: float, text: str = "") -> None:
         """`done` of the total is done; `text` says what is happening now."""
         part = min(max(done / self._total, 0.0), 1.0) if self._total > 0 else 1.0
         if self._first is None:
             self._first = part, self._now()
-        if self._live:
+        if self._line is not None:
             if self._now() - self._drawn >= REDRAW_EVERY or part == 1.0:
                 self._drawn = self._now()
-                self._draw(part, text)
+                self._line.show(self._described(part, text), part)
         elif part >= self._next_line:
             self._next_line = (int(part / LINE_EVERY + 1e-9) + 1) * LINE_EVERY
-            self._write(self._line(part, text))
+            self.note(self._described(part, text))
 
     def note(self, line: str) -> None:
         """Write a line of its own above the bar."""
-        self._wipe()
-        self._write(line)
+        if self._line is not None:
+            self._line.note(line)
+        else:
+            say(line, self._stream)
 
     def close(self) -> None:
         """Leave the terminal ready for other output; idempotent."""
-        self._wipe()
+        if self._line is not None:
+            self._line.close()
 
     def __enter__(self) -> Progress:
         return self
@@ -145,7 +214,7 @@ class Progress:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _line(self, part: float, text: str) -> str:
+    def _described(self, part: float, text: str) -> str:
         spent = self._now() - self._began
         left = self._time_left(part)
         more = f"  {text}" if text else ""
@@ -159,23 +228,6 @@ class Progress:
             return ""
         pace = (self._now() - when) / (part - first)
         return f", {_clock(pace * (1 - part))} left"
-
-    def _draw(self, part: float, text: str) -> None:
-        filled = round(24 * part)
-        line = f"[{'#' * filled}{'.' * (24 - filled)}] {self._line(part, text)}"[:118]
-        self._stream.write("\r" + line + " " * max(0, self._width - len(line)))
-        self._stream.flush()
-        self._width = len(line)
-
-    def _wipe(self) -> None:
-        if self._live and self._width:
-            self._stream.write("\r" + " " * self._width + "\r")
-            self._stream.flush()
-            self._width = 0
-
-    def _write(self, line: str) -> None:
-        self._stream.write(line + "\n")
-        self._stream.flush()
 
 
 def _clock(seconds: float) -> str:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing, warn
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import print_json, refusing, say, warn
 
 
 @click.command()
@@ -23,7 +24,7 @@ from tactile_lab.commands.terminal import print_json, refusing, warn
     metavar="FILE",
     help="Draw curve and fit as FILE.png and FILE.svg.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option
 def command(
     curve: Path, between: tuple[str, str] | None, figure: Path | None, as_json: bool
 ) -> None:
@@ -79,6 +80,6 @@ def command(
         ("swing", fit.swing, "V"),
     ):
         interval = f"{show(estimate.low, unit)} to {show(estimate.high, unit)}"
-        click.echo(f"{name:6} {show(estimate.value, unit)}  ({interval}, 95 %)")
+        say(f"{name:6} {show(estimate.value, unit)}  ({interval}, 95 %)")
     low, high = fit.range
-    click.echo(f"from {fit.points} points between {low:g} V and {high:g} V")
+    say(f"from {fit.points} points between {low:g} V and {high:g} V")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from tactile_lab.commands.terminal import refusing
+from tactile_lab.commands.terminal import refusing, say
 
 WRONG = 1
 
@@ -58,7 +59,7 @@ def accuracy(
         if out is not None:
             write_csv(rows, out / "accuracy.csv")
             figure(rows, out / "accuracy.svg")
-            click.echo(f"Wrote accuracy.csv and accuracy.svg to {out}.")
+            say(f"Wrote accuracy.csv and accuracy.svg to {out}.")
 
 
 @command.command()
@@ -99,12 +100,12 @@ def stability(
 
 def _write(text: str, out: Path | None, name: str) -> None:
     if out is None:
-        click.echo(text)
+        say(text)
         return
     out.mkdir(parents=True, exist_ok=True)
     (out / name).write_text(text, encoding="utf-8")
-    click.echo(f"Wrote {out / name}.")
+    say(f"Wrote {out / name}.")
 
 
 def _say(text: str) -> None:
-    click.echo(text, err=True)
+    say(text, sys.stderr)

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.terminal import print_json, refusing
+from tactile_lab.commands.options import json_option, run_argument
+from tactile_lab.commands.terminal import print_json, refusing, say, working
 
 DAMAGED = 1
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@run_argument
+@json_option
 def command(run: Path, as_json: bool) -> None:
     """Check every chunk, checksum, counter and spike of RUN; change nothing.
 
@@ -25,7 +26,8 @@ def command(run: Path, as_json: bool) -> None:
 
         if not run.is_dir():
             raise RunFolderError(f"{run} is no folder; give the folder of one run.")
-        verdict = verify(run)
+        with working("checking every sample"):
+            verdict = verify(run)
     proof = verdict.certificate
     if as_json:
         print_json(
@@ -42,11 +44,11 @@ def command(run: Path, as_json: bool) -> None:
         )
     else:
         for finding in verdict.findings:
-            click.echo(f"damage      {finding}")
+            say(f"damage      {finding}")
         for note in verdict.notes:
-            click.echo(f"note        {note}")
+            say(f"note        {note}")
         if proof is not None:
-            click.echo(str(proof))
-        click.echo("sound" if verdict.sound else f"{len(verdict.findings)} findings")
+            say(str(proof))
+        say("sound" if verdict.sound else f"{len(verdict.findings)} findings")
     if not verdict.sound:
         raise click.exceptions.Exit(DAMAGED)

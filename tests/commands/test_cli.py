@@ -131,3 +131,44 @@ def test_ctrl_c_has_its_code(monkeypatch, capsys):
         main(["simulate"])
     assert end.value.code == 130
     assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [("simulat",), ("run", "--nonsense"), ("show",), ("plan", "nonsense")]
+)
+def test_every_refusal_is_one_line_of_the_same_form(capsys, arguments):
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    assert end.value.code == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("tactile-lab: ")
+    assert len(told.err.splitlines()) == 1
+
+
+def completed(line, monkeypatch, capsys):
+    """What bash would offer for the last word of `line`."""
+    words = line.split(" ")
+    monkeypatch.setenv("_TACTILE_LAB_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
+    with pytest.raises(SystemExit):
+        main([])
+    return [offer.split(",")[1] for offer in capsys.readouterr().out.splitlines()]
+
+
+def test_the_shell_completes_verbs_scenes_keys_and_runs(tmp_path, monkeypatch, capsys):
+    def offered(line):
+        return completed(line, monkeypatch, capsys)
+
+    assert offered("tactile-lab val") == ["validate"]
+    assert "hold_10s" in offered("tactile-lab run hol")
+    assert offered("tactile-lab run hold_10s --set protocol.lev") == ["protocol.level="]
+    monkeypatch.chdir(tmp_path)
+    for place in ("runs/2026-01-01_demo", "runs/2026-01-02_demo", "runs/other"):
+        (tmp_path / place).mkdir(parents=True)
+        if "demo" in place:
+            (tmp_path / place / "run.json").touch()
+    newest_first = ["runs/2026-01-02_demo", "runs/2026-01-01_demo"]
+    assert offered("tactile-lab show ") == newest_first
+    assert offered("tactile-lab verify runs/2026-01-02") == newest_first[:1]

@@ -68,3 +68,20 @@ def test_warnings_go_to_stderr(tactile_lab):
     answer = tactile_lab("plan", "--set", "record.sample_rate=0.2 MS/s", "--json")
     assert "misses about 44%" in answer.err
     assert any("misses about 44%" in text for text in answer.json["warnings"])
+
+
+def test_the_keys_of_a_scene_are_listed_with_their_meaning(tactile_lab):
+    said = tactile_lab("plan", "hold_10s", "--keys").out
+    assert '= "0.15 N"  # Force held' in said
+    assert said.startswith("protocol.level ")
+    assert "record.sample_rate" in said
+    for key in tactile_lab("plan", "--keys", "--json").json["keys"]:
+        if key["name"] == "protocol.hold":
+            assert key["value"] == '"2.0 s"'
+
+
+def test_no_heading_stands_empty(tactile_lab):
+    lines = tactile_lab("plan", "--set", 'record.signals=["force"]').out.splitlines()
+    for above, below in zip(lines, [*lines[1:], ""], strict=True):
+        if above and not above.startswith(" ") and ":" not in above:
+            assert below.startswith("  "), above

@@ -1,17 +1,23 @@
 """Progress, warnings, and errors as one message with a code."""
 
 import io
+import re
 
 import click
 import pytest
 
-from tactile_lab.commands.terminal import Progress, print_json, refusing
+from tactile_lab.commands.terminal import Progress, print_json, refusing, say
 from tactile_lab.errors import SceneError
 
 
 class Terminal(io.StringIO):
     def isatty(self):
         return True
+
+
+@pytest.fixture(autouse=True)
+def _a_terminal_that_can_redraw(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
 
 
 class Watch:
@@ -45,7 +51,7 @@ def test_progress_on_a_terminal_redraws_one_line_with_the_time_left():
         assert "30 s left" in shown
         assert "120 mN" in shown
         assert "\n" not in shown
-    assert stream.getvalue().endswith("\r")
+    assert stream.getvalue().endswith("\x1b[2K"), "the line is wiped"
 
 
 def test_what_happens_once_before_the_first_update_is_not_taken_for_the_pace():
@@ -74,7 +80,9 @@ def test_notes_stand_on_their_own_lines():
     progress = Progress(1.0, "demo", stream, Watch())
     progress.update(0.5)
     progress.note("warning: something")
-    assert "\rwarning: something\n" in stream.getvalue()
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue())
+    lines = plain.split("\n")
+    assert any(line.split("\r")[-1] == "warning: something" for line in lines)
 
 
 def test_progress_of_nothing_and_beyond_the_end():
@@ -104,3 +112,15 @@ def test_json_refuses_nan():
 def test_json_keeps_full_precision(capsys):
     print_json({"x": 0.1 + 0.2})
     assert capsys.readouterr().out == '{"x": 0.30000000000000004}\n'
+
+
+def test_colour_is_for_terminals_and_not_where_it_is_unwanted(monkeypatch):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    terminal, pipe, unwanted = Terminal(), io.StringIO(), Terminal()
+    say("V_C1: WRONG", terminal)
+    say("V_C1: WRONG", pipe)
+    monkeypatch.setenv("NO_COLOR", "1")
+    say("V_C1: WRONG", unwanted)
+    assert "\x1b[1;31mWRONG" in terminal.getvalue()
+    assert pipe.getvalue() == "V_C1: WRONG\n"
+    assert "31m" not in unwanted.getvalue()

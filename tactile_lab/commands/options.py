@@ -1,0 +1,129 @@
+"""Options that several verbs share, and what the shell completes in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def _scenes(ctx: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Names of the scenes that ship, and files."""
+    from tactile_lab.plugins import scene_names
+
+    names = [name for name in scene_names() if name.startswith(begun)]
+    return [*map(CompletionItem, names), CompletionItem(begun, type="file")]
+
+
+def _keys(ctx: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Keys of the scene named right after the verb, or of the demo."""
+    import os
+
+    from tactile_lab.errors import TactileLabError
+    from tactile_lab.scene.keys import keys
+    from tactile_lab.scene.load import load
+
+    if "=" in begun:
+        return []
+    try:
+        # click has parsed nothing yet: the value of --set is still missing
+        words = [*os.environ.get("COMP_WORDS", "").split()[2:], "-"]
+        found = keys(load(None if words[0].startswith("-") else words[0]))
+    except TactileLabError:
+        return []
+    return [
+        CompletionItem(f"{key.name}=", help=key.meaning)
+        for key in found
+        if key.name.startswith(begun)
+    ]
+
+
+def _benches(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
+    return [CompletionItem("sim"), CompletionItem(begun, type="file")]
+
+
+def _runs(ctx: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Folders of runs below the folder begun, or below ./runs; newest first."""
+    found = sorted(Path().glob(f"{begun or 'runs/'}*/run.json"), reverse=True)
+    found += sorted(Path().glob(f"{begun}*/run.json"), reverse=True) if begun else []
+    names = dict.fromkeys(str(path.parent) for path in found)
+    return [*map(CompletionItem, names)] or [CompletionItem(begun, type="dir")]
+
+
+scene_argument: Decorator = click.argument(
+    "scene", required=False, type=click.Path(), shell_complete=_scenes
+)
+
+
+def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The argument and options of all verbs that take a scene."""
+    for option in (
+        scene_argument,
+        click.option(
+            "--set",
+            "overrides",
+            multiple=True,
+            metavar="KEY=VALUE",
+            shell_complete=_keys,
+            help='Change one key, such as --set record.sample_rate="100 kS/s"; '
+            "`tactile-lab plan SCENE --keys` lists them.",
+        ),
+        click.option(
+            "--bench",
+            metavar="FILE|sim",
+            shell_complete=_benches,
+            help="Bench file to use instead of the scene's own.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+run_argument: Decorator = click.argument(
+    "run", type=click.Path(path_type=Path), shell_complete=_runs
+)
+
+json_option: Decorator = click.option(
+    "--json", "as_json", is_flag=True, help="One JSON object on stdout."
+)
+
+runs_option: Decorator = click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("runs"),
+    show_default=True,
+    metavar="DIR",
+    help="Where run folders are put.",
+)
+
+notes_option: Decorator = click.option(
+    "--note",
+    "notes",
+    multiple=True,
+    metavar="KEY=TEXT",
+    help='Kept with the run, such as --note operator="A. Petaru".',
+)
+
+
+def noted(notes: tuple[str, ...]) -> dict[str, str]:
+    """What ``--note`` options say.
+
+    Raises:
+        SceneError: one has another form.
+    """
+    from tactile_lab.errors import SceneError
+
+    found = {}
+    for note in notes:
+        key, equals, text = note.partition("=")
+        if not (key and equals):
+            raise SceneError(
+                f'--note "{note}": write KEY=TEXT, such as operator="Ada".'
+            )
+        found[key.strip()] = text
+    return found

@@ -1,0 +1,50 @@
+"""Every key of a scene: its value now, and what it means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from tactile_lab.complaint import written
+from tactile_lab.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key, as ``--set`` takes it.
+
+    Attributes:
+        name: ``table.key``.
+        value: as the scene has it, in TOML.
+        meaning: for a person; empty where the name says it.
+    """
+
+    name: str
+    value: str
+    meaning: str
+
+
+def keys(scene: Scene) -> list[Key]:
+    """Keys of the protocol first, then of the other tables."""
+    fields = scene.protocol.parameters()
+    meanings = {f"protocol.{n}": f.description or "" for n, f in fields.items()}
+    values = dict(_flat(scene.to_dict()))
+    names = [*meanings, *(name for name in values if name not in meanings)]
+    return [
+        Key(
+            name,
+            written(values[name]) if name in values else "",
+            meanings.get(name, ""),
+        )
+        for name in names
+        if name not in ("protocol.name", "protocol.source")
+    ]
+
+
+def _flat(table: dict[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{at}{name}.")
+        else:
+            yield at + name, value
