@@ -51,7 +51,7 @@ class WiredInputs:
                 input=one.name,
                 range=one.range,
                 offset=one.offset,
-                coupling=one.coupling,
+                coupling="AC" if one.coupling == "AC" else "DC",
             )
             for one in acquisition.inputs
         ]

@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.clock import Clock
+from tactile_lab.quantity import Unit
+from tactile_lab.table import Table
 
 COPPER = 0.00393
 """Temperature coefficient of copper's resistance at 20 C, 1/K."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoilLimits:
-    """What the coil and its source may be asked to do.
+class CoilLimits(Table):
+    """What the coil and its source may be asked to do: ``[coil.limits]``.
 
     Attributes:
         current: largest magnitude, A.
@@ -33,13 +35,13 @@ class CoilLimits:
         resistance: coil resistance at 20 C, Ohm; None until measured.
     """
 
-    current: float = 2.0
-    slew: float = 5.0
-    compliance: float = 14.0
-    continuous: float = 0.6
-    heat: float = 30.0
-    recovery: float = 60.0
-    resistance: float | None = None
+    current: Annotated[float, Unit("A", above=0.0)] = 2.0
+    slew: Annotated[float, Unit("A/s", above=0.0)] = 5.0
+    compliance: Annotated[float, Unit("V", above=0.0)] = 14.0
+    continuous: Annotated[float, Unit("A", above=0.0)] = 0.6
+    heat: Annotated[float, Unit("A^2 s", above=0.0)] = 30.0
+    recovery: Annotated[float, Unit("s", above=0.0)] = 60.0
+    resistance: Annotated[float, Unit("Ohm", above=0.0)] | None = None
 
 
 @dataclass(frozen=True)
@@ -146,26 +148,49 @@ class CoilCapability:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Channel:
-    """One scope input and what is wired to it.
+class Channel(Table):
+    """One scope input and what is wired to it: an entry of ``[[scope.channels]]``.
 
     Attributes:
-        signal: what it measures (`V_C1`, `V_C2`, `V_K`, `coil_current`, ...).
+        signal: what it measures; such as `V_C1`, `V_K` or `coil_current`.
         input: the scope's name for the input, such as "A".
         range: full scale, V: the input takes -range to +range around -offset.
         offset: analogue offset added before digitising, V.
         coupling: "DC" or "AC".
-        scale: signal unit per volt at the input (10 for a 10:1 probe, 1/R for a shunt).
+        scale: signal unit per volt at the input: 10 for a 10:1 probe; what follows
+            from `shunt` or `tesla_per_volt` where one of them is given.
+        shunt: of coil_current: the shunt's resistance, Ohm.
+        tesla_per_volt: of field: what the analogue output of a teslameter means, T/V.
         zero: what lies at the input where the signal is 0, V.
+
+    Raises:
+        ValueError: keys contradict each other.
     """
 
     signal: str
     input: str
-    range: float
-    offset: float = 0.0
-    coupling: str = "DC"
+    range: Annotated[float, Unit("V", above=0.0)] = 5.0
+    offset: Annotated[float, Unit("V")] = 0.0
+    coupling: Literal["DC", "AC"] = "DC"
     scale: float = 1.0
-    zero: float = 0.0
+    shunt: Annotated[float, Unit("Ohm", above=0.0)] | None = None
+    tesla_per_volt: Annotated[float, Unit("T/V")] | None = None
+    zero: Annotated[float, Unit("V")] = 0.0
+
+    def __post_init__(self) -> None:
+        for key, belongs_to, given, scale in (
+            ("shunt", "coil_current", self.shunt, 1 / (self.shunt or 1.0)),
+            ("tesla_per_volt", "field", self.tesla_per_volt, self.tesla_per_volt),
+        ):
+            if given is None:
+                continue
+            if self.signal != belongs_to:
+                raise ValueError(f"{key} belongs to the signal {belongs_to}")
+            if self.scale not in (1.0, scale):
+                raise ValueError(f"give either {key} or scale, not both")
+            object.__setattr__(self, "scale", scale)
+        if self.scale == 0:
+            raise ValueError("scale must not be 0")
 
     @property
     def span(self) -> tuple[float, float]:

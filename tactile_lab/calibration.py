@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_lab.columns import read_columns, read_text
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.quantity import show
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, ValidationInfo
+    from pydantic_core import CoreSchema
 
 COIL, VALID_UNTIL, HASH = "coil", "valid until", "sha256"
 UNCERTAINTY = {"T": "uncertainty T (95 %)", "N": "uncertainty N (95 %)"}
@@ -145,6 +149,36 @@ class Calibration:
                 f"which covers {show(self.least, 'A')} to {show(self.most, 'A')}."
             )
         return np.asarray(np.interp(amperes, self.current, self.value))
+
+
+class CalibrationFile:
+    """Of a field: a calibration inside, the path of its file in bench files.
+
+    A path is relative to the folder that the validation context names.
+    """
+
+    def read(self, value: Any, info: ValidationInfo) -> Calibration | None:
+        """The calibration in the file that is named."""
+        if value is None or isinstance(value, Calibration):
+            return value
+        if not isinstance(value, str):
+            raise SceneError("a text in quotes is needed")
+        folder: Path = (info.context or {}).get("folder", Path())
+        return read_calibration((folder / value).resolve())
+
+    def write(self, value: Calibration | None) -> str | None:
+        """The path of its file."""
+        return None if value is None else str(value.path)
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        from pydantic_core import core_schema
+
+        return core_schema.with_info_plain_validator_function(
+            self.read,
+            serialization=core_schema.plain_serializer_function_ser_schema(self.write),
+        )
 
 
 def read_calibration(path: Path) -> Calibration:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 
 from tactile_lab.errors import SceneError, nearest
+from tactile_lab.table import fields_of
 
-M = TypeVar("M", bound=BaseModel)
+M = TypeVar("M")
 Blame = Callable[[tuple[str, ...]], str]
 """Names the origin of a key: the file, or the option that set it."""
 
@@ -25,6 +28,7 @@ _NEEDED = {
     "list_type": "a list [...] is needed",
     "dict_type": "a table is needed",
     "model_type": "a table is needed",
+    "dataclass_type": "a table is needed",
     "missing": "this key is missing",
 }
 _BOUNDS = {
@@ -33,24 +37,37 @@ _BOUNDS = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
+_UNKNOWN = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 _TAGS = frozenset({"word", "table"})
 
 
 def validated(
-    model: type[M], table: Mapping[str, Any], at: tuple[str, ...], blame: Blame
+    kind: type[M],
+    table: Mapping[str, Any],
+    at: tuple[str, ...],
+    blame: Blame,
+    folder: Path = Path(),
 ) -> M:
-    """`table`, found under the keys `at`, as a `model`.
+    """What a file holds as the noun it describes.
+
+    Args:
+        kind: a `tactile_lab.table.Table`, or a pydantic model.
+        table: as the file has it; quantities are texts, lists are tuples.
+        at: keys under which it was found.
+        blame: names the origin of a key.
+        folder: what the files it names are relative to.
 
     Raises:
         SceneError: one line for each key that is wrong.
     """
     try:
-        return model.model_validate(table, context={"text_only": True})
+        context = {"text_only": True, "folder": folder}
+        return TypeAdapter(kind).validate_python(table, context=context)
     except ValidationError as wrong:
         found = wrong.errors()
         inside = {error["loc"][:-1] for error in found}
         lines = [
-            _line(error, model, at, blame)
+            _line(error, kind, at, blame)
             for error in found
             if not (error["type"] == "too_short" and error["loc"] in inside)
         ]
@@ -95,12 +112,12 @@ def written(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _line(error: Any, model: type[BaseModel], at: tuple[str, ...], blame: Blame) -> str:
+def _line(error: Any, kind: Any, at: tuple[str, ...], blame: Blame) -> str:
     loc = tuple(part for part in error["loc"] if part not in _TAGS)
     full = (*at, *loc)
     origin = blame(tuple(str(part) for part in full))
-    if error["type"] == "extra_forbidden":
-        known = known_keys(model, loc[:-1])
+    if error["type"] in _UNKNOWN:
+        known = known_keys(kind, loc[:-1])
         hint = nearest(str(loc[-1]), known)
         where = place(full[:-1], table=True)
         what = "table" if isinstance(error["input"], dict) else "key"
@@ -111,7 +128,7 @@ def _line(error: Any, model: type[BaseModel], at: tuple[str, ...], blame: Blame)
     if not loc:  # a check of the whole table
         return f"{origin}: {place(full, table=True)}: {_sentence(_reason(error))}"
     if error["type"] == "missing":
-        return f"{origin}: {place(full)} is missing{_example(model, loc)}."
+        return f"{origin}: {place(full)} is missing{_example(kind, loc)}."
     reason = _reason(error)
     value = written(error["input"])
     shown = "" if value in reason or isinstance(error["input"], dict) else f" = {value}"
@@ -146,45 +163,29 @@ def _reason(error: Any) -> str:
     return message[:1].lower() + message[1:]
 
 
-def _example(model: type[BaseModel], loc: tuple[Any, ...]) -> str:
-    table = _model_at(model, loc[:-1])
-    field = table.model_fields.get(str(loc[-1])) if table is not None else None
-    if field is None:
-        return ""
-    if field.description:
-        return f": {field.description}"
-    return ""
+def _example(kind: Any, loc: tuple[Any, ...]) -> str:
+    field = _keys_at(kind, loc[:-1]).get(str(loc[-1]))
+    told = None if field is None else field.description
+    return f": {told}" if told else ""
 
 
-def known_keys(model: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
-    """Keys allowed in the table found under `loc` of `model`."""
-    table = _model_at(model, loc)
-    if table is None:
-        return []
-    return [field.alias or name for name, field in table.model_fields.items()]
+def known_keys(kind: Any, loc: tuple[Any, ...]) -> list[str]:
+    """Keys allowed in the table found under `loc` of `kind`."""
+    return [field.alias or name for name, field in _keys_at(kind, loc).items()]
 
 
-def _model_at(model: type[BaseModel], loc: tuple[Any, ...]) -> type[BaseModel] | None:
+def _keys_at(kind: Any, loc: tuple[Any, ...]) -> Mapping[str, FieldInfo]:
+    """The fields of the table under `loc`; none where that is no table."""
+    keys: Mapping[str, FieldInfo] = fields_of(kind)
     for part in loc:
-        if isinstance(part, int):
-            continue
-        for name, field in model.model_fields.items():
-            if part in (name, field.alias):
-                inner = _inner(field.annotation)
-                break
-        else:
-            return None
-        if inner is None:
-            return None
-        model = inner
-    return model
+        if not isinstance(part, int):
+            found = (f for name, f in keys.items() if part in (name, f.alias))
+            keys = _inner(getattr(next(found, None), "annotation", None))
+    return keys
 
 
-def _inner(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for part in typing.get_args(annotation):
-        found = _inner(part)
-        if found is not None:
-            return found
-    return None
+def _inner(annotation: Any) -> Mapping[str, FieldInfo]:
+    """The fields of the first table in a type such as ``tuple[Channel, ...]``."""
+    return fields_of(annotation) or next(
+        filter(None, map(_inner, typing.get_args(annotation))), {}
+    )

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.calibration import Calibration
+from tactile_lab.calibration import Calibration, CalibrationFile
 from tactile_lab.errors import LimitError, ParameterError
-from tactile_lab.quantity import show
+from tactile_lab.quantity import Unit, show
+from tactile_lab.table import Table
 from tactile_lab.waveform import Waveform
 
 MU_0 = 1.25663706127e-6
@@ -44,8 +45,10 @@ class ForceUncertainty:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Magnet:
+class Magnet(Table):
     """The electromagnet, the magnet on the cantilever and the distance between them.
+
+    It is the table ``[magnet]`` of a bench file.
 
     Args:
         r: distance between magnet and pole face, m, above 0.
@@ -56,19 +59,24 @@ class Magnet:
             calibration is given.
         calibration: measured field or force against current.
         geometry_uncertainty: half of the 95 % band of Eq. (2)'s r, A1, A2 and B1
-            together, as a part of the force; None where nobody has stated it.
+            together, as a part of the force, from 0 to below 1; None where nobody has
+            stated it.
+        allow_expired: use the calibration beyond its date nevertheless.
+        allow_other_coil: use it with another source than it was made with.
 
     Raises:
-        ParameterError: a value is not finite or not above 0.
+        ParameterError: a value is not finite or out of range.
     """
 
-    r: float
-    A1: float = 2.827e-5
-    A2: float = A2_PRINTED
-    B1: float = 0.163
-    B2_per_ampere: float = 0.011
-    calibration: Calibration | None = None
+    r: Annotated[float, Unit("m", above=0.0)]
+    A1: Annotated[float, Unit("m^2", above=0.0)] = 2.827e-5
+    A2: Annotated[float, Unit("m^2", above=0.0)] = A2_PRINTED
+    B1: Annotated[float, Unit("T", above=0.0)] = 0.163
+    B2_per_ampere: Annotated[float, Unit("T/A")] = 0.011
+    calibration: Annotated[Calibration | None, CalibrationFile()] = None
     geometry_uncertainty: float | None = None
+    allow_expired: bool = False
+    allow_other_coil: bool = False
 
     def __post_init__(self) -> None:
         for name in ("r", "A1", "A2", "B1"):
@@ -78,6 +86,13 @@ class Magnet:
         if not math.isfinite(self.B2_per_ampere) or self.B2_per_ampere == 0:
             raise ParameterError(
                 f"B2_per_ampere = {self.B2_per_ampere} T/A must be finite and not 0."
+            )
+        if self.geometry_uncertainty is not None and not (
+            0 <= self.geometry_uncertainty < 1
+        ):
+            raise ParameterError(
+                f"geometry_uncertainty = {self.geometry_uncertainty} must be at least "
+                "0 and less than 1."
             )
 
     @property

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any
-
-from pydantic import GetCoreSchemaHandler, ValidationInfo
-from pydantic_core import CoreSchema, core_schema
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tactile_lab.errors import QuantityError
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, ValidationInfo
+    from pydantic_core import CoreSchema
 
 PREFIXES = {
     "": 1.0, "q": 1e-30, "r": 1e-27, "y": 1e-24, "z": 1e-21, "a": 1e-18,
@@ -154,14 +155,14 @@ class SIInt(int):
 
 @dataclass(frozen=True)
 class Unit:
-    """Pydantic field type: SI float inside, quantity text in files and on the wire.
+    """Of a field: SI float inside, quantity text in files and on the wire.
 
     Text is parsed; a bare number is taken as SI from Python code but refused where
     the validation context says ``{"text_only": True}`` (scene files), unless it is
     marked as one of Python's.
 
     Attributes:
-        symbol: SI unit.
+        symbol: SI unit; "" for a bare number without a dimension.
         above, least, most: open lower, closed lower and closed upper limit, SI.
     """
 
@@ -183,15 +184,16 @@ class Unit:
 
     def validate(self, value: Any, info: ValidationInfo) -> float:
         """The SI value, or an error that says what is allowed."""
-        if isinstance(value, str):
+        text_only = self.symbol and (info.context or {}).get("text_only")
+        if isinstance(value, str) and self.symbol:
             number = parse(value, self.symbol)
         elif isinstance(value, bool) or not isinstance(value, int | float):
+            if not self.symbol:
+                raise QuantityError("a number is needed")
             raise QuantityError(
                 f"{value!r} is no quantity; write for example {example(self.symbol)}."
             )
-        elif (info.context or {}).get("text_only") and not isinstance(
-            value, SIFloat | SIInt
-        ):
+        elif text_only and not isinstance(value, SIFloat | SIInt):
             raise QuantityError(
                 f'{value!r} has no unit; write for example "{value} {self.symbol}".'
             )
@@ -202,23 +204,33 @@ class Unit:
                 number = math.inf
             if not math.isfinite(number):
                 raise QuantityError(f"{number} {self.symbol} is not finite.")
-        low = (self.above is not None and number <= self.above) or (
-            self.least is not None and number < self.least
-        )
-        if low or (self.most is not None and number > self.most):
+        if not self.allows(number):
             raise QuantityError(
                 f"{show(number, self.symbol)} is out of range; allowed is "
                 f"{self.limits()}."
             )
         return number
 
-    def write(self, value: float) -> str:
-        """Exact text that `parse` reads back to the same float."""
-        return f"{value!r} {self.symbol}"
+    def allows(self, number: float) -> bool:
+        """Whether `number`, SI, lies within the limits."""
+        return (
+            (self.above is None or number > self.above)
+            and (self.least is None or number >= self.least)
+            and (self.most is None or number <= self.most)
+        )
+
+    def write(self, value: Any) -> Any:
+        """What a file holds: exact text that `parse` reads back to the same float.
+
+        A number without a dimension stays one; None stays None.
+        """
+        return value if value is None or not self.symbol else f"{value!r} {self.symbol}"
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
+        from pydantic_core import core_schema
+
         return core_schema.with_info_plain_validator_function(
             self.validate,
             serialization=core_schema.plain_serializer_function_ser_schema(self.write),

@@ -13,6 +13,7 @@ from tactile_lab.quantity import parse
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.scene.toml_text import to_toml
+from tactile_lab.table import dumped
 
 BY_PERSON = "read by a person"
 """In place of a teslameter's dialect: it has no output that could be read."""
@@ -61,7 +62,7 @@ def show_bench(choice: Choice, spec: BenchSpec) -> None:
     """Let `choice` start from a bench; a simulated one gives no name and no port."""
     if not spec.simulated:
         choice.name = spec.name
-    _take_over(choice, spec.table.model_dump(by_alias=True, exclude_none=True))
+    _take_over(choice, dumped(spec))
 
 
 def bench_text(choice: Choice) -> str:

@@ -9,10 +9,12 @@ from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLineEdit, QWidget
 
 from gui.parts import column, empty, label, push
 from gui.setup.texts import exact, toml
+from tactile_lab.bench import Channel
 from tactile_lab.errors import QuantityError, SceneError
 from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.quantity import parse, show
-from tactile_lab.scene.bench_file import BenchSpec, ChannelTable
+from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.table import dumped
 
 
 class InputCard(QFrame):
@@ -20,9 +22,7 @@ class InputCard(QFrame):
 
     changed = Signal()
 
-    def __init__(
-        self, table: ChannelTable, ranges: tuple[float, ...], bits: int
-    ) -> None:
+    def __init__(self, table: Channel, ranges: tuple[float, ...], bits: int) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._table, self._bits = table, bits
@@ -64,7 +64,7 @@ class InputCard(QFrame):
         Raises:
             QuantityError: the offset is no voltage.
         """
-        made = self._table.model_dump(by_alias=True, exclude_none=True)
+        made = dumped(self._table)
         made["range"] = exact(float(self.range.currentData()), "V").replace("−", "-")
         made["offset"] = exact(parse(self.offset.text(), "V"), "V").replace("−", "-")
         made["coupling"] = self.coupling.currentText()
@@ -118,9 +118,9 @@ class ScopeInputs(QWidget):
             capability = scope_capability(scope)
             ranges, bits = capability.ranges, capability.bits
         except SceneError as error:
-            ranges, bits = tuple(sorted({one.range for one in scope.wiring})), 8
+            ranges, bits = tuple(sorted({one.range for one in scope.channels})), 8
             self.say(str(error))
-        for table in scope.wiring:
+        for table in scope.channels:
             card = InputCard(table, ranges, bits)
             card.changed.connect(self._buttons)
             self.cards.append(card)

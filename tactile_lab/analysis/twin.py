@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_lab.analysis.spike_pairs import PART, Matched, match
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Result, Start, simulate
+from tactile_lab.model.simulate import Result, simulate
+from tactile_lab.model.state import Start
 from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import Literal
+from dataclasses import dataclass, field, fields
+from functools import cache
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError
+from tactile_lab.quantity import Unit
+from tactile_lab.table import INTERNAL, Table
 
 FloatArray = NDArray[np.float64]
 
@@ -21,21 +24,30 @@ SUBTHRESHOLD_LIMIT = 2.75
 SATURATION_HEADROOM = 0.5
 """Real T1 saturates where V_C1 falls below V_fire less this, V (ngspice)."""
 
-_UNITS = {
-    "I_S": "A", "V_GS": "V", "m": "", "V_T": "V", "g31": "V m/N", "h": "m", "L": "m",
-    "d": "m", "a": "m", "b": "m", "tau": "s", "R1": "Ohm", "R2": "Ohm", "R3": "Ohm",
-    "R_L": "Ohm", "R_k": "Ohm", "C1": "F", "C2": "F", "V_S": "V", "V_th": "V",
-    "I_T1s": "A", "beta_F": "", "beta_R": "", "V_fire": "V", "V_reset": "V",
-    "t_eps": "s", "I_bias": "A",
-}  # fmt: skip
-_POSITIVE = frozenset(
-    "I_S m V_T h L a b tau R1 R2 R3 R_L C1 C2 V_S V_th I_T1s beta_F beta_R".split()
-)
+
+@dataclass(frozen=True)
+class Parameter(Unit):
+    """Unit and limits of a circuit's parameter, which `Circuit` itself refuses by."""
+
+    def allows(self, number: float) -> bool:
+        """Any number, as far as a file is concerned."""
+        return True
+
+
+Number = Annotated[float, Parameter("", above=0.0)]
+Ampere = Annotated[float, Parameter("A", above=0.0)]
+Volt = Annotated[float, Parameter("V")]
+PositiveVolt = Annotated[float, Parameter("V", above=0.0)]
+Metre = Annotated[float, Parameter("m", above=0.0)]
+Second = Annotated[float, Parameter("s", above=0.0)]
+Ohm = Annotated[float, Parameter("Ohm", above=0.0)]
+Farad = Annotated[float, Parameter("F", above=0.0)]
+
 _PUT = {"V_fire": 3.56, "V_reset": 0.578, "t_eps": 8e-6}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Circuit:
+class Circuit(Table):
     """The sensor circuit of Fig. 3; the defaults are Table 1.
 
     Args:
@@ -75,43 +87,43 @@ class Circuit:
         ParameterError: a value is not finite, impossible, or contradicts another.
     """
 
-    I_S: float = 1.216e-12
-    V_GS: float = 1.4
-    m: float = 5.646
-    V_T: float = 0.025
-    g31: float = 0.039
-    h: float = 500e-9
-    L: float = 7.7e-3
-    d: float = 1.8e-3
-    a: float = 2e-3
-    b: float = 475e-6
-    tau: float = 8.69
-    R1: float = 9.58e6
-    R2: float = 100e6
-    R3: float = 100e6
-    R_L: float = 500e6
-    R_k: float = 10e3
-    C1: float = 680e-12
-    C2: float = 150e-12
-    V_S: float = 5.0
-    V_th: float = 3.213
-    I_T1s: float = 1.41e-15
-    beta_F: float = 180.7
-    beta_R: float = 4.977
-    V_fire: float | None = None
-    V_reset: float | None = None
-    t_eps: float | None = None
+    I_S: Ampere = 1.216e-12
+    V_GS: Volt = 1.4
+    m: Number = 5.646
+    V_T: PositiveVolt = 0.025
+    g31: Annotated[float, Parameter("V m/N")] = 0.039
+    h: Metre = 500e-9
+    L: Metre = 7.7e-3
+    d: Annotated[float, Parameter("m")] = 1.8e-3
+    a: Metre = 2e-3
+    b: Metre = 475e-6
+    tau: Second = 8.69
+    R1: Ohm = 9.58e6
+    R2: Ohm = 100e6
+    R3: Ohm = 100e6
+    R_L: Ohm = 500e6
+    R_k: Annotated[float, Parameter("Ohm")] = 10e3
+    C1: Farad = 680e-12
+    C2: Farad = 150e-12
+    V_S: PositiveVolt = 5.0
+    V_th: PositiveVolt = 3.213
+    I_T1s: Ampere = 1.41e-15
+    beta_F: Number = 180.7
+    beta_R: Number = 4.977
+    V_fire: Volt | None = None
+    V_reset: Volt | None = None
+    t_eps: Annotated[float, Parameter("s")] | None = None
     t1: Literal["emitter_resistor", "direct"] = "emitter_resistor"
     firing: Literal["lif", "put"] = "lif"
     saturation: bool = False
-    I_bias: float = 0.0
+    I_bias: Annotated[float, Parameter("A")] = field(default=0.0, metadata=INTERNAL)
 
     def __post_init__(self) -> None:
-        for name in _UNITS:
+        for name, unit in _units().items():
             value = getattr(self, name)
             if value is None and name in _PUT:
                 continue
-            object.__setattr__(self, name, _checked(name, value))
+            object.__setattr__(self, name, _checked(name, value, unit))
         self._check_options()
         if not 0 <= self.d < self.L:
             raise ParameterError(
@@ -221,8 +233,24 @@ class Circuit:
         return self.fire_voltage / self.R_L - self.I_bias
 
 
-def _checked(name: str, value: object) -> float:
-    unit = _UNITS[name]
+@cache
+def _units() -> dict[str, Unit]:
+    """Unit and limits of every parameter that is a number."""
+    return {
+        name: unit
+        for name, hint in get_type_hints(Circuit, include_extras=True).items()
+        for unit in _within(hint)
+    }
+
+
+def _within(hint: Any) -> list[Unit]:
+    """The unit in an annotated type, or in an optional one."""
+    kept = [one for one in getattr(hint, "__metadata__", ()) if isinstance(one, Unit)]
+    return kept or [one for part in get_args(hint) for one in _within(part)]
+
+
+def _checked(name: str, value: object, of: Unit) -> float:
+    unit = of.symbol
     if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
         raise ParameterError(
             f"{name} = {value!r} must be a number in {unit or 'ones'}."
@@ -230,7 +258,7 @@ def _checked(name: str, value: object) -> float:
     number = float(value)
     if not math.isfinite(number):
         raise ParameterError(f"{name} = {number} {unit} must be finite.")
-    if name in _POSITIVE and not SMALLEST <= number <= LARGEST:
+    if of.above is not None and not SMALLEST <= number <= LARGEST:
         raise ParameterError(
             f"{name} = {number:g} {unit} must lie between {SMALLEST:g} and "
             f"{LARGEST:g} {unit}."

@@ -15,17 +15,8 @@ from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit, FloatArray
 from tactile_lab.model.need import Need, checked_tolerance
 from tactile_lab.model.solution import Solution
 from tactile_lab.model.solver import solve
-from tactile_lab.model.state import State
+from tactile_lab.model.state import Start, State
 from tactile_lab.waveform import Waveform
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """Voltages at time 0 instead of the equilibrium; a cold start is all 0 V."""
-
-    V_P: float
-    V_C1: float
-    V_C2: float
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,20 @@
-"""All that the model remembers between two slices."""
+"""Where the model starts, and all that it remembers between two slices."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from tactile_lab.model.circuit import Volt
+from tactile_lab.table import Table
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start(Table):
+    """Voltages at time 0 instead of the equilibrium, V; a cold start is all 0 V."""
+
+    V_P: Volt
+    V_C1: Volt
+    V_C2: Volt
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,14 +17,13 @@ def check_calibration(scene: Scene, drive: Timeline) -> tuple[str, ...]:
         SceneError: it was changed since it was written, or it has expired and the
             bench does not say ``allow_expired = true``.
     """
-    used, allowed = scene.bench.magnet.calibration, scene.bench.table.magnet
+    magnet = scene.bench.magnet
+    used = magnet.calibration
     if used is None:
         return ()
     told: tuple[str, ...] = ()
     if drive.asks_force:
-        told = used.check(
-            today=datetime.date.today(), beyond_date=allowed.allow_expired
-        )
+        told = used.check(today=datetime.date.today(), beyond_date=magnet.allow_expired)
     current = drive.current
     if current is not None and (
         current.value.min() < used.least or current.value.max() > used.most
@@ -51,8 +50,9 @@ def check_coil(
         SceneError: the calibration belongs to another coil and the bench does not say
             ``allow_other_coil = true``.
     """
-    used, allowed = scene.bench.magnet.calibration, scene.bench.table.magnet
+    magnet = scene.bench.magnet
+    used = magnet.calibration
     if used is None or not used.head:
         return ()
     coil = settings.get("coil", {}).get("identity")
-    return used.check(coil=coil, other_coil=allowed.allow_other_coil)
+    return used.check(coil=coil, other_coil=magnet.allow_other_coil)

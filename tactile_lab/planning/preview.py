@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tactile_lab.model.simulate import Result, Start, simulate
+from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.scene.scene import Scene
 from tactile_lab.waveform import Waveform
 
@@ -24,14 +24,11 @@ def model(
         ParameterError: the tolerance cannot be asked for.
         SolverError: the model cannot answer to that tolerance.
     """
-    start = scene.start
     return simulate(
         scene.circuit,
         force,
         keep=tuple(keep),
         until=duration,
-        start=None
-        if start is None
-        else Start(V_P=start.V_P, V_C1=start.V_C1, V_C2=start.V_C2),
+        start=scene.start,
         tolerance=tolerance,
     )

@@ -14,7 +14,6 @@ from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.model.drain_current import Divider
-from tactile_lab.model.simulate import Start
 from tactile_lab.quantity import show
 from tactile_lab.report.driven import told
 from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
@@ -68,7 +67,7 @@ def read(folder: Path) -> RunData:
             traces=tuple(_trace(run, name) for name in run.signals),
             circuit=scene.circuit,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
-            start=_start(scene),
+            start=scene.start,
             divider=_divider(scene),
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
@@ -158,13 +157,6 @@ def _trace(run: Run, name: str) -> Trace:
         scale=float(signal.attributes.get("scale", 1.0)),
         code=abs(signal.gain),
     )
-
-
-def _start(scene: Scene) -> Start | None:
-    given = scene.start
-    if given is None:
-        return None
-    return Start(V_P=given.V_P, V_C1=given.V_C1, V_C2=given.V_C2)
 
 
 def _warming(run: Run) -> float | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.drain_current import Divider
-from tactile_lab.model.simulate import Start
+from tactile_lab.model.state import Start
 from tactile_lab.signals import Source
 from tactile_lab.waveform import Waveform
 

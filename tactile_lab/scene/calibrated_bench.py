@@ -8,6 +8,7 @@ from tactile_lab.errors import SceneError
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.scene.toml_text import to_toml
+from tactile_lab.table import dumped
 
 
 def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> BenchSpec:
@@ -27,7 +28,7 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
     """
     copy = path.with_name(f"{path.stem}-{calibration.parent.name}.csv")
     draft = path.with_suffix(".new.toml")
-    table = spec.table.model_dump(by_alias=True, exclude_none=True)
+    table = {**dumped(spec), "file": None}
     table["magnet"]["calibration"] = copy.name
     try:
         contents = calibration.read_bytes()

@@ -12,7 +12,7 @@ from typing import Any
 
 from tactile_lab.columns import read_text
 from tactile_lab.complaint import Blame, complaint, validated, written
-from tactile_lab.errors import ParameterError, SceneError, nearest
+from tactile_lab.errors import SceneError, nearest
 from tactile_lab.plugins import (
     protocol_class,
     protocol_from_file,
@@ -20,12 +20,13 @@ from tactile_lab.plugins import (
     scene_path,
 )
 from tactile_lab.scene import overrides as options
-from tactile_lab.scene.bench_file import OWN_FILES, BenchSpec, BenchTable, is_file
+from tactile_lab.scene.bench_file import BenchSpec, is_file
 from tactile_lab.scene.overrides import Overrides
 from tactile_lab.scene.scene import Scene
-from tactile_lab.scene.sensor import SensorTable
+from tactile_lab.scene.sensor import Sensor, with_preset
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.signals import SIGNALS
+from tactile_lab.table import dumped
 from tactile_lab.trial import Protocol
 
 TABLES = (
@@ -97,14 +98,11 @@ def resolve(
     frozen = _lists_to_tuples(data)
     folder = path.parent
     spec = _bench(frozen.get("bench", {}), folder, blame)
-    sensor = validated(SensorTable, frozen.get("sensor", {}), ("sensor",), blame)
-    try:
-        circuit = sensor.circuit(spec.hand_set)
-        start = sensor.start_voltages(circuit)
-    except (ParameterError, ValueError) as reason:
-        raise complaint(("sensor",), str(reason), blame) from reason
+    hand_set = dumped(spec).get("hand_set", {})
+    given = with_preset(frozen.get("sensor", {}), hand_set)
+    sensor = validated(Sensor, given, ("sensor",), blame)
     protocol, source = _protocol(frozen.get("protocol"), folder, blame)
-    protocol = protocol.on_sensor(circuit.tau, abs(circuit.k_F))
+    protocol = protocol.on_sensor(sensor.tau, abs(sensor.k_F))
     record = validated(Record, frozen.get("record", {}), ("record",), blame)
     if not record.signals:
         if "signals" in frozen.get("record", {}):
@@ -116,28 +114,24 @@ def resolve(
             or SIGNALS[name].source != "measured"
             or spec.measures(name)
         ]
-        record = record.model_copy(update={"signals": tuple(signals)})
+        record = replace(record, signals=tuple(signals))
+    detect = Detect.completed(frozen.get("detect", {}))
     return Scene(
         name=path.stem,
         path=path,
         bench=spec,
-        circuit=circuit,
-        start=start,
+        sensor=sensor,
         protocol=protocol,
         protocol_source=source,
         record=record,
-        detect=validated(Detect, frozen.get("detect", {}), ("detect",), blame),
+        detect=validated(Detect, detect, ("detect",), blame),
         simulated=validated(
-            Simulated,
-            {"noise": {}, **frozen.get("simulated", {})},
-            ("simulated",),
-            blame,
+            Simulated, frozen.get("simulated", {}), ("simulated",), blame
         ),
         conditions=validated(
             Conditions, frozen.get("conditions", {}), ("conditions",), blame
         ),
         coil=validated(CoilUse, frozen.get("coil", {}), ("coil",), blame),
-        sensor=sensor,
     )
 
 
@@ -278,19 +272,16 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
         if "file" in under:
             raise SceneError(f'{path}: a bench file has no key "file".')
         _refuse_not_finite(under, _blame(str(path), {}))
-        validated(BenchTable, _lists_to_tuples(under), (), _blame(str(path), {}))
+        whole = _lists_to_tuples(under)
+        validated(BenchSpec, whole, (), _blame(str(path), {}), path.parent)
         if inline.get("simulated") is False and under.get("simulated") is True:
             raise complaint(
                 ("bench", "simulated"), f"{file} is a simulated bench.", blame
             )
     merged = _merged(_lists_to_tuples(under), _placed(inline, folder))
-    spec = validated(BenchTable, merged, ("bench",), blame)
-    try:
-        return BenchSpec.of(spec, path, folder if path is None else path.parent)
-    except SceneError as reason:
-        raise complaint(
-            ("bench", "magnet", "calibration"), str(reason), blame
-        ) from reason
+    if path is not None:
+        folder, merged["file"] = path.parent, str(path)
+    return validated(BenchSpec, merged, ("bench",), blame, folder)
 
 
 def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -302,11 +293,8 @@ def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:
         files = {
             key: str((folder / name).resolve())
             for key, name in values.items()
-            if isinstance(name, str)
-            and (
-                (table == "magnet" and key == "calibration")
-                or (key in OWN_FILES and is_file(name))
-            )
+            if (key in ("dialect", "driver") and is_file(name))
+            or (key == "calibration" and isinstance(name, str))
         }
         placed[table] = {**values, **files}
     return placed

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.state import Start
 from tactile_lab.scene.bench_file import BenchSpec, is_file
-from tactile_lab.scene.sensor import SensorTable, StartVoltages
+from tactile_lab.scene.sensor import Sensor
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.scene.toml_text import to_toml
+from tactile_lab.table import dumped
 from tactile_lab.trial import Protocol
 
 
@@ -23,8 +25,7 @@ class Scene:
         name: the file's name without its ending.
         path: the scene or protocol file; None only for scenes made in Python.
         bench: instruments, wiring, geometry.
-        circuit: the sensor's parameters.
-        start: voltages at time 0, None for the equilibrium.
+        sensor: the circuit, its preset, and how it starts.
         protocol: typed parameters and trials.
         protocol_source: the user's Python file it came from, None for one that ships.
         record: signals kept and sample rate.
@@ -32,14 +33,12 @@ class Scene:
         simulated: physics of a simulated bench.
         coil: how to treat a force the coil cannot follow.
         conditions: under which the run is made.
-        sensor: the ``[sensor]`` table as written.
     """
 
     name: str
     path: Path | None
     bench: BenchSpec
-    circuit: Circuit
-    start: StartVoltages | None
+    sensor: Sensor
     protocol: Protocol
     protocol_source: Path | None
     record: Record
@@ -47,7 +46,17 @@ class Scene:
     simulated: Simulated
     coil: CoilUse
     conditions: Conditions
-    sensor: SensorTable
+
+    @property
+    def circuit(self) -> Circuit:
+        """The sensor's parameters."""
+        return self.sensor.circuit
+
+    @property
+    def start(self) -> Start | None:
+        """Voltages at time 0, None for the equilibrium."""
+        start = self.sensor.start
+        return start if isinstance(start, Start) else None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -69,18 +78,15 @@ class Scene:
         protocol = {"name": self.protocol.name}
         if self.protocol_source is not None:
             protocol["source"] = str(self.protocol_source)
-        bench = _dump(self.bench.table)
-        if self.bench.path is not None:
-            bench["file"] = str(self.bench.path)
         return {
-            "protocol": {**protocol, **_dump(self.protocol)},
-            "record": _dump(self.record),
-            "detect": _dump(self.detect),
-            "sensor": self._sensor(),
-            "coil": _dump(self.coil),
-            "simulated": _dump(self.simulated),
-            "conditions": _dump(self.conditions),
-            "bench": bench,
+            "protocol": {**protocol, **dumped(self.protocol)},
+            "record": dumped(self.record),
+            "detect": dumped(self.detect),
+            "sensor": dumped(self.sensor),
+            "coil": dumped(self.coil),
+            "simulated": dumped(self.simulated),
+            "conditions": dumped(self.conditions),
+            "bench": dumped(self.bench),
         }
 
     def to_toml(self, copies: Mapping[Path, str] | None = None) -> str:
@@ -96,20 +102,6 @@ class Scene:
             del data["conditions"]
             data = _renamed(data, {str(path): name for path, name in copies.items()})
         return to_toml(data)
-
-    def _sensor(self) -> dict[str, Any]:
-        own = {
-            name: getattr(self.circuit, name)
-            for name in SensorTable.model_fields
-            if name not in ("preset", "start")
-        }
-        full = SensorTable(preset=self.sensor.preset, start=self.sensor.start, **own)
-        return _dump(full)
-
-
-def _dump(table: Any) -> dict[str, Any]:
-    dumped: dict[str, Any] = table.model_dump(by_alias=True, exclude_none=True)
-    return dumped
 
 
 def _renamed(data: Any, names: Mapping[str, str]) -> Any:

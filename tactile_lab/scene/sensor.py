@@ -1,52 +1,32 @@
-"""``[sensor]``: the circuit's parameters, a preset under them, and how it starts."""
+"""``[sensor]``: the circuit, the preset under it, and how it starts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Tag
 
-from tactile_lab.model.circuit import Circuit
-from tactile_lab.quantity import Unit
-from tactile_lab.scene.tables import Table
+from tactile_lab.errors import ParameterError
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit
+from tactile_lab.model.state import Start
 
-PRESETS: dict[str, dict[str, float]] = {"table1": {}, "fig5b": {"V_GS": 1.54141}}
+PRESETS: Mapping[str, Mapping[str, str]] = {
+    "table1": {},
+    "fig5b": {"V_GS": "1.54141 V"},
+}
 """What each preset changes of Table 1; fig5b sits close enough to threshold to fire
 at 50 mN for 50 s, as the paper's bench must have done."""
 
-Ampere = Annotated[float, Unit("A")]
-Volt = Annotated[float, Unit("V")]
-Metre = Annotated[float, Unit("m")]
-Second = Annotated[float, Unit("s")]
-Ohm = Annotated[float, Unit("Ohm")]
-Farad = Annotated[float, Unit("F")]
-Coefficient = Annotated[float, Unit("V m/N")]
-
-
-class StartTable(Table):
-    """Voltages at time 0, all three."""
-
-    V_P: Volt
-    V_C1: Volt
-    V_C2: Volt
-
-
-@dataclass(frozen=True, kw_only=True)
-class StartVoltages:
-    """Voltages at time 0 instead of the equilibrium, V."""
-
-    V_P: float
-    V_C1: float
-    V_C2: float
-
 
 def _form(value: Any) -> str:
-    return "table" if isinstance(value, dict | StartTable) else "word"
+    return "table" if isinstance(value, dict | Start) else "word"
 
 
 def _start(value: Any) -> Any:
-    if value != "equilibrium" and not isinstance(value, dict | StartTable):
+    if value != "equilibrium" and not isinstance(value, dict | Start):
         raise ValueError(
             '"equilibrium" or a table { V_P = "0 V", V_C1 = "0 V", V_C2 = "0 V" } is '
             "needed"
@@ -54,77 +34,56 @@ def _start(value: Any) -> Any:
     return value
 
 
-class SensorTable(Table):
-    """Keys of ``[sensor]``; None is what the preset says (see `Circuit`)."""
+@dataclass(frozen=True, kw_only=True)
+class Sensor(Circuit):
+    """A circuit as a scene writes it.
+
+    Args:
+        preset: what stood in place of the defaults of `Circuit`, see `PRESETS`.
+        start: voltages at time 0, or "equilibrium".
+
+    Raises:
+        ParameterError: as `Circuit`, or a voltage at which it cannot start.
+    """
 
     preset: Literal["table1", "fig5b"] = "table1"
-    I_S: Ampere | None = None
-    V_GS: Volt | None = None
-    m: float | None = None
-    V_T: Volt | None = None
-    g31: Coefficient | None = None
-    h: Metre | None = None
-    L: Metre | None = None
-    d: Metre | None = None
-    a: Metre | None = None
-    b: Metre | None = None
-    tau: Second | None = None
-    R1: Ohm | None = None
-    R2: Ohm | None = None
-    R3: Ohm | None = None
-    R_L: Ohm | None = None
-    R_k: Ohm | None = None
-    C1: Farad | None = None
-    C2: Farad | None = None
-    V_S: Volt | None = None
-    V_th: Volt | None = None
-    I_T1s: Ampere | None = None
-    beta_F: float | None = None
-    beta_R: float | None = None
-    V_fire: Volt | None = None
-    V_reset: Volt | None = None
-    t_eps: Second | None = None
-    t1: Literal["emitter_resistor", "direct"] | None = None
-    firing: Literal["lif", "put"] | None = None
-    saturation: bool | None = None
     start: Annotated[
-        Annotated[StartTable, Tag("table")]
-        | Annotated[Literal["equilibrium"], Tag("word")],
+        Annotated[Start, Tag("table")] | Annotated[Literal["equilibrium"], Tag("word")],
         Discriminator(_form),
         BeforeValidator(_start),
     ] = "equilibrium"
 
-    def circuit(self, hand_set: dict[str, float]) -> Circuit:
-        """The circuit: preset, then the bench's hand-set voltages, then these keys.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.start, Start):
+            self._check_start(self.start)
 
-        Raises:
-            ParameterError: a value is impossible or contradicts another.
-        """
-        own = self.model_dump(exclude={"preset", "start"}, exclude_none=True)
-        own = {name: getattr(self, name) for name in own}
-        return Circuit(**{**PRESETS[self.preset], **hand_set, **own})
+    @cached_property
+    def circuit(self) -> Circuit:
+        """The circuit alone."""
+        return Circuit(**{f.name: getattr(self, f.name) for f in fields(Circuit)})
 
-    def start_voltages(self, circuit: Circuit) -> StartVoltages | None:
-        """Voltages at time 0, None for the equilibrium.
-
-        Raises:
-            ValueError: a voltage at which the circuit cannot start.
-        """
-        if not isinstance(self.start, StartTable):
-            return None
-        start = self.start
-        if start.V_C2 >= circuit.fire_voltage:
-            raise ValueError(
+    def _check_start(self, start: Start) -> None:
+        if start.V_C2 >= self.fire_voltage:
+            raise ParameterError(
                 f"start V_C2 = {start.V_C2:g} V must be below V_fire = "
-                f"{circuit.fire_voltage:g} V: the circuit would fire at time 0."
+                f"{self.fire_voltage:g} V: the circuit would fire at time 0."
             )
-        if not 0 <= start.V_C1 <= circuit.V_S:
-            raise ValueError(
+        if not 0 <= start.V_C1 <= self.V_S:
+            raise ParameterError(
                 f"start V_C1 = {start.V_C1:g} V must lie between 0 V and V_S = "
-                f"{circuit.V_S:g} V."
+                f"{self.V_S:g} V."
             )
-        if max(abs(start.V_P), abs(start.V_C2)) > 1e4:
-            raise ValueError(
+        if max(abs(start.V_P), abs(start.V_C2)) > LARGEST_VOLTAGE:
+            raise ParameterError(
                 "start V_P and V_C2 must not exceed 10 kV in magnitude; give volts."
             )
-        return StartVoltages(V_P=start.V_P, V_C1=start.V_C1, V_C2=start.V_C2)
+
+
+def with_preset(
+    table: Mapping[str, Any], hand_set: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The table over the bench's hand-set voltages over its preset."""
+    preset = table.get("preset")
+    under = PRESETS.get(preset, {}) if isinstance(preset, str) else {}
+    return {**under, **hand_set, **table}

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, ValidationInfo
 
 from tactile_lab.errors import nearest
 from tactile_lab.quantity import (
@@ -26,6 +19,7 @@ from tactile_lab.quantity import (
     parse,
 )
 from tactile_lab.signals import SIGNALS
+from tactile_lab.table import Table
 
 Noise = Annotated[float, Unit("V", least=0.0)]
 HalfWidth = Annotated[float, Unit("A", least=0.0)]
@@ -56,14 +50,18 @@ Level = Annotated[float | Literal["auto"], OrAuto("V", above=0.0)]
 Hysteresis = Annotated[float | Literal["auto"], OrAuto("V", least=0.0)]
 
 
-class Table(BaseModel):
-    """A table of a scene: strict, frozen, unknown keys refused."""
+def _signals(names: tuple[str, ...]) -> tuple[str, ...]:
+    for name in names:
+        if name not in SIGNALS:
+            hint = nearest(name, SIGNALS)
+            raise ValueError(
+                f'signal "{name}" does not exist; {hint + " " if hint else ""}'
+                f"Known: {', '.join(SIGNALS)}."
+            )
+    return tuple(dict.fromkeys(names))
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False
-    )
 
-
+@dataclass(frozen=True, kw_only=True)
 class Record(Table):
     """``[record]``: which signals are kept and how fast the scope samples.
 
@@ -73,22 +71,11 @@ class Record(Table):
         sample_rate: of every enabled scope channel, S/s.
     """
 
-    signals: tuple[str, ...] = ()
+    signals: Annotated[tuple[str, ...], AfterValidator(_signals)] = ()
     sample_rate: SampleRate = 1e6
 
-    @field_validator("signals")
-    @classmethod
-    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            if name not in SIGNALS:
-                hint = nearest(name, SIGNALS)
-                raise ValueError(
-                    f'signal "{name}" does not exist; {hint + " " if hint else ""}'
-                    f"Known: {', '.join(SIGNALS)}."
-                )
-        return tuple(dict.fromkeys(names))
 
-
+@dataclass(frozen=True, kw_only=True)
 class Detect(Table):
     """``[detect]``: how spikes are found on the streamed V_K.
 
@@ -104,16 +91,7 @@ class Detect(Table):
     hysteresis: Hysteresis = 0.1
     refractory: Pause = 50e-6
 
-    @model_validator(mode="before")
-    @classmethod
-    def _follows(cls, given: Any) -> Any:
-        """Hysteresis goes with the threshold unless it is given."""
-        if isinstance(given, dict) and given.get("threshold") == AUTO:
-            return {"hysteresis": AUTO, **given}
-        return given
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Detect:
+    def __post_init__(self) -> None:
         if isinstance(self.threshold, str) or isinstance(self.hysteresis, str):
             if self.threshold != self.hysteresis:
                 raise ValueError(
@@ -124,7 +102,13 @@ class Detect(Table):
                 f"hysteresis {self.hysteresis:g} V must be below the threshold "
                 f"{self.threshold:g} V, or V_K could never re-arm the detector."
             )
-        return self
+
+    @staticmethod
+    def completed(table: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The table with a hysteresis that goes with the threshold unless given."""
+        return (
+            {"hysteresis": AUTO, **table} if table.get("threshold") == AUTO else table
+        )
 
 
 @dataclass(frozen=True)
@@ -145,6 +129,7 @@ Temperature = Annotated[
 ]
 
 
+@dataclass(frozen=True, kw_only=True)
 class Conditions(Table):
     """``[conditions]``: under which a run is made; noted with it, changing nothing.
 
@@ -165,6 +150,49 @@ class Conditions(Table):
         return {name: text for name, text in texts.items() if text}
 
 
+NOISE = {
+    "V_C1": 5e-3,
+    "V_C2": 5e-3,
+    "V_K": 20e-3,
+    "coil_current": 0.5e-3,
+    "I_DS": 5e-3,
+}
+"""Standard deviation at the scope's inputs unless a scene says otherwise, V."""
+
+Names = TypeVar("Names", bound=Iterable[str])
+
+
+def _scope_signals(names: Names) -> Names:
+    for name in names:
+        if name not in NOISE:
+            hint = nearest(name, NOISE)
+            raise ValueError(
+                f'"{name}" is no scope signal; {hint + " " if hint else ""}'
+                f"Known: {', '.join(NOISE)}."
+            )
+    return names
+
+
+def _with_default_noise(noise: dict[str, float]) -> dict[str, float]:
+    return {**NOISE, **_scope_signals(noise)}
+
+
+def _two_or_none(signals: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(signals)) not in (0, 2):
+        raise ValueError("name two different signals, or none")
+    return signals
+
+
+def _factors(factors: dict[str, float]) -> dict[str, float]:
+    if 0 in _scope_signals(factors).values():
+        raise ValueError("a factor must not be 0")
+    return factors
+
+
+Probes = Annotated[tuple[str, ...], AfterValidator(_scope_signals)]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Simulated(Table):
     """``[simulated]``: the physics of the simulated bench; no effect on a real one.
 
@@ -192,8 +220,10 @@ class Simulated(Table):
             bench is opened, s; never if left out.
     """
 
-    seed: int = Field(default=1, ge=0, le=2**63 - 1)
-    noise: dict[str, Noise] = Field(default={})
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
+    noise: Annotated[dict[str, Noise], AfterValidator(_with_default_noise)] = field(
+        default_factory=lambda: dict(NOISE)
+    )
     follower: bool = True
     follower_offset: Voltage = 0.0
     input_bias: Current = 65e-12
@@ -203,48 +233,17 @@ class Simulated(Table):
     eddy_lag: Pause = 3e-3
     hysteresis: HalfWidth = 0.0
     attraction: Pull = 0.0
-    clock_error: float = Field(default=0.0, ge=-1e-4, le=1e-4)
-    swapped: tuple[str, ...] = ()
-    open_probes: tuple[str, ...] = ()
-    attenuation: dict[str, float] = Field(default={})
+    clock_error: Annotated[float, Field(ge=-1e-4, le=1e-4)] = 0.0
+    swapped: Annotated[Probes, AfterValidator(_two_or_none)] = ()
+    open_probes: Probes = ()
+    attenuation: Annotated[dict[str, float], AfterValidator(_factors)] = field(
+        default_factory=dict
+    )
     inverted_coil: bool = False
     coil_unplugged: Duration | None = None
 
-    default_noise: ClassVar[dict[str, float]] = {
-        "V_C1": 5e-3,
-        "V_C2": 5e-3,
-        "V_K": 20e-3,
-        "coil_current": 0.5e-3,
-        "I_DS": 5e-3,
-    }
 
-    @field_validator("noise")
-    @classmethod
-    def _channels(cls, noise: dict[str, float]) -> dict[str, float]:
-        cls._known(noise)
-        return {**cls.default_noise, **noise}
-
-    @field_validator("swapped", "open_probes", "attenuation")
-    @classmethod
-    def _probes(cls, named: Any, info: ValidationInfo) -> Any:
-        cls._known(named)
-        if info.field_name == "swapped" and len(set(named)) not in (0, 2):
-            raise ValueError("name two different signals, or none")
-        if info.field_name == "attenuation" and 0 in named.values():
-            raise ValueError("a factor must not be 0")
-        return named
-
-    @classmethod
-    def _known(cls, names: Iterable[str]) -> None:
-        for name in names:
-            if name not in cls.default_noise:
-                hint = nearest(name, cls.default_noise)
-                raise ValueError(
-                    f'"{name}" is no scope signal; {hint + " " if hint else ""}'
-                    f"Known: {', '.join(cls.default_noise)}."
-                )
-
-
+@dataclass(frozen=True, kw_only=True)
 class CoilUse(Table):
     """``[coil]``: what to do with a force the coil cannot follow.
 

@@ -11,7 +11,7 @@ import numpy as np
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_V_C1, wright_omega
-from tactile_lab.model.simulate import Start
+from tactile_lab.model.state import Start
 from tactile_lab.validation.decimal_rule import NODES, ONE, ZERO, Numbers, rule, solved
 from tactile_lab.waveform import Waveform
 

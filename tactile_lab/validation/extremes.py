@@ -11,7 +11,8 @@ from typing import Literal
 import numpy as np
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.model.simulate import simulate
+from tactile_lab.model.state import Start
 from tactile_lab.validation.problem import Problem
 from tactile_lab.validation.reference import constant_firing
 from tactile_lab.waveform import Waveform

@@ -9,7 +9,8 @@ from decimal import Decimal
 import numpy as np
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.model.simulate import simulate
+from tactile_lab.model.state import Start
 from tactile_lab.validation.reference import reference
 from tactile_lab.validation.table import provenance
 from tactile_lab.waveform import Waveform

@@ -21,7 +21,7 @@ from tactile_lab.model.integrator import TAU_L, Q_at
 from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
 from tactile_lab.model.packed import parameters
 from tactile_lab.model.pair import flow
-from tactile_lab.model.simulate import Start
+from tactile_lab.model.state import Start
 from tactile_lab.model.transistor import SATURATES, TO_A, TO_C2
 from tactile_lab.waveform import Waveform
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from decimal import Decimal, localcontext
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Start
+from tactile_lab.model.state import Start
 from tactile_lab.validation.decimal_cascade import Cascade, Reference
 from tactile_lab.validation.decimal_pair import Pair
 from tactile_lab.waveform import Waveform

@@ -13,7 +13,8 @@ from tactile_lab.errors import SolverError
 from tactile_lab.model.advance import advance, rest
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import T1_currents, V_C1_slope, rest_point
-from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.model.simulate import simulate
+from tactile_lab.model.state import Start
 from tactile_lab.validation.honesty import Case, compare, saturated_case
 from tactile_lab.waveform import Waveform
 

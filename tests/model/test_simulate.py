@@ -7,7 +7,8 @@ from tactile_lab.errors import ParameterError
 from tactile_lab.model.advance import advance, rest
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1, rest_V_C2
-from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.model.simulate import simulate
+from tactile_lab.model.state import Start
 from tactile_lab.waveform import Waveform
 
 SANITY = Waveform.through([(0, 0), (1, 0), (1.01, 0.15), (11, 0.15), (11.01, 0)])

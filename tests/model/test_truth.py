@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Start, simulate
+from tactile_lab.model.simulate import simulate
+from tactile_lab.model.state import Start
 from tactile_lab.validation.extremes import grazing
 from tactile_lab.validation.honesty import Case, compare, random_case
 from tactile_lab.validation.reference import constant_firing, reference

@@ -8,10 +8,11 @@ import pytest
 
 from tactile_lab.cli import main
 from tactile_lab.complaint import known_keys
+from tactile_lab.model.state import Start
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
-from tactile_lab.scene.bench_file import BenchTable
+from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load, load_bench
-from tactile_lab.scene.sensor import SensorTable, StartTable
+from tactile_lab.scene.sensor import Sensor
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.signals import SIGNALS
 
@@ -43,7 +44,7 @@ def test_an_example_loads(number, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "table", [Record, Detect, Simulated, CoilUse, Conditions, SensorTable]
+    "table", [Record, Detect, Simulated, CoilUse, Conditions, Sensor]
 )
 def test_every_key_of_a_table_is_documented(table):
     assert [key for key in known_keys(table, ()) if f"`{key}`" not in SCENES] == []
@@ -75,14 +76,14 @@ def test_every_key_of_a_bench_file_is_in_the_example():
         ("magnet",),
         ("hand_set",),
     ):
-        missing = set(known_keys(BenchTable, at)) - parts
+        missing = set(known_keys(BenchSpec, at)) - parts
         elsewhere = {"file", "simulated", "calibration", "dialect"}
         assert missing <= elsewhere, (at, missing)
 
 
 def test_every_signal_and_start_voltage_is_documented():
     assert [name for name in SIGNALS if f"`{name}`" not in SCENES] == []
-    assert all(name in SCENES for name in known_keys(StartTable, ()))
+    assert all(name in SCENES for name in known_keys(Start, ()))
 
 
 def test_the_documented_defaults_are_the_defaults():

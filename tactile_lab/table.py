@@ -1,0 +1,87 @@
+"""Tables of a scene or bench file: plain dataclasses, validated in place.
+
+A noun that a file can describe is a frozen dataclass that inherits `Table`; units and
+limits stand at its fields (``current: Annotated[float, Unit("A", above=0.0)]``). Made
+in Python it is what it is given; `tactile_lab.complaint.validated` makes one of what a
+file holds. Nothing here loads pydantic before a file is read.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, ClassVar, get_type_hints
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler
+    from pydantic.fields import FieldInfo
+    from pydantic_core import CoreSchema
+
+INTERNAL = {"internal": True}
+"""Metadata of a dataclass field that no file may set."""
+
+
+class Table:
+    """What a table of a file describes: strict, unknown keys refused."""
+
+    __pydantic_config__: ClassVar[Any] = {
+        "extra": "forbid",
+        "strict": True,
+        "allow_inf_nan": False,
+    }
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """The schema pydantic finds, for a table instead of an instance."""
+        made = handler(source)
+        whole: Any = handler.resolve_ref_schema(made)
+        whole["strict"] = False  # its fields stay strict
+        arguments = whole["schema"]
+        keys = [name for name in whole["fields"] if name not in _internal(cls)]
+        whole["fields"] = keys
+        arguments["fields"] = [f for f in arguments["fields"] if f["name"] in keys]
+        return made
+
+
+def fields_of(kind: Any) -> dict[str, FieldInfo]:
+    """The keys of a table or a protocol, with type, unit, limits and default.
+
+    Empty for whatever has none.
+    """
+    from pydantic import BaseModel
+    from pydantic.fields import FieldInfo
+    from typing_extensions import is_typeddict
+
+    if is_typeddict(kind):
+        hints = get_type_hints(kind, include_extras=True)
+        return {name: FieldInfo.from_annotation(hint) for name, hint in hints.items()}
+    if not isinstance(kind, type):
+        return {}
+    if issubclass(kind, BaseModel):
+        return kind.model_fields
+    if not dataclasses.is_dataclass(kind):
+        return {}
+    hints = get_type_hints(kind, include_extras=True)
+    return {
+        field.name: FieldInfo.from_annotated_attribute(hints[field.name], field)
+        for field in dataclasses.fields(kind)
+        if not field.metadata.get("internal")
+    }
+
+
+def dumped(table: Any) -> dict[str, Any]:
+    """All keys of a table or protocol as a file holds them; what is None is left out.
+
+    Quantities are exact texts.
+    """
+    from pydantic import TypeAdapter
+
+    made: dict[str, Any] = TypeAdapter(type(table)).dump_python(
+        table, by_alias=True, exclude_none=True
+    )
+    return made
+
+
+def _internal(kind: Any) -> set[str]:
+    return {f.name for f in dataclasses.fields(kind) if f.metadata.get("internal")}
