@@ -44,3 +44,6 @@ SIGNALS = {
 
 BENCH_ONLY = frozenset({"coil_current", "field"})
 """Signals the model alone knows nothing of."""
+
+FIELD_AVERAGING = 0.2
+"""Time one reading is averaged over, s: whole periods of 50 Hz and of 60 Hz mains."""

@@ -7,16 +7,14 @@ import numpy as np
 from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import show
-
-AVERAGING = 0.2
-"""Time one reading is averaged over, s: whole periods of 50 Hz and of 60 Hz mains."""
+from tactile_lab.signals import FIELD_AVERAGING
 
 FULL = 0.95
 """Part of the channel's range beyond which a mean is no reading any more."""
 
 
 class FieldMean:
-    """Means of the field channel of one stream, each over `AVERAGING`.
+    """Means of the field channel of one stream, each over `FIELD_AVERAGING`.
 
     A reading ends with its record where a scope has gaps between records.
 
@@ -30,7 +28,7 @@ class FieldMean:
         self._row = signals.index("field") if "field" in signals else None
         self._stream = stream
         self._start = start
-        self._span = max(1, round(AVERAGING / stream.interval))
+        self._span = max(1, round(FIELD_AVERAGING / stream.interval))
         self._sum = 0
         self._count = 0
         self._first = 0

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from tactile_lab.acquisition.field_mean import AVERAGING
 from tactile_lab.planning.needs import AVERAGED, Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.warn import threshold_of
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
-from tactile_lab.signals import SIGNALS
+from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
 
 NOT_RECORDED = "field is not recorded"
 
@@ -29,7 +28,7 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
         name = channel.signal
         why = "stored" if name in stored else "streamed, not stored"
         if name == AVERAGED:
-            why = f"kept as means of {show(AVERAGING, 's')}"
+            why = f"kept as means of {show(FIELD_AVERAGING, 's')}"
         if name == needed.detect_on:
             why += f"; spikes are detected on it{_threshold(scene, name)}"
         if name == "V_C1" and name not in scene.record.signals:

@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 
 from sim_backend.bench import open_bench
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.field_mean import AVERAGING, FieldMean
+from tactile_lab.acquisition.field_mean import FieldMean
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.scene.load import load
+from tactile_lab.signals import FIELD_AVERAGING
 from tactile_lab.store.run import Run
 
 BENCH = """
@@ -54,7 +55,7 @@ def test_a_calibration_reads_the_field_from_the_scope(tmp_path):
     with Run.load(done.folder) as run:
         assert "field" not in run.signals
         field = run.field
-        assert (np.diff(field["time"]) >= AVERAGING * 0.999).all()
+        assert (np.diff(field["time"]) >= FIELD_AVERAGING * 0.999).all()
         trials = run.trials[run.trials["pause"] == 0]
         for trial in trials:
             inside = (field["time"] > trial["hold_start"] + trial["start"]) & (
