@@ -26,53 +26,20 @@ class Tools(QWidget):
     def __init__(self, stack: LaneStack, view: TimeView, theme: Theme) -> None:
         super().__init__()
         self._stack, self._view, self._theme = stack, view, theme
-        self.follow = IconButton(
-            theme,
-            "follow",
-            "Follow the newest data (F)",
-            text="Follow",
-            role="toggle",
-            checkable=True,
-        )
-        self.freeze = IconButton(
-            theme,
-            "freeze",
-            "Freeze the display; acquisition goes on (Space)",
-            role="toggle",
-            checkable=True,
+        self.follow = self._toggle("follow", "Follow the newest data (F)", "Follow")
+        self.freeze = self._toggle(
+            "freeze", "Freeze the display; acquisition goes on (Space)"
         )
         self.widths = Segments(["1 s", "5 s", "10 s", "Run"], "Visible time")
         self.fit = IconButton(theme, "fit", "Fit the whole run (A)")
-        self.zoom = IconButton(
-            theme, "zoom", "Zoom to a box (Z)", role="toggle", checkable=True
+        self.zoom = self._toggle("zoom", "Zoom to a box (Z)")
+        self.cursors = self._toggle("cursors", "Cursors A and B (C)", "Cursors")
+        self.twin = self._toggle("twin", "Show what the model expects (M)", "Model")
+        self.residual = self._toggle(
+            "residual", "Show measured less model (Shift+M)", "Residual"
         )
-        self.cursors = IconButton(
-            theme,
-            "cursors",
-            "Cursors A and B (C)",
-            text="Cursors",
-            role="toggle",
-            checkable=True,
-        )
-        self.twin = IconButton(
-            theme,
-            "twin",
-            "Show what the model expects (M)",
-            text="Model",
-            role="toggle",
-            checkable=True,
-        )
-        self.residual = IconButton(
-            theme, "residual", "Show measured less model (Shift+M)",
-            text="Residual", role="toggle", checkable=True,
-        )  # fmt: skip
-        self.monitor = IconButton(
-            theme,
-            "eye",
-            "Monitor: watch the sensor between runs, coil off",
-            text="Monitor",
-            role="toggle",
-            checkable=True,
+        self.monitor = self._toggle(
+            "eye", "Monitor: watch the sensor between runs, coil off", "Monitor"
         )
         self.lanes = IconButton(theme, "layers", "Choose lanes")
         self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
@@ -87,6 +54,11 @@ class Tools(QWidget):
         ]
         self._lay_out()
         self._connect()
+
+    def _toggle(self, icon: str, tip: str, text: str = "") -> IconButton:
+        return IconButton(
+            self._theme, icon, tip, text=text, role="toggle", checkable=True
+        )
 
     def set_width(self, width: int) -> None:
         """Text beside the icons where there is room, else icons alone."""
@@ -106,7 +78,11 @@ class Tools(QWidget):
             self._view.place_cursors(start + 0.35 * width, start + 0.65 * width)
         elif not on:
             self._view.clear_cursors()
-        self.cursors.setChecked(on)
+
+    def show_monitor(self, *, on: bool) -> None:
+        """Whether the sensor is being watched."""
+        if self.monitor.isChecked() is not on:
+            self.monitor.setChecked(on)
 
     def bring(self, which: int) -> None:
         """Bring cursor A (0) or B (1) to the middle of the view."""
@@ -121,7 +97,7 @@ class Tools(QWidget):
 
     def _connect(self) -> None:
         self.follow.clicked.connect(self._view.set_follow)
-        self._view.follow_changed.connect(self._follow_changed)
+        self._view.follow_changed.connect(self.follow.setChecked)
         self._view.changed.connect(self._mark_width)
         self.widths.group.idClicked.connect(self._width_chosen)
         self.fit.clicked.connect(self._view.show_all)
@@ -156,9 +132,6 @@ class Tools(QWidget):
         if marked != self.widths.chosen:
             self.widths.choose(marked)
 
-    def _follow_changed(self, follow: bool) -> None:
-        self.follow.setChecked(follow)
-
     def _box(self, on: bool) -> None:
         self._stack.zoom_box = on
         self._stack.arrange()
@@ -188,6 +161,7 @@ class Tools(QWidget):
     def show_cursors(self) -> None:
         """Times of A and B, their difference, and the mean rate between, as text."""
         cursors = self._view.cursors
+        self.cursors.setChecked(cursors is not None)
         self.set_width(self.width())
         if cursors is None:
             self._readout.setText("")

@@ -93,8 +93,7 @@ class Frames(QObject):
             bar.show_standing(monitor.standing, recording=monitor.recording)
         elif bar.isVisible():
             bar.hide()
-        if panels.centre.tools.monitor.isChecked() is not monitor.alive:
-            panels.centre.tools.monitor.setChecked(monitor.alive)
+        panels.centre.tools.show_monitor(on=monitor.alive)
 
     def _keep_budget(self, cost: float) -> None:
         self.costs.append(cost)
