@@ -182,7 +182,7 @@ class Channel(Table):
             ("shunt", "coil_current", self.shunt, 1 / (self.shunt or 1.0)),
             ("tesla_per_volt", "field", self.tesla_per_volt, self.tesla_per_volt),
         ):
-            if given is None:
+            if not given or not scale:
                 continue
             if self.signal != belongs_to:
                 raise ValueError(f"{key} belongs to the signal {belongs_to}")

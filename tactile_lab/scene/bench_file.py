@@ -77,7 +77,7 @@ def _wired(channel: Channel) -> Channel:
     if not channel.input:
         raise ValueError('input is empty; name one of the scope, such as "A"')
     if channel.signal == "field":
-        if channel.tesla_per_volt is None:
+        if not channel.tesla_per_volt:
             raise ValueError(
                 "field needs tesla_per_volt, what the teslameter's analogue output "
                 'means at the range its knob shows, such as "0.02 T/V"; compare two '
