@@ -44,13 +44,13 @@ def parse(text: str, unit: str) -> float:
     digits, written = match.group(1).replace("−", "-"), match.group(2)
     if written is None:
         raise QuantityError(
-            f'"{text}" has no unit; write for example "{digits} {unit}".'
+            f'"{text}" has no unit; write for example {example(unit, digits)}.'
         )
     factor = _factor(written, unit)
     if factor is None:
         raise QuantityError(
             f'"{text}" has the unit {written}; {unit} is needed here (any SI prefix), '
-            f"such as {example(unit)}."
+            f"such as {example(unit, digits if unit == 'K' else '')}."
         )
     value = _scaled(digits, factor)
     if not math.isfinite(value):
@@ -67,12 +67,24 @@ def _scaled(digits: str, factor: float) -> float:
     return float(digits) * factor
 
 
-def example(unit: str) -> str:
-    """A quantity of that unit, to show in a message."""
-    return {
-        "N": '"50 mN"', "s": '"2 s"', "V": '"1.4 V"', "S/s": '"1 MS/s"', "A": '"0.5 A"',
-        "Ohm": '"100 MOhm"', "F": '"150 pF"', "m": '"6 mm"', "T": '"163 mT"',
-    }.get(unit, f'"1 {unit}"')  # fmt: skip
+def example(unit: str, digits: str = "") -> str:
+    """A quantity of that unit, to show in a message.
+
+    Args:
+        unit: SI.
+        digits: a number that was given without unit: what it may have meant. A number
+            of 1 or more is taken for one of the unit as it is used here.
+    """
+    usual, prefix = {
+        "N": ("50", "m"), "s": ("2", ""), "V": ("1.4", ""), "S/s": ("1", "M"),
+        "A": ("0.5", ""), "Ohm": ("100", "M"), "F": ("150", "p"), "m": ("6", "m"),
+        "T": ("163", "m"),
+    }.get(unit, ("1", ""))  # fmt: skip
+    if unit == "K":
+        return f'"{digits or 23.5} °C"'
+    if digits and abs(float(digits)) < 1 and prefix == "m":
+        prefix = ""  # more likely SI
+    return f'"{digits or usual} {prefix}{unit}"'
 
 
 def _factor(written: str, unit: str) -> float | None:
@@ -195,7 +207,8 @@ class Unit:
             )
         elif text_only and not isinstance(value, SIFloat | SIInt):
             raise QuantityError(
-                f'{value!r} has no unit; write for example "{value} {self.symbol}".'
+                f"{value!r} has no unit; write for example "
+                f"{example(self.symbol, str(value))}."
             )
         else:
             try:

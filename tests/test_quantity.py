@@ -139,3 +139,20 @@ def test_a_dumped_field_validates_to_the_same(value):
     assert isinstance(dumped["level"], str)
     again = Pulse.model_validate(dumped, context={"text_only": True})
     assert again.level == value
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "hint"),
+    [
+        ("80", "N", '"80 mN"'),
+        ("0.08", "N", '"0.08 N"'),
+        ("2", "s", '"2 s"'),
+        ("1", "S/s", '"1 MS/s"'),
+        ("23.5 C", "K", '"23.5 °C"'),
+        ("23.5", "K", '"23.5 °C"'),
+    ],
+)
+def test_a_number_without_unit_is_answered_with_what_it_may_mean(text, unit, hint):
+    with pytest.raises(QuantityError) as why:
+        parse(text, unit)
+    assert hint in str(why.value)

@@ -23,25 +23,31 @@ def environment() -> dict[str, str]:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "not installed"
-    commit = _commit()
+    commit = commit_of(Path(__file__).parents[2])
     if commit is not None:
         found["commit"] = commit
     return found
 
 
-def _commit() -> str | None:
+def commit_of(root: Path) -> str | None:
     """The checkout's commit, with a plus where files were changed; None outside git."""
-    root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return None
     try:
-        asked = subprocess.run(
-            ["git", "-C", str(root), "describe", "--always", "--dirty=+"],
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=False,
-        )
+        # `describe --dirty` would take the lock of the user's index
+        commit = _git(root, "describe", "--always")
+        changed = _git(root, "status", "--porcelain", "--untracked-files=no")
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return asked.stdout.strip() or None
+    return commit and commit + ("+" if changed else "")
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    done = subprocess.run(
+        ["git", "--no-optional-locks", "-C", str(root), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=5,
+        check=False,
+    )
+    return done.stdout.strip() or None

@@ -7,12 +7,14 @@ edit anywhere in it can never run old machine code.
 
 from __future__ import annotations
 
+import logging
 import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit
+from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 COMPILED = (
@@ -27,6 +29,25 @@ _INNER: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
 }
+
+
+class _FirstUse(event.Listener):
+    """Says that code is compiled, once, and only where the disk has none of it."""
+
+    KIND = "numba:compile"
+
+    def on_start(self, _: Any) -> None:
+        """Compiling begins."""
+        event.unregister(self.KIND, self)  # type: ignore[no-untyped-call]
+        logging.getLogger(__name__).warning(
+            "Compiling for this computer, about 20 s; kept for every later run."
+        )
+
+    def on_end(self, _: Any) -> None:
+        """Nothing to say."""
+
+
+event.register(_FirstUse.KIND, _FirstUse())  # type: ignore[no-untyped-call]
 
 
 def inner(function: F) -> F:
