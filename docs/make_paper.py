@@ -24,9 +24,9 @@ from tactile_lab.analysis.transfer_file import read_transfer
 from tactile_lab.engine.execution import Execution
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
-from tactile_lab.report.canvas import save
+from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.from_run import read
-from tactile_lab.report.transfer_figure import transfer_figure
+from tactile_lab.report.transfer import transfer_plot
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
@@ -152,7 +152,8 @@ def transfer() -> Transfer:
     curve = read_transfer(path)
     fit = fit_transfer(curve.V_GS, curve.I_DS)
     name = "computed from Table 1, with 5 % noise"
-    save(transfer_figure(curve, fit, name), DOCS / "paper" / "transfer")
+    plot = transfer_plot(curve, fit)
+    save(draw(plot, "Transfer curve", name), DOCS / "paper" / "transfer")
     (DOCS / "paper" / "transfer.svg").unlink()
     return fit
 

@@ -1,1 +1,1 @@
-"""One file per measurement protocol; scenes/ holds ready-to-run scenes."""
+"""One file per protocol, its trials, meaning and plots; scenes/ are ready to run."""

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import datetime
+from collections.abc import Iterator
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from tactile_lab.quantity import Duration, Pause
+from tactile_lab.analysis.field_calibration import (
+    FieldCalibration,
+    FieldStep,
+    calibration_text,
+    fit_field,
+)
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.measurement import Measurement
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.quantity import Duration, Pause, show
 from tactile_lab.stimulus.demagnetise import demagnetising
 from tactile_lab.stimulus.force import PushCurrent
 from tactile_lab.trial import Protocol, Trial, Trials
@@ -18,6 +30,12 @@ BEYOND, LEAST_BEYOND = 0.2, 0.2
 the half-width of a soft core's loop, so that both branches are settled in the range."""
 REPEATED = 3
 """Steps of the falling branch that are read again at the end."""
+BRANCHES: dict[str, Literal["rising", "falling", "again"]] = {
+    "rising": "rising", "falling": "falling", "again": "again",
+}  # fmt: skip
+"""First words of the labels of steps."""
+HALF_A_DIGIT = 5e-6
+"""Error of a field read off a display that shows 0.01 mT, T."""
 RAMP = 0.5
 """Time in which the current goes from one step to the next, s: it never overshoots."""
 
@@ -27,13 +45,14 @@ class CalibrateField(Protocol):
 
     At the end the first steps are read again: the drift. The winding's resistance tells
     how much it warmed. Take the NdFeB magnet away first: it adds 163 mT. Each step
-    keeps the direction it is approached from, because the two branches differ.
-    `analysis.field_calibration` makes the calibration file of the readings.
+    keeps the direction it is approached from, because the two branches differ. The run
+    keeps the calibration file that is made of the readings.
     """
 
     name: ClassVar[str] = "calibrate_field"
     title: ClassVar[str] = "Field calibration"
     signals: ClassVar[tuple[str, ...]] = ("coil_current", "field")
+    checks: ClassVar[Literal["field"]] = "field"
 
     most: PushCurrent = Field(default=1.0, description="Largest calibrated current")
     points: int = Field(
@@ -85,3 +104,118 @@ class CalibrateField(Protocol):
             label=f"{branch} {level * 1e3:.0f} mA".replace("-", "−"),
             hold=(begin, end),
         )
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """Slope, loop and uncertainty of B2(I), and the calibration file."""
+        try:
+            found = fit_field(_steps(run), run.warming)
+        except NotIdentifiableError as reason:
+            return Conclusion((f"No calibration: {reason}.",))
+        slope, loop = found.slope, show(found.half_width, "T", 3)
+        sentences = (
+            f"B2 rises by {show(slope.value, 'T')}/A (±{show(slope.half, 'T', 2)}/A, "
+            f"95 %), from {show(found.offset.value, 'T', 3)} at 0 A.",
+            f"The loop is {loop} or {show(found.half_width_current, 'A', 3)} to either "
+            f"side; one field value is known to ±{show(found.uncertainty, 'T', 3)} "
+            "(95 %).",
+            *_steady(found),
+            *(f"{warning[0].upper()}{warning[1:]}." for warning in found.warnings),
+        )
+        values = {
+            "slope_T_per_A": slope.value,
+            "slope_low_95": slope.low,
+            "slope_high_95": slope.high,
+            "offset_T": found.offset.value,
+            "half_width_T": found.half_width,
+            "half_width_A": found.half_width_current,
+            "uncertainty_T": found.uncertainty,
+            "drift_T": found.drift,
+            "warming_K": found.warming,
+            "current_A": found.current.tolist(),
+            "field_T": found.field.tolist(),
+        }
+        return Conclusion(sentences, values, files=_file(run, found))
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Both branches of B2(I), and what the straight line leaves of them."""
+        try:
+            steps = _steps(run)
+            fit = fit_field(steps)
+        except NotIdentifiableError:
+            return  # the conclusion says why
+        fields, left = [], []
+        for branch, colour, mark in (
+            ("rising", "V_C1", "up"),
+            ("falling", "force", "down"),
+        ):
+            here = [s for s in steps if s.branch == branch]
+            current = np.array([s.current for s in here])
+            field = np.array([s.field for s in here])
+            line = fit.slope.value * current + fit.offset.value
+            look: Any = {"mark": mark, "colour": colour}
+            fields.append(Series(x=current, y=field, name=branch, **look))
+            left.append(Series(x=current, y=field - line, **look))
+        yield Plot(
+            name="figure",
+            caption="Field of the electromagnet against current. Upper: both branches. "
+            "Lower: each branch less the straight line of the mean curve.",
+            x_label="Coil current",
+            x_unit="A",
+            panels=(
+                Panel(label="B2", unit="T", series=tuple(fields)),
+                Panel(label="Less line", unit="T", series=tuple(left), height=1.35),
+            ),
+        )
+
+
+def _steps(run: Measurement) -> list[FieldStep]:
+    """Mean reading and mean current of each step.
+
+    Raises:
+        NotIdentifiableError: the run has no readings.
+    """
+    if run.field is None or not len(run.field) or run.current is None:
+        raise NotIdentifiableError("the run has no teslameter readings or no current")
+    steps = []
+    for trial in run.results:
+        branch = BRANCHES.get(trial.label.partition(" ")[0])
+        if branch is None or trial.held is None:
+            continue
+        readings = run.field_between(*trial.held)
+        applied = run.current_at(trial.held[1])
+        if not readings.size or applied is None:
+            continue
+        error = HALF_A_DIGIT
+        if readings.size > 1:
+            error = float(readings.std(ddof=1) / np.sqrt(readings.size))
+        field = float(readings.mean())
+        steps.append(
+            FieldStep(branch=branch, current=applied, field=field, error=error)
+        )
+    return steps
+
+
+def _steady(found: FieldCalibration) -> Iterator[str]:
+    """What the checks of drift and temperature gave."""
+    if found.drift is not None:
+        yield (
+            f"At the same current and history the field changed by "
+            f"{show(found.drift, 'T', 2)} from begin to end."
+        )
+    if found.warming is not None:
+        yield f"The winding became {found.warming:.0f} K warmer (by its resistance)."
+
+
+def _file(run: Measurement, found: FieldCalibration) -> dict[str, str]:
+    """The calibration file a bench may name; none for a run without a date."""
+    try:
+        date = datetime.date.fromisoformat(run.started[:10])
+    except ValueError:
+        return {}
+    text = calibration_text(
+        found,
+        coil=run.settings.get("coil", {}).get("identity", run.bench),
+        date=date,
+        temperature=run.conditions.get("temperature", "not known"),
+    )
+    return {"calibration.csv": text}

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import math
+from typing import Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from tactile_lab.quantity import Duration, Force, Pause
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.quantity import Duration, Force, Pause, show
 from tactile_lab.stimulus.force import ForceProtocol, pause, step
 from tactile_lab.trial import Trials
 
@@ -23,6 +27,7 @@ class ForceCheck(ForceProtocol):
     title: ClassVar[str] = "Force check"
     signals: ClassVar[tuple[str, ...]] = ("force", "coil_current", "field")
     as_wired: ClassVar[bool] = True
+    checks: ClassVar[Literal["force"]] = "force"
 
     levels: tuple[Force, ...] = Field(
         default=(0.05, 0.1, 0.0, -0.05), min_length=1, description="Force by Eq. (2)"
@@ -49,3 +54,71 @@ class ForceCheck(ForceProtocol):
             yield step(level, ramp=self.ramp, hold=self.hold)
             if self.gap > 0:
                 yield pause(self.gap)
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """F(I) - F(0) by Eq. (2) from current and field, and independent readings."""
+        trials = run.results
+        by_field = [_force_by_field(run, t) for t in trials]
+        bands = [run.uncertain(force) for force in by_field]
+        values: dict[str, Any] = {
+            "F_minus_F0_by_field_N": by_field,
+            "F_minus_F0_uncertainty_N_95": bands,
+        }
+        known = [
+            f"{t.label} as {show(force, 'N', 3)}"
+            + ("" if band is None else f" ± {show(band, 'N', 2)}")
+            for t, force, band in zip(trials, by_field, bands, strict=True)
+            if force is not None
+        ]
+        field = Conclusion(values=values)
+        if known:
+            said = f"F(I) − F(0) by Eq. (2) from the field read: {', '.join(known)}."
+            field = Conclusion((said,), values)
+        return field + self._read_over_eq2(run)
+
+    def _read_over_eq2(self, run: Measurement) -> Conclusion:
+        """The readings over what Eq. (2) gives for the levels."""
+        levels = np.array([t.level or 0.0 for t in run.results])
+        readings = np.array(self.readings)
+        if readings.size != levels.size:
+            said = (
+                "No independent readings: enter F(I) − F(0) of each level with "
+                '--set protocol.readings=["...", ...] to check Eq. (2).'
+            )
+            return Conclusion((said,))
+        strength = float(np.sum(levels**2))
+        if strength == 0:
+            return Conclusion(("All levels are 0 N: nothing to compare.",))
+        scale = float(np.sum(levels * readings) / strength)
+        left = readings - scale * levels
+        freedom = max(1, levels.size - 1)
+        error = float(np.sqrt(np.sum(left**2) / freedom / strength))
+        said = f"The force read is {scale:.3g} ± {2 * error:.2g} times that of Eq. (2)."
+        if 0.05 < scale < 0.2:
+            said += (
+                " A factor near 0.1 is the area A2: Table 1 prints 2.25e-3 m², a core "
+                "of 15 mm x 15 mm has 2.25e-4 m²."
+            )
+        found = {"read_over_eq2": scale, "standard_error": error}
+        if run.force_uncertainty is not None:
+            shared = run.force_uncertainty
+            offset = shared.absolute * abs(float(levels.sum())) / strength
+            open_ = scale * math.hypot(shared.relative, offset)
+            found["eq2_uncertainty_95"] = open_
+            said += (
+                " What calibration and geometry leave open in Eq. (2) adds "
+                f"±{open_:.2g} (95 %)."
+            )
+        return Conclusion((said,), found)
+
+
+def _force_by_field(run: Measurement, trial: MeasuredTrial) -> float | None:
+    """F(I) - F(0) of a trial from the field in its hold and before it, N."""
+    if trial.held is None or run.newtons_per_tesla is None:
+        return None
+    start, end = trial.held
+    held = run.field_between((start + end) / 2, end)
+    before = run.field_between(trial.start - 1.0, trial.start)
+    if not (held.size and before.size):
+        return None
+    return float(held.mean() - before.mean()) * run.newtons_per_tesla

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar
 
 from pydantic import Field
 
-from tactile_lab.quantity import Duration
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.measurement import Measurement
+from tactile_lab.plot import Guide, Plot
+from tactile_lab.quantity import Duration, show
+from tactile_lab.report.overview import overview
 from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -33,3 +39,35 @@ class Monitor(Protocol):
                 level=0.0,
             )
             left -= length
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """How far the sensor sits from its threshold."""
+        trace = run.trace("V_C1")
+        if run.circuit is None or trace is None or not trace.time.size:
+            return Conclusion()
+        end, critical = float(trace.time[-1]), run.circuit.critical_V_C1
+        distance = run.mean("V_C1", end - 1.0, end) - critical
+        where = "above" if distance > 0 else "below"
+        said = (
+            f"V_C1 ended {show(abs(distance), 'V', 3)} {where} the critical "
+            f"{show(critical, 'V')}: the sensor "
+            f"{'is silent' if distance > 0 else 'fires'} at rest."
+        )
+        return Conclusion((said,), {"distance_to_threshold_V": distance})
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """The general plot with the V_C1 below which the sensor fires."""
+        if run.circuit is None:
+            return
+        critical, general = run.circuit.critical_V_C1, overview(run)
+        said = f"fires below {show(critical, 'V')}"
+        line = Guide(at=critical, along="x", text=said, colour="V_C1")
+        yield replace(
+            general,
+            panels=tuple(
+                replace(panel, guides=(*panel.guides, line))
+                if panel.label == "Voltage"
+                else panel
+                for panel in general.panels
+            ),
+        )

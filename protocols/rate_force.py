@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
+from protocols.threshold_search import critical_force, rate_against_force
+from tactile_lab.analysis.rate_force import eq15_rate, mean_slope
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.measurement import Measurement
+from tactile_lab.plot import Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.levels import Levels
@@ -40,3 +48,69 @@ class RateForce(Recovering, Levels):
                 first = first_rest(outcome)
             if number + 1 < len(levels):
                 yield from self.recover(level, first)
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """The critical force, the slope above it, and the rates beside Eq. (15)."""
+        found = critical_force(run, self.ramp, self.hold)
+        return found + _slope(run) + _beside_eq15(run) if run.searched else found
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Rate against force, and Eq. (15)."""
+        forces = [t.level for t in run.results if t.level is not None]
+        ramp = next((t.hold[0] for t in run.results if t.hold is not None), None)
+        expected: tuple[Series, ...] = ()
+        if run.circuit is not None and ramp is not None and forces:
+            swept = np.linspace(0.9 * min(forces), 1.03 * max(forces), 400)
+            rate = [eq15_rate(run.circuit, float(f), ramp) for f in swept]
+            expected = (
+                Series(x=swept, y=rate, name="Eq. (15)", mark="dashed", colour="I_DS"),
+            )
+        yield from rate_against_force(
+            run,
+            "Highest rate of each step from rest against its force, as in Fig. 4d. "
+            "Line: Eq. (15) with the current at the end of the ramp; it knows no "
+            "adaptation. Grey band: the critical force lies within.",
+            *expected,
+        )
+
+
+def _slope(run: Measurement) -> Conclusion:
+    """The mean slope of rate over force above onset."""
+    levelled = [
+        (t.level, t.response.peak_rate)
+        for t in run.results
+        if t.level is not None and t.response.peak_rate is not None
+    ]
+    try:
+        slope = mean_slope(
+            [level for level, _ in levelled],
+            [rate for _, rate in levelled],
+            run.force_uncertainty,
+        )
+    except NotIdentifiableError as reason:
+        return Conclusion((), {"slope_Hz_per_N": None}, (f"No slope: {reason}.",))
+    said = (
+        f"Above onset the highest rate rises by {slope.text('Hz/mN', 1e-3)} on "
+        "average; the curve bends."
+    )
+    return Conclusion((said,), {"slope_Hz_per_N": slope})
+
+
+def _beside_eq15(run: Measurement) -> Conclusion:
+    """The highest rates over those of Eq. (15)."""
+    ratios = [
+        t.response.peak_rate / expected
+        for t in run.results
+        if run.circuit is not None
+        and t.response.peak_rate is not None
+        and t.hold is not None
+        and t.level is not None
+        and (expected := eq15_rate(run.circuit, t.level, t.hold[0])) > 0
+    ]
+    if not ratios:
+        return Conclusion()
+    said = (
+        f"The highest rates are {min(ratios):.2f} to {max(ratios):.2f} of what Eq. "
+        "(15) gives for the current at the end of the ramp, which knows no adaptation."
+    )
+    return Conclusion((said,), {"peak_rate_over_eq15": ratios})

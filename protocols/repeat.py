@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
+from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
+from tactile_lab.measurement import Measurement
+from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause
 from tactile_lab.stimulus.force import ForceProtocol, step
 from tactile_lab.trial import Trials
@@ -33,3 +38,50 @@ class Repeat(ForceProtocol):
                 rest=self.gap,
                 label=f"no. {number + 1}",
             )
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """The highest rate from one presentation to the next."""
+        if not run.searched:
+            return Conclusion(missing=(NOT_SEARCHED,))
+        rates = [t.response.peak_rate for t in run.results]
+        values = {
+            "spikes": [t.response.spikes for t in run.results],
+            "peak_rates_Hz": rates,
+        }
+        if len(rates) < 2 or rates[0] is None:
+            why = "No decrement: the first presentation gave no rate."
+            return Conclusion((), values, (why,))
+        rated = [r for r in rates if r is not None]
+        said = (
+            "Peak rate from one presentation to the next: "
+            f"{', '.join(f'{r:.3g}' for r in rated)} Hz"
+        )
+        if silent := len(rates) - len(rated):
+            said += f"; the other {silent} gave fewer than two spikes"
+        return Conclusion((f"{said}.",), values)
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Highest rate against presentation."""
+        trials = [t for t in run.results if t.level is not None]
+        if len(trials) < 2:
+            return
+        number = np.arange(1, len(trials) + 1)
+        rate = np.array([t.response.peak_rate or 0.0 for t in trials])
+        counts = tuple(str(t.response.spikes) for t in trials)
+        yield Plot(
+            name="summary",
+            title="decrement",
+            caption="Highest rate from one presentation of the same force to the next, "
+            "as in Fig. 5d (right).",
+            x_label="Presentation (numbers: spikes)",
+            whole=True,
+            panels=(
+                Panel(
+                    label="Highest rate",
+                    unit="Hz",
+                    prefix="",
+                    series=(Series(x=number, y=rate, mark="joined", texts=counts),),
+                    limits=(0, max(float(rate.max()) * 1.15, 1.0)),
+                ),
+            ),
+        )

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tactile_lab.errors import LimitError
+from tactile_lab.analysis.rate_force import Onset, onset
+from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
+from tactile_lab.errors import LimitError, NotIdentifiableError
+from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import Duration, Pause, Unit, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.recovery import Recovering, first_rest
 from tactile_lab.trial import Outcome, Trial, Trials
+from tactile_lab.waveform import Waveform
 
 PushForce = Annotated[float, Unit("N", least=0.0)]
 Resolution = Annotated[float, Unit("N", above=0.0)]
@@ -70,7 +79,136 @@ class ThresholdSearch(Recovering):
     def _step(self, level: float) -> Trial:
         return step(level, ramp=self.ramp, hold=self.hold)
 
+    def conclude(self, run: Measurement) -> Conclusion:
+        """The critical force, and the V_GS that explains it."""
+        return critical_force(run, self.ramp, self.hold)
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Rate against force, with the critical force."""
+        yield from rate_against_force(
+            run,
+            "Highest rate of each trial against its force; open: silent. Grey band: "
+            "the critical force lies within.",
+        )
+
 
 def fired(outcome: Outcome) -> bool:
     """Whether the trial gave a spike."""
     return outcome.spike_times.size > 0
+
+
+def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
+    """Between which forces the sensor begins to fire, for that ramp and hold, s."""
+    if not run.searched:
+        return Conclusion(missing=(NOT_SEARCHED,))
+    try:
+        found = _onset(run.results)
+    except NotIdentifiableError as reason:
+        return Conclusion(
+            (), {"critical_force_N": None}, (f"No critical force: {reason}.",)
+        )
+    sentence = (
+        f"Critical force: between {show(found.silent, 'N')} (silent) and "
+        f"{show(found.fires, 'N')} (fires), for a ramp of {ramp:g} s and a hold of "
+        f"{hold:g} s."
+    )
+    values = {
+        "critical_force_N": found.middle,
+        "critical_force_half_width_N": found.half_width,
+    }
+    known, said = run.uncertain(found.middle), NOT_STATED
+    if known is not None:
+        whole = math.hypot(found.half_width, known)
+        values["critical_force_uncertainty_N_95"] = whole
+        said = f"With the calibration's uncertainty: ±{show(whole, 'N', 2)} (95 %)."
+    return Conclusion((sentence, said), values) + _gate(run, found, known or 0.0)
+
+
+def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterator[Plot]:
+    """The highest rate of each trial against its force; none below two trials.
+
+    Args:
+        run: what was measured.
+        caption: of the plot.
+        more: further series, below the points.
+    """
+    trials = [t for t in run.results if t.level is not None]
+    if len(trials) < 2:
+        return
+    force = np.array([t.level for t in trials], dtype=np.float64)
+    rate = np.array([t.response.peak_rate or 0.0 for t in trials])
+    fired = np.array([t.response.spikes > 0 for t in trials])
+    known = run.force_uncertainty
+    error = None if known is None else known.of(force)
+    bands: tuple[Guide, ...] = ()
+    try:
+        found = _onset(trials)
+        half = math.hypot(found.half_width, run.uncertain(found.middle) or 0.0)
+        bands = (Guide(at=found.middle - half, to=found.middle + half),)
+    except NotIdentifiableError:
+        pass  # no band to draw; the conclusion says why
+    kinds: tuple[tuple[str, Mark, NDArray[np.bool_]], ...] = (
+        (run.origin, "points", fired), ("silent", "open", ~fired),
+    )  # fmt: skip
+    points = tuple(
+        Series(
+            x=force[which], y=rate[which], name=name, mark=mark,
+            x_error=None if error is None else error[which],
+        )
+        for name, mark, which in kinds
+        if which.any()
+    )  # fmt: skip
+    yield Plot(
+        name="summary",
+        caption=caption,
+        x_label="Force",
+        x_unit="N",
+        panels=(
+            Panel(
+                label="Highest rate",
+                unit="Hz",
+                prefix="",
+                series=(*more, *points),
+                guides=bands,
+                limits=(0, None),
+            ),
+        ),
+    )
+
+
+def _onset(trials: Sequence[MeasuredTrial]) -> Onset:
+    forces = [float(t.level or 0.0) for t in trials]
+    return onset(forces, [t.response.spikes for t in trials])
+
+
+def _gate(run: Measurement, found: Onset, force_error: float) -> Conclusion:
+    """V_GS from the applied force of the two trials that bracket the onset."""
+    from tactile_lab.analysis.operating_point import V_GS_of_onset
+
+    if run.circuit is None:
+        return Conclusion()
+    silent, fires = (
+        _applied(run, next(t for t in run.results if t.level == level))
+        for level in (found.silent, found.fires)
+    )
+    try:
+        low, high = V_GS_of_onset(run.circuit, silent, fires, force_error)
+    except NotIdentifiableError as reason:
+        return Conclusion((f"No V_GS explains the critical force: {reason}.",))
+    said = (
+        f"By the model, a V_GS of {show((low + high) / 2, 'V', 5)} "
+        f"({show(low, 'V', 5)} to {show(high, 'V', 5)}) explains it; "
+        f"{show(run.circuit.V_GS, 'V', 5)} is believed."
+    )
+    return Conclusion((said,), {"V_GS_low_V": low, "V_GS_high_V": high})
+
+
+def _applied(run: Measurement, trial: MeasuredTrial) -> Waveform:
+    """The force of one trial as it was applied, N against s from its start."""
+    start, end = trial.start, trial.start + trial.duration
+    time, value = run.force.time, run.force.value
+    inside = (time > start) & (time < end)
+    return Waveform(
+        np.concatenate([[0.0], time[inside] - start, [trial.duration]]),
+        np.concatenate([[run.force.at(start)], value[inside], [run.force.at(end)]]),
+    )

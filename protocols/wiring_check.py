@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
-from tactile_lab.quantity import Duration, Unit
+from tactile_lab.analysis.wiring import (
+    NODES,
+    ChannelCalibration,
+    Levels,
+    calibrate_channel,
+    explaining_V_GS,
+    hum,
+    judge,
+)
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.quantity import Duration, Unit, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.trial import Probes, Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
 SmallForce = Annotated[float, Unit("N", above=0.0, most=0.1)]
 Mains = Annotated[float, Unit("Hz", above=0.0, most=100.0)]
+Window = tuple[float, float]
+CODE = 40e-3
+"""One code where a run does not tell, V."""
 
 
 class WiringCheck(Protocol):
@@ -29,7 +48,8 @@ class WiringCheck(Protocol):
         "force", "coil_current", "field", "V_C1", "V_C2", "V_K",
     )  # fmt: skip
     as_wired: ClassVar[bool] = True
-    sees_supply: ClassVar[bool] = True
+    moves_probes: ClassVar[bool] = True
+    checks: ClassVar[Literal["wiring"]] = "wiring"
 
     calibrate: bool = Field(
         default=True, description="First put the probes on 0 V and on V_S"
@@ -54,3 +74,151 @@ class WiringCheck(Protocol):
             hold=(0.0, self.hold),
             probes=probes,
         )
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """A verdict per channel, with its hum, and the V_GS that the rest explains."""
+        windows = {t.label: _window(t) for t in run.results}
+        if run.circuit is None or not {"rest", "push"} <= set(windows):
+            return Conclusion(("Rest and push were not both completed.",))
+        calibrations, faults = _calibrated(run, run.circuit, windows)
+        rest, push = (_found(run, windows[w], calibrations) for w in ("rest", "push"))
+        expected = _expected(run, run.circuit, windows)
+        verdicts = judge(Levels(rest, push), expected, faults)
+        channels: dict[str, dict[str, Any]] = {}
+        sentences = []
+        for verdict in verdicts:
+            trace = run.trace(verdict.signal)
+            size, said = self._hum(trace, windows["rest"])
+            known = calibrations.get(verdict.signal)
+            channels[verdict.signal] = {
+                "ok": verdict.ok,
+                "text": verdict.text,
+                "hum_V": size,
+                "offset_V": known.offset if known else None,
+                "gain": known.gain if known else None,
+                "error_V": known.error if known else None,
+            }
+            sentences.append(
+                f"{verdict.signal}: {'as wired' if verdict.ok else 'WRONG'}, "
+                f"{verdict.text}{said}."
+            )
+        sentences += [
+            f"{name}: offset {show(c.offset, 'V', 2)}, gain {c.gain:.3f} by 0 V and "
+            f"V_S, then known to ±{show(2 * c.error, 'V', 2)} (95 %)."
+            for name, c in calibrations.items()
+        ]
+        found = Conclusion(tuple(sentences), {"channels": channels})
+        if "V_C1" in rest and all(v.ok for v in verdicts if v.signal == "V_C1"):
+            found += _gate(run, run.circuit, rest["V_C1"], calibrations.get("V_C1"))
+        return found
+
+    def _hum(
+        self, trace: RecordedSignal | None, window: Window
+    ) -> tuple[float | None, str]:
+        """Amplitude of the mains hum at a channel's input, V, and what to say of it."""
+        if trace is None:
+            return None, ""
+        inside = (trace.time >= window[0]) & (trace.time <= window[1])
+        try:
+            shown = hum(trace.time[inside], trace.mean[inside], self.mains)
+        except NotIdentifiableError:
+            return None, ""
+        size = shown / abs(trace.scale)
+        half = (trace.code or CODE) / abs(trace.scale) / 2
+        # half a code of the converter is as fine as it can be told
+        said = f"{1e3 * size:.2g} ± {1e3 * half:.2g} mV"
+        if size <= half:
+            said = f"below {1e3 * half:.2g} mV"
+        return size, f"; {self.mains:g} Hz hum {said}"
+
+
+def _window(trial: MeasuredTrial) -> Window:
+    start, end = trial.held or (trial.start, trial.start + trial.duration)
+    # the second half: the followers and node A have settled
+    return (start + end) / 2, end
+
+
+def _calibrated(
+    run: Measurement, circuit: Circuit, windows: Mapping[str, Window]
+) -> tuple[dict[str, ChannelCalibration], dict[str, str]]:
+    """Calibrations of the voltage channels, and what is wrong with those without."""
+    found: dict[str, ChannelCalibration] = {}
+    faults: dict[str, str] = {}
+    if not {"0 V", "V_S"} <= set(windows):
+        return found, faults
+    for trace in run.traces:
+        if trace.signal not in NODES:
+            continue
+        low, high = (run.mean(trace.signal, *windows[w]) for w in ("0 V", "V_S"))
+        try:
+            found[trace.signal] = calibrate_channel(
+                low, high, circuit.V_S, trace.code or CODE
+            )
+        except NotIdentifiableError as reason:
+            faults[trace.signal] = str(reason)
+    return found, faults
+
+
+def _found(
+    run: Measurement, window: Window, calibrations: Mapping[str, ChannelCalibration]
+) -> dict[str, float]:
+    """Mean of each signal in the window, corrected where its channel is calibrated."""
+    found = {}
+    for trace in run.traces:
+        value, known = run.mean(trace.signal, *window), calibrations.get(trace.signal)
+        found[trace.signal] = value if known is None else known.corrected(value)
+    field = run.field_between(*window)
+    if field.size:
+        found["field"] = float(field.mean())
+    return found
+
+
+def _expected(
+    run: Measurement, circuit: Circuit, windows: Mapping[str, Window]
+) -> Levels:
+    """Rest and push by the model, and by what was set."""
+    from tactile_lab.model.simulate import simulate
+
+    centres = np.array([sum(windows[w]) / 2 for w in ("rest", "push")])
+    nodes = {}
+    for signal in ("V_C1", "V_C2"):
+        model = simulate(
+            circuit, run.force, keep=(signal,), until=run.duration, tolerance=1e-6
+        )
+        nodes[signal] = model.sample(signal, centres)
+    levels = []
+    for i, name in enumerate(("rest", "push")):
+        amperes = run.current_at(windows[name][1]) or 0.0
+        levels.append(
+            {
+                **{signal: float(values[i]) for signal, values in nodes.items()},
+                "V_K": 0.0,
+                "coil_current": amperes,
+                "field": amperes * (run.field_per_ampere or 0.0),
+            }
+        )
+    return Levels(*levels)
+
+
+def _gate(
+    run: Measurement, circuit: Circuit, V_C1: float, known: ChannelCalibration | None
+) -> Conclusion:
+    """V_GS that explains V_C1 at rest."""
+    from tactile_lab.model.equations import rest_V_C1
+
+    trace = run.trace("V_C1")
+    code = (trace.code if trace else None) or CODE
+    error = math.hypot(code / math.sqrt(12), known.error if known else code)
+    try:
+        gate = explaining_V_GS(circuit, V_C1, error)
+    except NotIdentifiableError as reason:
+        said = f"{str(reason)[0].upper()}{str(reason)[1:]}."
+        return Conclusion((said,), {"V_GS": None})
+    said = (
+        f"V_C1 rests at {show(V_C1, 'V')}, the model at "
+        f"{show(rest_V_C1(circuit), 'V')}: a V_GS of {show(gate.value, 'V')} "
+        f"({show(gate.low, 'V')} to {show(gate.high, 'V')}, 95 %) explains it; "
+        "threshold_search refines it (0.65 mN per mV)."
+    )
+    values = {"value": gate.value, "low_95": gate.low, "high_95": gate.high}
+    return Conclusion((said,), {"V_GS": values})

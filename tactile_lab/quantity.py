@@ -140,8 +140,7 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     if unit in ("m^2", "m²") and 0 < abs(value) < 0.01:
         prefix, number = "m", value * 1e6
     elif value != 0 and not any(c in unit for c in " ^²"):
-        power = 3 * math.floor(math.log10(abs(value)) / 3 + 1e-12)
-        power = min(max(power, -15), 9)
+        power = _power(value)
         number = value / 10.0**power
         if float(f"{abs(number):.{digits}g}") >= 1000 and power < 9:
             power, number = power + 3, number / 1000
@@ -163,6 +162,18 @@ class SIFloat(float):
 
 class SIInt(int):
     """A whole number given in Python: SI, also where a file must write the unit."""
+
+
+def prefix_of(value: float, unit: str) -> str:
+    """The prefix that keeps 1 to 999 in front of `unit`; "" for a compound unit."""
+    if value == 0 or not unit.isalpha():
+        return ""
+    return _SHOWN[_power(value)]
+
+
+def _power(value: float) -> int:
+    """Power of ten of the prefix that keeps 1 to 999 in front."""
+    return min(max(3 * math.floor(math.log10(abs(value)) / 3 + 1e-12), -15), 9)
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+import inspect
+import traceback
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 from pydantic.fields import FieldInfo
 
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.errors import TactileLabError
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.measurement import Measurement
+    from tactile_lab.plot import Plot
 
 Probes = Literal["circuit", "ground", "supply"]
 """What the probes of the circuit's voltages touch: their nodes, 0 V, or V_S."""
@@ -87,11 +96,12 @@ Trials = Generator[Trial, Outcome, None]
 
 
 class Protocol(BaseModel):
-    """A measurement protocol: typed parameters and a generator of trials.
+    """A measurement protocol: its parameters, its trials, what they mean, their plots.
 
     A subclass is one file: its fields (with units and limits, see
     `tactile_lab.quantity`) become the scene's ``[protocol]`` keys, the ``--set`` keys,
-    the window's form and the stored attributes.
+    the window's form and the stored attributes. It writes `trials`, and `conclude` and
+    `plots` where its answer is more than the traces.
     """
 
     model_config = ConfigDict(
@@ -108,13 +118,28 @@ class Protocol(BaseModel):
     """Of those, what the bench does not measure is left out without complaint."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Signals the generator looks at in outcomes: acquired even when not recorded."""
+    moves_probes: ClassVar[bool] = False
+    """The probes of the circuit's voltages are put on 0 V and V_S, too: their ranges
+    are widened to see both, and the model is not compared with them."""
+    checks: ClassVar[Literal["", "wiring", "field", "force"]] = ""
+    """What of the bench it checks or calibrates; the connect dialog offers it there."""
 
     def trials(self) -> Trials:
         """Yield trials; each ``yield`` returns that trial's outcome."""
         raise NotImplementedError
 
-    sees_supply: ClassVar[bool] = False
-    """The voltage channels' ranges are widened to see all from 0 V to V_S."""
+    def conclude(self, run: Measurement) -> Conclusion:
+        """What the trials mean; nothing by default.
+
+        Raises:
+            NotIdentifiableError: the run does not tell it. Any error is told in the
+                report instead of the conclusion.
+        """
+        return Conclusion()
+
+    def plots(self, run: Measurement) -> Iterable[Plot]:
+        """Plots of the answer beside the general one of force, voltages and spikes."""
+        return ()
 
     @classmethod
     def parameters(cls) -> dict[str, FieldInfo]:
@@ -136,3 +161,18 @@ class Protocol(BaseModel):
     def located(self, folder: Any) -> Protocol:
         """The same protocol with file parameters resolved against `folder` (a Path)."""
         return self
+
+    @classmethod
+    def fault(cls, error: Exception) -> str:
+        """What went wrong in this protocol, with file and line of its own code.
+
+        For the errors of `tactile_lab.errors`, which are raised on purpose, it is
+        their text.
+        """
+        if isinstance(error, TactileLabError):
+            return str(error)
+        file = inspect.getfile(cls)
+        frames = traceback.extract_tb(error.__traceback__)
+        line = next((f.lineno for f in reversed(frames) if f.filename == file), None)
+        where = Path(file).name if line is None else f"{Path(file).name}, line {line}"
+        return f"{where}: {type(error).__name__}: {error}"

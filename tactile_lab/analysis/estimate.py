@@ -23,6 +23,18 @@ class Estimate:
         half = student_95(freedom) * error
         return cls(float(value), float(error), float(value - half), float(value + half))
 
+    @property
+    def half(self) -> float:
+        """Half the width of the 95 % interval."""
+        return (self.high - self.low) / 2
+
+    def text(self, unit: str, factor: float = 1.0) -> str:
+        """For a person: "3.1 s (2.9 to 3.3 s, 95 %)"; `factor`: from SI to `unit`."""
+        if self.low == self.high:
+            return f"{_plain(self.value * factor)} {unit} (at its bound)"
+        low, high = _plain(self.low * factor), _plain(self.high * factor)
+        return f"{_plain(self.value * factor)} {unit} ({low} to {high} {unit}, 95 %)"
+
     def widened(self, *halves: float) -> Estimate:
         """With further independent causes of error, half-widths of their 95 % bands."""
         more = sum(half**2 for half in halves)
@@ -41,6 +53,10 @@ class Estimate:
             "low_95": self.low,
             "high_95": self.high,
         }
+
+
+def _plain(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
 
 
 def student_95(freedom: int) -> float:

@@ -6,7 +6,6 @@ import datetime
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.calibration import COIL, HASH, UNCERTAINTY, VALID_UNTIL, table_hash
-from tactile_lab.errors import NotIdentifiableError, SceneError
+from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.quantity import show
 
 FloatArray = NDArray[np.float64]
@@ -188,27 +187,22 @@ def _apart(current: FloatArray) -> FloatArray:
     return np.array(sorted(kept))
 
 
-def write_calibration(
-    path: Path,
+def calibration_text(
     calibration: FieldCalibration,
     *,
     coil: str,
     date: datetime.date,
     temperature: str = "not known",
     valid_days: int = 180,
-) -> Path:
-    """Write the file a bench's ``[magnet] calibration`` names; never over another.
+) -> str:
+    """The file a bench's ``[magnet] calibration`` names: head, hash and table.
 
     Args:
-        path: ends in .csv.
         calibration: what to write.
         coil: the coil or source it belongs to, as the bench names it.
         date: day of the measurement.
         temperature: of the room meanwhile, and who says so.
         valid_days: after so many days it has expired.
-
-    Raises:
-        SceneError: the file exists, or cannot be written.
     """
     rows = "\n".join(
         f"{i:.6g},{b:.9g}"
@@ -228,21 +222,7 @@ def write_calibration(
         UNCERTAINTY["T"]: f"{calibration.uncertainty:.3g}",
     }
     told = "".join(f"# {name}: {value}\n" for name, value in head.items()) + body
-    text = f"# {HASH}: {table_hash(told)}\n{told}"
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-        path.chmod(0o444)
-    except FileExistsError as reason:
-        raise SceneError(
-            f"Calibration {path} exists; calibrations are never changed. Choose "
-            "another name."
-        ) from reason
-    except OSError as reason:
-        raise SceneError(
-            f"Calibration {path} cannot be written: {reason.strerror}."
-        ) from reason
-    return path
+    return f"# {HASH}: {table_hash(told)}\n{told}"
 
 
 def _known(value: float | None) -> str:

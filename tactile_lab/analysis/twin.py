@@ -17,9 +17,6 @@ from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
-ELSEWHERE = frozenset({"wiring_check"})
-"""Protocols that put the probes elsewhere: nothing follows from V_C1 alone."""
-
 
 @dataclass(frozen=True, eq=False)
 class Measured:

@@ -25,7 +25,7 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
         from tactile_lab.errors import RunFolderError
         from tactile_lab.report.from_run import read
         from tactile_lab.report.results import results
-        from tactile_lab.report.table import table
+        from tactile_lab.report.table import trials_table
         from tactile_lab.report.write import write
 
         folder = out or run
@@ -44,8 +44,8 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
     if as_json:
         print_json(results(written.findings))
         return
-    say(table(written.findings).text)
-    for sentence in written.findings.conclusion.sentences:
-        say(sentence)
+    say(trials_table(written.findings.run).text)
+    if text := written.findings.conclusion.text:
+        say(text)
     say(f"figure  {written.png}")
     say(f"report  {written.html}")

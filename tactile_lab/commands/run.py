@@ -170,9 +170,8 @@ class Narrator:
         searched = execution.needs.detect_on is not None
         if searched or "V_C1" in execution.needs.stored:
             from tactile_lab.acquisition.model_comparison import ModelComparison
-            from tactile_lab.analysis.twin import ELSEWHERE
 
-            if execution.scene.protocol.name in ELSEWHERE:
+            if execution.scene.protocol.moves_probes:
                 return
             self._model = ModelComparison(execution.scene, searched=searched)
 
@@ -280,14 +279,14 @@ def _report(done: Executed) -> Report | None:
 
 
 def _print(done: Executed, report: Report | None, took: float) -> None:
-    from tactile_lab.report.table import table
+    from tactile_lab.report.table import trials_table
 
     if report is not None:
         run = report.findings.run
-        say(table(report.findings).text)
+        say(trials_table(run).text)
         say()
-        for sentence in report.findings.conclusion.sentences:
-            say(sentence)
+        if text := report.findings.conclusion.text:
+            say(text)
         say(
             f"{done.duration:.1f} s of experiment in {took:.1f} s "
             f"({done.took:.1f} s of it running)."

@@ -53,11 +53,12 @@ def command(
         fit = fit_transfer(read.V_GS, read.I_DS, between=limits)
         if figure is not None:
             from tactile_lab.errors import SceneError
-            from tactile_lab.report.canvas import save
-            from tactile_lab.report.transfer_figure import transfer_figure
+            from tactile_lab.report.canvas import draw, save
+            from tactile_lab.report.transfer import transfer_plot
 
             try:
-                save(transfer_figure(read, fit, curve.name), figure)
+                plot = transfer_plot(read, fit)
+                save(draw(plot, "Transfer curve", curve.name), figure)
             except OSError as reason:
                 raise SceneError(
                     f"{figure} cannot be written: {reason.strerror}."

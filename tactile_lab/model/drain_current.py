@@ -8,27 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.errors import ParameterError
+from tactile_lab.model.circuit import Circuit
 
 FloatArray = NDArray[np.float64]
 
 BOXCAR_3DB = 0.4429
 """-3 dB frequency of a mean over a window, times the window's length."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Divider:
-    """The part of the circuit around node A; Table 1 by default.
-
-    Attributes:
-        V_S: supply, V.
-        R1, R2: divider, Ohm.
-        C1: capacitor, F.
-    """
-
-    V_S: float = 5.0
-    R1: float = 9.58e6
-    R2: float = 100e6
-    C1: float = 680e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +36,7 @@ class DrainCurrent:
 def drain_current(
     time: ArrayLike,
     V_C1: ArrayLike,
-    divider: Divider | None = None,
+    circuit: Circuit | None = None,
     *,
     window: float = 0.02,
 ) -> DrainCurrent:
@@ -63,13 +48,13 @@ def drain_current(
     Args:
         time: evenly spaced, shape (n,), n >= 3, s.
         V_C1: bin means or samples, shape (n,), V.
-        divider: the parts around node A; Table 1's where None.
+        circuit: V_S, R1, R2 and C1 around node A; Table 1's where None.
         window: wanted length of the window, s; made at least three points long.
 
     Raises:
         ParameterError: too few points, unequal shapes or uneven spacing.
     """
-    parts = divider or Divider()
+    parts = circuit or Circuit()
     t = np.asarray(time, dtype=np.float64)
     v = np.asarray(V_C1, dtype=np.float64)
     if t.ndim != 1 or t.shape != v.shape or t.size < 3:

@@ -146,7 +146,7 @@ def _as_the_scope_can(
     if scope is None or not channels:
         return channels, float("inf"), True
     capability = scope_capability(scope)
-    if scene.protocol.sees_supply:
+    if scene.protocol.moves_probes:
         channels = tuple(
             _widened(c, scene.circuit.V_S, capability.ranges) for c in channels
         )

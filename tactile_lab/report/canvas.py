@@ -1,17 +1,27 @@
-"""A blank figure in the house style, and its files."""
+"""Plots drawn by matplotlib in the house style, and the files of a figure."""
 
 from __future__ import annotations
 
 import io
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike, NDArray
 
+from tactile_lab.plot import Guide, Panel, Plot, Series, y_scale
+from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
+
+FloatArray = NDArray[np.float64]
 
 # Any: matplotlib types the keys as some 400 literals
 STYLE: Any = {
@@ -42,110 +52,289 @@ STYLE: Any = {
     "path.simplify_threshold": 0.3,
     "agg.path.chunksize": 20000,
 }
-
-
-WIDTH, HEIGHT = 7.2, 3.7
-"""Of a figure with one panel, inches."""
+WIDTH = 7.2
+"""Of a figure, inches; so are all lengths below."""
+LEFT, RIGHT, FOOT, GAP = 0.72, 0.3, 0.5, 0.18
+BETWEEN = 0.75
+"""Between panels side by side."""
+HEAD_HEIGHT = 0.62
+"""Room the heading takes at the top."""
 HEADING = "heading"
 """Names the heading's parts in SVG: a page with a heading of its own hides them."""
-HEAD_HEIGHT = 0.62
-"""Room the heading takes at the top, inches."""
-BOX = (0.72, 0.5, WIDTH - 1.02, HEIGHT - 0.5 - HEAD_HEIGHT)
-"""Left, bottom, width and height of that panel, inches."""
+DASHES, DOTS = (0, (4, 2)), (0, (1, 2.5))
+MANY, MOST = 60, 200
+"""So many points are drawn smaller."""
 
 
-def blank(width: float, height: float) -> Figure:
-    """A figure of that size in inches, drawn by Agg, without pyplot's state."""
+def draw(
+    plot: Plot, title: str, subtitle: str = "", *, simulated: bool | None = None
+) -> Figure:
+    """The plot as a figure, drawn by Agg, without pyplot's state.
+
+    Args:
+        plot: what to draw.
+        title: bold, above it.
+        subtitle: a quiet second line.
+        simulated: the mark that tells simulated from measured; None for neither.
+    """
+    heights = [panel.height for panel in plot.panels]
+    high = max(heights) if plot.beside else sum(heights) + GAP * (len(heights) - 1)
     with rc_context(STYLE):
-        figure = Figure(figsize=(width, height))
+        figure = Figure(figsize=(WIDTH, FOOT + high + HEAD_HEIGHT))
         FigureCanvasAgg(figure)
+        factor, x_text = plot.x_scale()
+        drawn = _boxes(figure, plot)
+        for axes, panel in zip(drawn, plot.panels, strict=True):
+            _panel(axes, panel, factor)
+            _x_axis(axes, plot, factor)
+        for axes, letter in zip(drawn, "abcdef" if plot.letters else "", strict=False):
+            axes.annotate(
+                letter, (0, 1), (-0.58 * 72, -1), xycoords="axes fraction",
+                textcoords="offset points", weight="bold", size=10, va="top",
+            )  # fmt: skip
+        labelled = drawn if plot.beside else drawn[-1:]
+        for axes in drawn:
+            if axes in labelled:
+                axes.set_xlabel(_math(x_text))
+            else:
+                axes.tick_params(axis="x", labelbottom=False, length=0)
+                axes.spines["bottom"].set_visible(False)
+        _heading(figure, title, subtitle, simulated)
     return figure
 
 
-def axes(
-    figure: Figure,
-    box: tuple[float, float, float, float],
-    share: Axes | None = None,
-) -> Axes:
-    """Axes at `box` (left, bottom, width, height in inches), sharing time."""
+def _boxes(figure: Figure, plot: Plot) -> list[Axes]:
+    """Empty axes for the panels."""
     width, height = figure.get_size_inches()
-    left, bottom, wide, high = box
-    with rc_context(STYLE):
-        made = figure.add_axes(
-            (left / width, bottom / height, wide / width, high / height), sharex=share
-        )
-        made.grid(axis="y", color=RULE.light, linewidth=0.5)
-        made.set_axisbelow(True)
+    room = width - LEFT - RIGHT
+    made: list[Axes] = []
+    top, left = height - HEAD_HEIGHT, LEFT
+    for panel in plot.panels:
+        wide, share = room, made[0] if made else None
+        if plot.beside:
+            wide, share = (room + BETWEEN) / len(plot.panels) - BETWEEN, None
+        bottom = FOOT if plot.beside else top - panel.height
+        box = (left / width, bottom / height, wide / width, panel.height / height)
+        axes = figure.add_axes(box, sharex=share)
+        axes.grid(axis="y", color=RULE.light, linewidth=0.5)
+        axes.set_axisbelow(True)
+        axes.yaxis.set_label_coords(-0.42 / wide, 0.5)
+        made.append(axes)
+        if plot.beside:
+            left += wide + BETWEEN
+        else:
+            top -= panel.height + GAP
     return made
 
 
-def heading(
-    figure: Figure, title: str, subtitle: str, *, simulated: bool | None
-) -> None:
-    """Title, a quiet second line, and the mark that tells simulated from measured.
+def _x_axis(axes: Axes, plot: Plot, factor: float) -> None:
+    if plot.x_log:
+        axes.set_xscale("log")
+    if plot.x_ticks:
+        at = [factor * x for x in plot.x_ticks]
+        axes.set_xticks(at, [f"{x:.3g}" for x in at])
+        axes.minorticks_off()
+    elif plot.whole:
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    elif not plot.x_log:
+        few = 10 if not plot.beside else 6
+        axes.xaxis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
+    if plot.x_limits is not None:
+        axes.set_xlim(factor * plot.x_limits[0], factor * plot.x_limits[1])
 
-    Args:
-        figure: to put them on.
-        title: bold.
-        subtitle: below it.
-        simulated: the mark; None for a figure that is neither or is not known to be.
-    """
+
+def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
+    factor, text = y_scale(panel)
+    if panel.log:
+        axes.set_yscale("log")
+    for guide in panel.guides:
+        _guide(axes, guide, factor if guide.along == "x" else x_factor)
+    for order, series in enumerate(panel.series):
+        _series(axes, series, x_factor, factor, 3 + order)
+    low, high = panel.limits
+    axes.set_ylim(
+        None if low is None else low * factor, None if high is None else high * factor
+    )
+    axes.set_ylabel(_math(text))
+    if not panel.log:
+        few = max(3, round(3 * panel.height))
+        axes.yaxis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
+    _legend(axes, panel.series)
+    if panel.text:
+        up = panel.corner == "upper"
+        axes.annotate(
+            _math(panel.text), (0.99, 1 if up else 0.04), xycoords="axes fraction",
+            ha="right", va="top" if up else "bottom", size=7.5, zorder=20,
+        )  # fmt: skip
+    if panel.note:
+        axes.annotate(
+            _math(panel.note), (1, 1), (0, 3), xycoords="axes fraction",
+            textcoords="offset points", ha="right", va="bottom", size=6.5,
+            color=QUIET.light,
+        )  # fmt: skip
+
+
+def _guide(axes: Axes, guide: Guide, factor: float) -> None:
+    at, across = guide.at * factor, guide.along == "x"
+    colour = _colour(guide.colour)
+    if guide.to is not None:
+        grey = palette.BAND if guide.colour == "band" else RULE
+        span = axes.axhspan if across else axes.axvspan
+        span(at, guide.to * factor, color=grey.light, lw=0, zorder=0)
+        return
+    look: Any = {"color": colour, "lw": 0.6, "zorder": 1}
+    if guide.dashed:
+        look["ls"] = DASHES if guide.text else (0, (2, 2))
+    (axes.axhline if across else axes.axvline)(at, **look)
+    if guide.text:
+        place, where = (0.01, at), axes.get_yaxis_transform()
+        if not across:
+            place, where = (at, 0.99), axes.get_xaxis_transform()
+        axes.annotate(
+            _math(guide.text), place, (0, -3) if across else (3, 0), xycoords=where,
+            textcoords="offset points", va="top", size=7, color=colour, zorder=19,
+        )  # fmt: skip
+
+
+def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None:
+    x, colour = _scaled(s.x, x_by), _colour(s.colour)
+    y = _scaled(s.y, y_by) if np.size(s.y) else np.empty(0)
+    over: Any = {"color": colour, "zorder": order}
+    if s.mark == "ticks":
+        axes.vlines(x, 0.86, 0.98, transform=axes.get_xaxis_transform(), lw=0.7, **over)
+        return
+    if s.low is not None and s.high is not None:
+        _between(axes, s, x, _scaled(s.low, y_by), _scaled(s.high, y_by), over)
+    errors = [
+        None if e is None else _scaled(e, by)
+        for e, by in ((s.x_error, x_by), (s.y_error, y_by))
+    ]
+    if any(e is not None for e in errors):
+        axes.errorbar(
+            x, y, xerr=errors[0], yerr=errors[1], fmt="none", elinewidth=0.8,
+            ecolor=colour if errors[0] is None else QUIET.light, capsize=2,
+            zorder=order,
+        )  # fmt: skip
+    if s.mark == "filled":
+        axes.fill_between(x, 0, y, color=colour, alpha=0.14, lw=0, zorder=order)
+    if s.mark not in ("range", "band", "text"):
+        axes.plot(x, y, clip_on=s.mark not in _DISCS, **over, **_look(s, x.size))
+    for at, value, text in zip(x, y, s.texts, strict=False):
+        beside = s.mark == "text"
+        up = 1 if value >= 0 or not beside else -1
+        axes.annotate(
+            text, (at, value), (0, (3 if beside else 6) * up),
+            textcoords="offset points", ha="center",
+            va="bottom" if up > 0 else "top", size=7.5 if beside else 7,
+            color=colour if beside else QUIET.light,
+        )  # fmt: skip
+
+
+_DISCS = ("points", "dots", "open", "joined")
+
+
+def _between(
+    axes: Axes, s: Series, x: FloatArray, low: FloatArray, high: FloatArray, over: Any
+) -> None:
+    """What lies between the extremes, or within the tolerance."""
+    if s.mark == "range":
+        axes.fill_between(x, low, high, lw=0.5, **{**over, "zorder": 2.5})
+    elif s.mark in _DISCS:
+        wide = 3 if x.size < MANY else 1
+        axes.vlines(x, low, high, color=palette.TWIN.light, alpha=0.35, lw=wide)
+    else:
+        axes.fill_between(x, low, high, **{**over, "zorder": over["zorder"] - 0.5},
+                          alpha=0.25, lw=0)  # fmt: skip
+
+
+def _look(s: Series, count: int) -> Any:
+    """How matplotlib draws that mark."""
+    size = 5.5 if count < MANY else 3.2 if count < MOST else 1.6
+    looks: dict[str, Any] = {
+        "line": {"lw": 1.1},
+        "filled": {"lw": 1.2},
+        "dashed": {"lw": 1.0, "ls": DASHES},
+        "dotted": {"lw": 0.8, "ls": DOTS},
+        "steps": {"lw": 0.6, "alpha": 0.6, "drawstyle": "steps-post"},
+        "dots": {"marker": "o", "ls": "", "ms": min(size, 3.2), "mew": 0},
+        "points": {"marker": "o", "ls": "", "ms": size, "mew": 0},
+        "open": {"marker": "o", "ls": "", "ms": size, "mew": 1.2, "mfc": PAPER.light},
+        "up": {"marker": "^", "ms": 4, "mew": 0, "lw": 0.8},
+        "down": {"marker": "v", "ms": 4, "mew": 0, "lw": 0.8},
+        "joined": {"marker": "o", "ms": 0.8 * size, "mew": 0, "lw": 0.8},
+    }
+    return looks.get(s.mark, {"lw": 1.6})
+
+
+def _legend(axes: Axes, series: Iterable[Series]) -> None:
+    """Named series in a line above the panel."""
+    named = [s for s in series if s.name]
+    if not named:
+        return
+    handles = [
+        Line2D([], [], color=_colour(s.colour), label=_math(s.name), **_look(s, 0))
+        for s in named
+    ]
+    axes.legend(
+        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.005),
+        ncol=len(named), labelcolor=INK.light, handlelength=1.6,
+        borderaxespad=0, borderpad=0, columnspacing=1.2,
+    )  # fmt: skip
+
+
+def _colour(name: str) -> str:
+    return palette.BY_NAME.get(name, INK).light
+
+
+def _scaled(values: ArrayLike, factor: float) -> FloatArray:
+    return np.asarray(values, dtype=np.float64) * factor
+
+
+def _math(text: str) -> str:
+    """Text with V_C1 as a symbol with its subscript."""
+    return re.sub(r"\b([A-Z])_([A-Z0-9]+)\b", r"$\1_{\2}$", text)
+
+
+def _heading(figure: Figure, title: str, subtitle: str, simulated: bool | None) -> None:
+    """Title, a quiet second line, and the mark that tells simulated from measured."""
     width, height = figure.get_size_inches()
     left, top = 0.12 / width, 1 - 0.12 / height
     texts = [
-        figure.text(
-            left, top, title, size=11, weight="bold", va="top", color=INK.light
-        ),
+        figure.text(left, top, title, size=11, weight="bold", va="top"),
         figure.text(
             left, top - 0.2 / height, subtitle, size=7.5, va="top", color=QUIET.light
         ),
     ]
     if simulated is not None:
         mark = SIMULATED.light if simulated else MEASURED.light
+        box = {
+            "boxstyle": "round,pad=0.45", "facecolor": "none", "edgecolor": mark,
+            "linewidth": 0.9,
+        }  # fmt: skip
         texts.append(
             figure.text(
-                1 - 0.12 / width,
-                top,
-                "SIMULATED BENCH" if simulated else "MEASURED",
-                size=7.5,
-                weight="bold",
-                ha="right",
-                va="top",
-                color=mark,
-                bbox={
-                    "boxstyle": "round,pad=0.45",
-                    "facecolor": "none",
-                    "edgecolor": mark,
-                    "linewidth": 0.9,
-                },
+                1 - 0.12 / width, top, "SIMULATED BENCH" if simulated else "MEASURED",
+                size=7.5, weight="bold", ha="right", va="top", color=mark, bbox=box,
             )
-        )
+        )  # fmt: skip
     for number, text in enumerate(texts):
         text.set_gid(f"{HEADING}-{number}")
-
-
-def svg(figure: Figure) -> str:
-    """The figure as SVG text, the same every time."""
-    buffer = io.StringIO()
-    with rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return buffer.getvalue()
 
 
 def save(figure: Figure, stem: Path, *, pdf: bool = False) -> tuple[Path, str]:
     """Write `stem`.png, `stem`.svg and, if asked, `stem`.pdf.
 
     Returns:
-        The PNG's path and the SVG's text.
+        The PNG's path and the SVG's text, the same every time.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    png = stem.with_suffix(".png")
+    png, buffer = stem.with_suffix(".png"), io.StringIO()
     with rc_context(STYLE):
         figure.savefig(png, dpi=160, pil_kwargs={"compress_level": 3})
         if pdf:
             figure.savefig(stem.with_suffix(".pdf"))
-    text = svg(figure)
-    stem.with_suffix(".svg").write_text(text, encoding="utf-8")
-    return png, text
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    stem.with_suffix(".svg").write_text(buffer.getvalue(), encoding="utf-8")
+    return png, buffer.getvalue()

@@ -1,112 +1,121 @@
-"""The numbers a run gives, per trial, each with the reason where there is none."""
+"""What a run tells: its derived signals, its conclusion, its plots, and why not."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from tactile_lab.analysis.twin import ELSEWHERE, Twin
+from tactile_lab.analysis.twin import Twin
+from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import TactileLabError
+from tactile_lab.measurement import RecordedSignal
 from tactile_lab.model.drain_current import drain_current
-from tactile_lab.report.conclusion import Conclusion
-from tactile_lab.report.conclusions import conclude
-from tactile_lab.report.run_data import RunData, Trace, TrialData
-from tactile_lab.report.trial_finding import TrialFinding
-from tactile_lab.report.twinned import with_twin
+from tactile_lab.plot import Plot
+from tactile_lab.report.drift import drift_plot
+from tactile_lab.report.overview import overview
+from tactile_lab.report.run_data import RunData
+from tactile_lab.report.splice import stretches
+from tactile_lab.report.twin import twin_plot, with_twin
+from tactile_lab.stimulus.force import force_at_zero
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Findings:
-    """A run with its numbers.
+    """A run with what it tells.
 
     Attributes:
-        run: the run, with I_DS among its traces where it can be derived.
-        trials: one finding per trial that is no pause.
+        run: the run, with I_DS and the model's V_C1 among its traces where they are
+            known.
         notes: statements on derived quantities, one sentence each.
         missing: what could not be told, and why, one sentence each.
         conclusion: what the protocol was run for.
+        answers: the protocol's own plots.
         twin: the model beside the run, or None.
     """
 
     run: RunData
-    trials: tuple[TrialFinding, ...]
     notes: tuple[str, ...]
     missing: tuple[str, ...]
     conclusion: Conclusion
+    answers: tuple[Plot, ...]
     twin: Twin | None
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        """All plots: the protocol's own, the general one, the model, the drift."""
+        general = () if any(p.name == "figure" for p in self.answers) else (
+            overview(self.run),
+        )  # fmt: skip
+        twin = None if self.twin is None else twin_plot(self.run, self.twin)
+        further = (p for p in (twin, drift_plot(self.run)) if p is not None)
+        return (*self.answers, *general, *further)
 
 
 def find(run: RunData) -> Findings:
-    """Compute a run's numbers.
+    """What a run tells.
 
-    Too few spikes, uneven traces or a force that the model cannot follow give a
-    statement, never an error: what can be told is told.
+    Too few spikes, uneven traces, a force that the model cannot follow or a protocol
+    that fails give a statement, never an error: what can be told is told.
     """
     notes: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-    beside = None
-    if run.protocol not in ELSEWHERE:
-        run, beside, notes, missing = _derived(run)
-    trials = tuple(TrialFinding.of(trial) for trial in _shown(run.trials))
+    missing: list[str] = []
+    twin = None
+    if not run.protocol.moves_probes:
+        try:
+            run, notes = _with_drain_current(run)
+        except TactileLabError as reason:
+            missing.append(f"No I_DS: {reason}")
+        try:
+            run, twin = with_twin(run)
+        except TactileLabError as reason:
+            missing.append(f"No model beside the run: {reason}")
+    conclusion = _conclusion(run)
+    answers: tuple[Plot, ...] = ()
     try:
-        conclusion = conclude(run, trials)
-    except TactileLabError as reason:
-        conclusion = Conclusion(missing=(f"No conclusion: {reason}",))
+        answers = tuple(run.protocol.plots(run))
+        for plot in answers:
+            plot.to_dict()  # what cannot be described is not drawn either
+    except Exception as error:  # whatever a user's protocol raises: the rest is kept
+        missing.append(f"No plot of the answer: {run.protocol.fault(error)}")
+        answers = ()
     return Findings(
         run=run,
-        trials=trials,
         notes=notes,
         missing=(*conclusion.missing, *missing),
         conclusion=conclusion,
-        twin=beside,
+        answers=answers,
+        twin=twin,
     )
 
 
-def _derived(
-    run: RunData,
-) -> tuple[RunData, Twin | None, tuple[str, ...], tuple[str, ...]]:
-    """The run with I_DS and the model beside it, what to say of them, what failed."""
-    notes: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-    beside = None
-    try:
-        run, notes = _with_drain_current(run)
-    except TactileLabError as reason:
-        missing = (f"No I_DS: {reason}",)
-    try:
-        run, beside = with_twin(run)
-    except TactileLabError as reason:
-        missing = (*missing, f"No model beside the run: {reason}")
-    return run, beside, notes, missing
-
-
-def _shown(trials: Sequence[TrialData]) -> list[TrialData]:
-    """Trials with something to say: no pauses, no silent looks at the rest."""
-    played = [trial for trial in trials if not trial.pause]
-    telling = [
-        trial
-        for trial in played
-        if trial.level is not None or trial.hold is not None or trial.spike_times.size
-    ]
-    return telling or played
+def _conclusion(run: RunData) -> Conclusion:
+    """What the protocol concludes, and F(0) where it was read."""
+    own = Conclusion(missing=("No trial was completed: there is no result.",))
+    if run.results:
+        try:
+            own = run.protocol.conclude(run)
+            if not isinstance(own, Conclusion):
+                raise TypeError(f"conclude gave {own!r}; return a Conclusion")
+            own.plain  # noqa: B018 - what cannot be stored is no conclusion
+        except Exception as error:  # whatever a user's protocol raises
+            own = Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
+    return own + force_at_zero(run)
 
 
 def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:
     """The run with I_DS derived piecewise from V_C1, gap by gap, and what to say."""
     measured = run.trace("V_C1")
-    if run.trace("I_DS") is not None or measured is None:
+    if not run.asks_I_DS or run.trace("I_DS") is not None or measured is None:
         return run, ()
     pieces = [
-        drain_current(measured.time[piece], measured.mean[piece], run.divider)
+        drain_current(measured.time[piece], measured.mean[piece], run.circuit)
         for piece in stretches(measured.time)
         if piece.stop - piece.start >= 3
     ]
     if not pieces:
         return run, ()
-    derived = Trace(
+    derived = RecordedSignal(
         signal="I_DS",
         time=np.concatenate([p.time for p in pieces]),
         mean=np.concatenate([p.current for p in pieces]),
@@ -119,15 +128,3 @@ def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:
         f"ms: it follows changes up to {bandwidth:.0f} Hz (−3 dB)."
     )
     return replace(run, traces=(*run.traces, derived)), (note,)
-
-
-def stretches(time: np.ndarray) -> list[slice]:
-    """Runs of points without a gap: no step above 1.5 times the median step."""
-    if time.size == 0:
-        return []
-    step = np.diff(time)
-    if step.size == 0:
-        return [slice(0, 1)]
-    breaks = np.flatnonzero(step > 1.5 * np.median(step)) + 1
-    edges = [0, *breaks.tolist(), time.size]
-    return [slice(a, b) for a, b in pairwise(edges)]

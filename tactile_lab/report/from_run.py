@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
-from tactile_lab.model.drain_current import Divider
+from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.quantity import show
 from tactile_lab.report.driven import told
-from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
+from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
@@ -47,7 +47,7 @@ def read(folder: Path) -> RunData:
         segments = run.records("segments")
         return RunData(
             title=str(info.get("title", scene.protocol.title)),
-            protocol=scene.protocol.name,
+            protocol=scene.protocol,
             scene=str(info.get("scene", "")),
             run=folder.resolve().name,
             started=started,
@@ -68,7 +68,7 @@ def read(folder: Path) -> RunData:
             circuit=scene.circuit,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
-            divider=_divider(scene),
+            asks_I_DS="I_DS" in scene.record.signals,
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
             warnings=(*warnings, *_doubts(scene, started, settings, warnings)),
@@ -110,10 +110,10 @@ def stimulus_onset(scene: Scene) -> float:
 
 def _trial(
     row: Any, spikes: NDArray[np.float64], onset: float, segments: Records
-) -> TrialData:
+) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
-    return TrialData(
+    return MeasuredTrial(
         label=bytes(row["label"]).decode("utf-8", errors="replace"),
         level=None if np.isnan(level) else level,
         start=start,
@@ -143,12 +143,12 @@ def _clock_uncertainty(segments: Records, time: float) -> float | None:
     return float(segments["uncertainty"][number])
 
 
-def _trace(run: Run, name: str) -> Trace:
+def _trace(run: Run, name: str) -> RecordedSignal:
     signal = run.signal(name)
     cells = signal.trace(cells=CELLS)
     half = np.diff(cells.time, append=cells.time[-1:]) / 2
     half[-1:] = half[-2:-1]
-    return Trace(
+    return RecordedSignal(
         signal=name,
         time=cells.time + half,
         mean=cells.mean,
@@ -181,11 +181,6 @@ def _field(run: Run) -> NDArray[np.float64]:
     names = rows.dtype.names or ()
     value = "field" if "field" in names else "value"
     return np.column_stack([rows["time"], rows[value]])
-
-
-def _divider(scene: Scene) -> Divider:
-    circuit = scene.circuit
-    return Divider(V_S=circuit.V_S, R1=circuit.R1, R2=circuit.R2, C1=circuit.C1)
 
 
 def _loss(info: Mapping[str, Any]) -> Loss | None:

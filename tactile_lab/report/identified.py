@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tactile_lab.analysis.identify import Identified, identify
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.report.run_data import RunData
-from tactile_lab.report.twinned import displaced
+from tactile_lab.measurement import Measurement
+from tactile_lab.report.twin import displaced
 from tactile_lab.waveform import Waveform
 
 LAG = 0.03
@@ -19,7 +19,7 @@ LAG = 0.03
 the core's eddy currents, which the model does not know, last some milliseconds."""
 
 
-def identify_run(run: RunData, names: Sequence[str]) -> Identified:
+def identify_run(run: Measurement, names: Sequence[str]) -> Identified:
     """Fit the parameters `names` to V_C1 and the spikes of a run.
 
     Raises:
@@ -31,9 +31,7 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
         raise NotIdentifiableError(
             "the run has neither V_C1 nor spikes; record V_C1 or V_K"
         )
-    spikes = np.concatenate(
-        [t.spike_times + t.start for t in run.trials if not t.pause] or [np.empty(0)]
-    )
+    spikes = run.spike_times
     seen = None
     if trace is not None:
         inside = (trace.time >= 0) & (trace.time <= run.duration)

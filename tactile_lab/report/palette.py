@@ -37,3 +37,8 @@ ALL = (
     FORCE, V_C1, V_C2, V_K, RATE, I_DS, TWIN, INK, QUIET, RULE, BAND, PAPER, SIMULATED,
     MEASURED,
 )  # fmt: skip
+BY_NAME = {
+    "force": FORCE, "V_C1": V_C1, "V_C2": V_C2, "V_K": V_K, "rate": RATE, "I_DS": I_DS,
+    "coil_current": FORCE, "field": FORCE, "model": TWIN, "ink": INK, "quiet": QUIET,
+}  # fmt: skip
+"""By the names that descriptions of plots use."""

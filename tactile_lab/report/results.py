@@ -9,9 +9,10 @@ import numpy as np
 
 from tactile_lab.analysis.adaptation import Adaptation
 from tactile_lab.analysis.twin import Twin
+from tactile_lab.conclusion import Table
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.report.findings import Findings
 from tactile_lab.report.run_data import RunData
-from tactile_lab.report.trial_finding import TrialFinding
 
 SCHEMA = 1
 
@@ -24,7 +25,7 @@ def results(findings: Findings) -> dict[str, Any]:
         "schema": SCHEMA,
         "run": run.run,
         "title": run.title,
-        "protocol": run.protocol,
+        "protocol": run.protocol.name,
         "scene": run.scene,
         "started": run.started,
         "status": run.status,
@@ -38,8 +39,8 @@ def results(findings: Findings) -> dict[str, Any]:
             "absolute_N": run.force_uncertainty.absolute,
             "relative": run.force_uncertainty.relative,
         },
-        "spikes": sum(t.response.spikes for t in findings.trials),
-        "trials": [_trial(run, t) for t in findings.trials],
+        "spikes": sum(t.response.spikes for t in run.results),
+        "trials": [_trial(run, t) for t in run.results],
         "loss": None
         if loss is None
         else {
@@ -50,8 +51,10 @@ def results(findings: Findings) -> dict[str, Any]:
             "covered_s": loss.covered,
             "streamed_s": loss.streamed,
         },
-        "conclusion": findings.conclusion.values,
+        "conclusion": findings.conclusion.plain,
         "statements": list(findings.conclusion.sentences),
+        "tables": [_table(table) for table in findings.conclusion.tables],
+        "plots": [plot.to_dict() for plot in findings.answers],
         "twin": None if findings.twin is None else _twin(findings.twin),
         "accuracy": run.accuracy or None,
         "notes": list(findings.notes),
@@ -70,8 +73,8 @@ def as_json(findings: Findings) -> str:
     return text + "\n"
 
 
-def _trial(run: RunData, finding: TrialFinding) -> dict[str, Any]:
-    trial, response = finding.trial, finding.response
+def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
+    response, fit = trial.response, trial.adaptation
     return {
         "label": trial.label,
         "level_N": trial.level,
@@ -92,10 +95,17 @@ def _trial(run: RunData, finding: TrialFinding) -> dict[str, Any]:
         "fall": response.fall,
         "adaptation_index": response.adaptation_index,
         "silent_from_s": response.silent,
-        "adaptation": None
-        if finding.adaptation is None
-        else _adaptation(finding.adaptation),
-        "adaptation_why_not": finding.why_not or None,
+        "adaptation": None if fit is None else _adaptation(fit),
+        "adaptation_why_not": trial.why_not or None,
+    }
+
+
+def _table(table: Table) -> dict[str, Any]:
+    return {
+        "title": table.title,
+        "headings": list(table.headings),
+        "rows": [list(row) for row in table.rows],
+        "note": table.note,
     }
 
 

@@ -1,30 +1,30 @@
-"""A run without its planned recoveries, so that a figure shows what was measured."""
+"""A run's time with its planned recoveries cut out, and signals cut at their gaps."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.report.run_data import RunData, Trace
-from tactile_lab.waveform import Waveform
+from tactile_lab.measurement import Measurement
 
 FloatArray = NDArray[np.float64]
 
 
-class Axis:
-    """A run's time with its planned recoveries cut out.
+class ClosedTime:
+    """A run's time axis that closes up over each pause.
 
     Attributes:
         cuts: where something was cut, s on the closed axis.
     """
 
-    def __init__(self, run: RunData) -> None:
+    def __init__(self, run: Measurement) -> None:
         pauses = [(t.start, t.start + t.duration) for t in run.trials if t.pause]
         self._begins, self._ends = np.array(pauses or np.empty((0, 2))).T
         self._gone = np.append(0.0, np.cumsum(self._ends - self._begins))
         self.cuts = tuple(float(c) for c in self.closed(self._begins))
+        self.end = float(self.closed(np.array(run.duration)))
 
     def closed(self, time: FloatArray) -> FloatArray:
         """Run time, s, on the closed axis; all of a pause falls onto its cut."""
@@ -36,6 +36,10 @@ class Axis:
         moved: FloatArray = time - self._gone[number] + still
         return moved
 
+    def at(self, time: float) -> float:
+        """One run time on the closed axis, s."""
+        return float(self.closed(np.array(time)))
+
     def shown(self, time: FloatArray) -> NDArray[np.bool_]:
         """Which times lie in no pause."""
         if not self._begins.size:
@@ -45,48 +49,25 @@ class Axis:
         shown: NDArray[np.bool_] = (number == 0) | outside
         return shown
 
-
-def spliced(run: RunData) -> tuple[RunData, tuple[float, ...]]:
-    """The run with its pauses cut out, and the times at which something was cut.
-
-    Returns:
-        A run whose time axis closes up over each pause, and the cuts on that axis, s.
-        The run itself and no cuts where there is no pause.
-    """
-    axis = Axis(run)
-    if not axis.cuts:
-        return run, ()
-    trials = tuple(
-        replace(t, start=float(axis.closed(np.array(t.start))))
-        for t in run.trials
-        if not t.pause
-    )
-    return (
-        replace(
-            run,
-            trials=trials,
-            traces=tuple(_cut(t, axis) for t in run.traces),
-            force=_joined(axis.closed(run.force.time), run.force.value),
-            duration=float(axis.closed(np.array(run.duration))),
-        ),
-        axis.cuts,
-    )
+    def spliced(self, time: FloatArray, *values: FloatArray) -> list[FloatArray]:
+        """Closed times and the values at them, without pauses, NaN at each gap."""
+        keep = self.shown(time)
+        return broken(self.closed(time)[keep], *(v[keep] for v in values))
 
 
-def _cut(trace: Trace, axis: Axis) -> Trace:
-    keep = axis.shown(trace.time)
-    return replace(
-        trace,
-        time=axis.closed(trace.time)[keep],
-        mean=trace.mean[keep],
-        low=None if trace.low is None else trace.low[keep],
-        high=None if trace.high is None else trace.high[keep],
-    )
+def stretches(time: FloatArray) -> list[slice]:
+    """Runs of points without a gap: no step above 1.5 times the median step."""
+    if time.size == 0:
+        return []
+    step = np.diff(time)
+    if step.size == 0:
+        return [slice(0, 1)]
+    breaks = np.flatnonzero(step > 1.5 * np.median(step)) + 1
+    edges = [0, *breaks.tolist(), time.size]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
-def _joined(time: FloatArray, value: FloatArray) -> Waveform:
-    """A waveform of points of which many may share one instant: first and last stay."""
-    time = np.maximum.accumulate(time)  # closing up rounds
-    keep = np.ones(time.size, dtype=bool)
-    keep[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
-    return Waveform(time[keep], value[keep])
+def broken(time: FloatArray, *values: FloatArray) -> list[FloatArray]:
+    """The arrays with a NaN wherever a gap begins."""
+    gaps = [piece.start for piece in stretches(time)[1:]]
+    return [np.insert(v, gaps, np.nan) for v in (time, *values)]

@@ -1,110 +1,92 @@
-"""The short table of a run: for the terminal as text, for the report as cells."""
+"""The tables of a run's trials: for the terminal as text, for the report as cells."""
 
 from __future__ import annotations
 
-import textwrap
-from dataclasses import dataclass
-
+from tactile_lab.conclusion import Table
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.quantity import show
-from tactile_lab.report.findings import Findings
-from tactile_lab.report.run_data import RunData
-from tactile_lab.report.trial_finding import TrialFinding
 
 NONE = "–"
 
-WIDTH = 100
-"""Columns of a terminal the table is fitted to."""
 
-
-@dataclass(frozen=True)
-class Table:
-    """Headings and rows of text; first and last column stand left, the rest right."""
-
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-    @property
-    def text(self) -> str:
-        """Aligned columns under headings, for a terminal; no trailing newline.
-
-        What is too long for the last column goes on below.
-        """
-        widths = [
-            max(len(cell) for cell in column)
-            for column in zip(self.headings, *self.rows, strict=True)
-        ]
-        before = sum(widths[:-1]) + 2 * len(widths[:-1])
-        room = max(WIDTH - before, len(self.headings[-1]))
-        widths[-1] = min(widths[-1], room)
-        lines = [self._line(self.headings, widths)]
-        lines.append("  ".join("─" * width for width in widths))
-        for row in self.rows:
-            first, *more = textwrap.wrap(row[-1], room) or [""]
-            lines.append(self._line((*row[:-1], first), widths))
-            lines.extend(" " * before + part for part in more)
-        return "\n".join(lines)
-
-    def _line(self, cells: tuple[str, ...], widths: list[int]) -> str:
-        last = len(cells) - 1
-        padded = [
-            cell.ljust(width) if i in (0, last) else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(cells, widths, strict=True))
-        ]
-        return "  ".join(padded).rstrip()
-
-
-def table(findings: Findings) -> Table:
+def trials_table(run: Measurement) -> Table:
     """One row per trial: force, spikes, latency, rates, fall, time constant."""
-    if not findings.run.searched:
-        return _without_spikes(findings)
+    if not run.searched:
+        return Table(
+            headings=("Trial", "Start", "Length", "V_C1 before"),
+            rows=tuple(
+                (
+                    trial.label,
+                    show(trial.start, "s"),
+                    show(trial.duration, "s"),
+                    _shown(trial.rest, "V", 4),
+                )
+                for trial in run.results
+            ),
+            note="V_K was not searched for spikes.",
+        )
+    note = (
+        "First spike: time from the onset of the force, ± how well the clocks of coil "
+        "and scope are aligned. Final rate: of the last two spikes within the hold. "
+        "Fall: from the highest rate within the hold to the final one. Time constant: "
+        "1/|β| with its 95 % interval."
+    )
+    if run.force_uncertainty is not None:
+        note += " Force: ± its 95 % uncertainty by calibration and geometry."
     headings = (
         "Force", "Spikes", "First spike", "Peak rate", "Final rate", "Fall in hold",
         "Time constant",
     )  # fmt: skip
-    return Table(headings, tuple(_row(findings.run, t) for t in findings.trials))
+    rows = tuple(_row(run, trial) for trial in run.results)
+    return Table(headings=headings, rows=rows, note=note)
 
 
-def _without_spikes(findings: Findings) -> Table:
-    """Trials of a run whose V_K nobody asked for."""
+def fits_table(run: Measurement) -> Table:
+    """The fitted decays, one row per trial that has one."""
     rows = []
-    for finding in findings.trials:
-        trial = finding.trial
-        rows.append(
-            (
-                trial.label,
-                show(trial.start, "s"),
-                show(trial.duration, "s"),
-                _shown(trial.rest, "V", 4),
-            )
-        )
-    return Table(("Trial", "Start", "Length", "V_C1 before"), tuple(rows))
+    for trial in run.results:
+        fit = trial.adaptation
+        if fit is None:
+            continue
+        cells = [trial.label]
+        for estimate, unit in ((fit.alpha, "Hz"), (fit.beta, "1/s"), (fit.gamma, "Hz")):
+            spread = f"{_true(estimate.low)} to {_true(estimate.high)}"
+            cells.append(f"{_true(estimate.value)} {unit} ({spread})")
+        cells += [f"{fit.irregularity:.3f}", f"{fit.r_squared:.4f}", str(fit.intervals)]
+        rows.append(tuple(cells))
+    return Table(
+        title="Adaptation: α exp(βt) + γ",
+        headings=("Trial", "α", "β", "γ", "Irregularity", "R²", "Intervals"),
+        rows=tuple(rows),
+        note="95 % intervals in brackets; t from the start of the hold. The "
+        "exponential describes the decay; it is not the law of this circuit. Where the "
+        "rates leave the curve systematically, the intervals are too narrow.",
+    )
 
 
-def _row(run: RunData, finding: TrialFinding) -> tuple[str, ...]:
-    trial, response = finding.trial, finding.response
-    force = trial.label
+def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
+    response, force = trial.response, trial.label
     if trial.level is not None:
         force = _with(trial.level, run.uncertain(trial.level), "N", 4)
     latency = NONE
     if response.latency is not None:
         latency = _with(response.latency, trial.clock_uncertainty, "s", 3)
-    fall = NONE if response.fall is None else f"{100 * response.fall:.0f} %"
     return (
         force,
         str(response.spikes),
         latency,
         _shown(response.peak_rate, "Hz"),
         _shown(response.final_rate, "Hz"),
-        fall,
-        time_constant(finding),
+        NONE if response.fall is None else f"{100 * response.fall:.0f} %",
+        _time_constant(trial),
     )
 
 
-def time_constant(finding: TrialFinding) -> str:
+def _time_constant(trial: MeasuredTrial) -> str:
     """1/|beta| with its 95 % interval, or why there is none."""
-    fit = finding.adaptation
+    fit = trial.adaptation
     if fit is None:
-        return NONE if finding.response.spikes == 0 else finding.why_not
+        return NONE if trial.response.spikes == 0 else trial.why_not
     tau = fit.time_constant
     return f"{tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} s)"
 
@@ -117,3 +99,7 @@ def _with(value: float, uncertainty: float | None, unit: str, digits: int) -> st
 
 def _shown(value: float | None, unit: str, digits: int = 3) -> str:
     return NONE if value is None else show(value, unit, digits)
+
+
+def _true(value: float) -> str:
+    return f"{value:.4g}".replace("-", "−")

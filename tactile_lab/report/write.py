@@ -1,16 +1,15 @@
-"""Write a run's report: figure, report.html and results.json."""
+"""Write a run's report: figures, report.html and results.json."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from tactile_lab import notebook
-from tactile_lab.report.bench_conclusions import write_calibration_file
-from tactile_lab.report.canvas import save
-from tactile_lab.report.figures import figures
+from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.findings import Findings, find
-from tactile_lab.report.html import page
+from tactile_lab.report.page import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
 
@@ -33,15 +32,14 @@ class Report:
 def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
     """Write figure.png, figure.svg, report.html and results.json into `folder`.
 
-    A field calibration also gets calibration.csv, for a bench file to name.
-    Protocols whose answer is not a trace also get summary.png and summary.svg, runs
-    with a model beside them twin.png and twin.svg, runs with rests before their trials
-    drift.png and drift.svg.
+    Each further plot of the run gets files of its own name: summary (the protocol's
+    answer), twin (the model beside it), drift (the rests before its trials). So do the
+    files the protocol concludes with, such as a calibration.csv.
 
     Args:
-        folder: exists; files of these names are replaced.
+        folder: exists; figures and pages of these names are replaced.
         run: the run.
-        pdf: also write figure.pdf.
+        pdf: also write the figures as PDF.
 
     Raises:
         OSError: the folder cannot be written.
@@ -50,11 +48,12 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
     results = folder / "results.json"
     # the numbers first: they survive if drawing should fail
     results.write_text(as_json(findings), encoding="utf-8")
-    write_calibration_file(folder, findings.run)
-    pictures = {}
-    for drawn in figures(findings):
-        _, svg = save(drawn.figure, folder / drawn.stem, pdf=pdf)
-        pictures[drawn.stem] = svg, drawn.caption
+    _keep(folder, findings.conclusion.files)
+    pictures = []
+    for plot in findings.plots:
+        title = ": ".join(part for part in (run.title, plot.title) if part)
+        figure = draw(plot, title, run.subtitle, simulated=run.simulated)
+        pictures.append((plot, save(figure, folder / plot.name, pdf=pdf)[1]))
     html = folder / "report.html"
     html.write_text(page(findings, pictures), encoding="utf-8")
     return Report(
@@ -64,3 +63,15 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
         html=html,
         results=results,
     )
+
+
+def _keep(folder: Path, files: Mapping[str, str]) -> None:
+    """Write files that are never changed; one that is there already stays."""
+    for name, text in files.items():
+        path = folder / Path(name).name
+        try:
+            with path.open("x", encoding="utf-8") as file:
+                file.write(text)
+            path.chmod(0o444)
+        except FileExistsError:
+            continue

@@ -6,14 +6,18 @@ A subclass writes `presentations`; what comes before and after is said here once
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from tactile_lab.conclusion import Conclusion
 from tactile_lab.quantity import Unit, show
 from tactile_lab.stimulus.demagnetise import demagnetising
 from tactile_lab.trial import Outcome, Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.measurement import Measurement
 
 Steps = Generator[Trial, Outcome, None]
 PushCurrent = Annotated[float, Unit("A", above=0.0)]
@@ -94,3 +98,37 @@ def pause(seconds: float) -> Trial:
 
 def _at_zero(label: str) -> Trial:
     return Trial(force=Waveform.constant(0.0), duration=READING, label=label)
+
+
+def force_at_zero(run: Measurement) -> Conclusion:
+    """F(0), the force the core's remanence makes at 0 A, where a run asked for it.
+
+    The drive force is F(I) - F(0); what changes between before and after is an error
+    of every force of the run.
+    """
+    when = {AT_ZERO_BEFORE: "before", AT_ZERO_AFTER: "after"}
+    trials = [t for t in run.trials if t.label in when]
+    if not trials:
+        return Conclusion()
+    per_tesla, known = run.newtons_per_tesla, {}
+    values: dict[str, float | None] = {}
+    for trial in trials:
+        name = when[trial.label]
+        readings = run.field_between(trial.start, trial.start + trial.duration)
+        field = known[name] = float(readings.mean()) if readings.size else None
+        values[f"{name}_T"] = field
+        if per_tesla is not None:
+            values[f"{name}_N"] = None if field is None else field * per_tesla
+    fields = {name: field for name, field in known.items() if field is not None}
+    if not fields or per_tesla is None:
+        said = "F(0), the force at 0 A, is unknown: the bench reads no field."
+        return Conclusion((said,), {"force_at_zero": values})
+    told = " and ".join(
+        f"{show(field, 'T', 3)} or {show(field * per_tesla, 'N', 3)} {name}"
+        for name, field in fields.items()
+    )
+    said = f"F(0), the force at 0 A, by Eq. (2) from the field read: {told}."
+    if len(fields) == 2:
+        change = (fields["after"] - fields["before"]) * per_tesla
+        said += f" It changed by {show(change, 'N', 2)}."
+    return Conclusion((said,), {"force_at_zero": values})

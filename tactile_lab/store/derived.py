@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
-from tactile_lab.model.drain_current import Divider, DrainCurrent, drain_current
+from tactile_lab.model.drain_current import DrainCurrent, drain_current
 
 if TYPE_CHECKING:
     from tactile_lab.store.run import Run
@@ -80,12 +80,11 @@ def drain_current_of(run: Run) -> DrainCurrent:
     pieces = list(Selection(signals=("V_C1",), rate=1 / step).pieces(run))
     time = np.concatenate([times for times, _ in pieces]) if pieces else np.empty(0)
     V_C1 = np.concatenate([v for _, (v,) in pieces]) if pieces else np.empty(0)
-    c = run.scene.circuit
-    divider = Divider(V_S=c.V_S, R1=c.R1, R2=c.R2, C1=c.C1)
+    circuit = run.scene.circuit
     even = np.abs(np.diff(time) - np.median(np.diff(time))) < 0.01 * step
     edges = np.flatnonzero(~even) + 1  # gaps, and last means of fewer samples
     parts = [
-        drain_current(t, v, divider)
+        drain_current(t, v, circuit)
         for t, v in zip(np.split(time, edges), np.split(V_C1, edges), strict=True)
         if t.size >= 3
     ]

@@ -5,8 +5,8 @@ import pytest
 
 from tactile_lab.analysis.field_calibration import (
     FieldStep,
+    calibration_text,
     fit_field,
-    write_calibration,
 )
 from tactile_lab.analysis.wiring import Levels, explaining_V_GS, hum, judge
 from tactile_lab.calibration import read_calibration
@@ -79,9 +79,8 @@ def test_missing_branches_are_refused():
 
 
 def test_the_file_is_one_a_bench_can_use(tmp_path):
-    path = write_calibration(
-        tmp_path / "b2.csv", fit_field(loop()), coil="coil A", date=DAY
-    )
+    path = tmp_path / "b2.csv"
+    path.write_text(calibration_text(fit_field(loop()), coil="coil A", date=DAY))
     used = read_calibration(path)
     assert used.slope_at_zero == pytest.approx(0.0112, rel=0.01)
     assert used.at(0.5) == pytest.approx(0.0056, rel=0.01)
@@ -89,15 +88,13 @@ def test_the_file_is_one_a_bench_can_use(tmp_path):
         used.at(1.2)
 
 
-def test_the_file_is_dated_hashed_and_never_overwritten(tmp_path):
+def test_the_file_is_dated_and_hashed(tmp_path):
     found, path = fit_field(loop()), tmp_path / "b2.csv"
-    write_calibration(path, found, coil="coil A", date=DAY)
+    path.write_text(calibration_text(found, coil="coil A", date=DAY))
     used = read_calibration(path)
     assert used.check(coil="coil A", today=DAY) == ()
     assert used.head["date"] == "2026-11-21"
     assert used.uncertainty == pytest.approx(found.uncertainty, rel=0.01)
-    with pytest.raises(SceneError, match="exists"):
-        write_calibration(path, found, coil="coil A", date=DAY)
     late = datetime.date(2027, 5, 21)
     assert used.check(today=late - datetime.timedelta(days=1)) == ()
     with pytest.raises(SceneError, match="expired on 2027-05-20"):

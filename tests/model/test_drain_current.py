@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.drain_current import Divider, drain_current
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.drain_current import drain_current
 
 
 def integrate(i_ds, step=1e-5, duration=1.0, parts=None):
     """V_C1 that Eq. (16) gives for I_DS(t)."""
-    parts = parts or Divider()
+    parts = parts or Circuit()
     v, out = (5.0 / parts.R1 - i_ds(0.0)) / (1 / parts.R1 + 1 / parts.R2), []
     time = np.arange(0, duration, step)
     for t in time:
@@ -31,7 +32,7 @@ def test_without_the_capacitor_it_would_be_wrong():
         return 60e-9 + 30e-9 * np.sin(2 * np.pi * 2 * t)
 
     time, v_c1 = integrate(i_ds)
-    without = drain_current(time, v_c1, Divider(C1=1e-15), window=0.01)
+    without = drain_current(time, v_c1, Circuit(C1=1e-15), window=0.01)
     assert np.max(np.abs(without.current - i_ds(time))) > 1.5e-9
 
 
@@ -39,7 +40,7 @@ def test_the_bandwidth_is_where_a_sine_falls_by_3_db():
     found = drain_current(np.arange(0, 2, 1e-3), np.full(2000, 4.0), window=0.05)
     f = found.bandwidth
     time = np.arange(0, 2, 1e-3)
-    parts = Divider(C1=1e-18)
+    parts = Circuit(C1=1e-18)
     wave = drain_current(time, 4 + np.sin(2 * np.pi * f * time), parts, window=0.05)
     inner = wave.current[200:-200]
     conductance = 1 / parts.R1 + 1 / parts.R2

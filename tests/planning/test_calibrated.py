@@ -7,8 +7,8 @@ import pytest
 
 from tactile_lab.analysis.field_calibration import (
     FieldStep,
+    calibration_text,
     fit_field,
-    write_calibration,
 )
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
@@ -36,7 +36,7 @@ def calibrated(tmp_path):
         path = tmp_path / "b2.csv"
         day = datetime.date.today() - datetime.timedelta(days=age)
         if not path.exists():
-            write_calibration(path, fit_field(steps), coil=coil, date=day)
+            path.write_text(calibration_text(fit_field(steps), coil=coil, date=day))
         scene = tmp_path / "scene.toml"
         scene.write_text(
             f'[protocol]\nname = "{name}"\n'

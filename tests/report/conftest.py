@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from tactile_lab.report.run_data import Loss, RunData, Trace, TrialData
+from protocols.pulses import Pulses
+from tactile_lab.measurement import MeasuredTrial, RecordedSignal
+from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.waveform import Waveform
 
 STEP = 2e-4
@@ -46,7 +48,7 @@ def make_run(levels=(0.08, 0.12, 0.16, 0.2), *, ramp=0.25, hold=2.0, rest=2.0):
         noisy = values[:usable] + rng.normal(0, 4e-3, usable)
         cells = noisy.reshape(-1, bins)
         middle = time[:usable].reshape(-1, bins).mean(axis=1)
-        return Trace(
+        return RecordedSignal(
             signal=signal,
             time=middle,
             mean=cells.mean(axis=1),
@@ -59,7 +61,7 @@ def make_run(levels=(0.08, 0.12, 0.16, 0.2), *, ramp=0.25, hold=2.0, rest=2.0):
         start = i * length
         mine = spikes[(spikes >= start) & (spikes < start + length)] - start
         trials.append(
-            TrialData(
+            MeasuredTrial(
                 label=f"{level * 1e3:g} mN",
                 level=level,
                 start=start,
@@ -70,7 +72,7 @@ def make_run(levels=(0.08, 0.12, 0.16, 0.2), *, ramp=0.25, hold=2.0, rest=2.0):
         )
     return RunData(
         title="Force pulses",
-        protocol="pulses",
+        protocol=Pulses(),
         scene="demo",
         run="2026-11-21_demo",
         started="2026-11-21 02:00",

@@ -7,23 +7,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from protocols.calibrate_field import CalibrateField
+from protocols.force_check import ForceCheck
+from protocols.hold import Hold
 from tactile_lab.calibration import read_calibration
 from tactile_lab.magnetics import ForceUncertainty
+from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
-from tactile_lab.report.figure import figure
+from tactile_lab.plugins import protocol_class
+from tactile_lab.report.canvas import draw
 from tactile_lab.report.findings import find
 from tactile_lab.report.identified import identify_run, settled
-from tactile_lab.report.run_data import RunData, Trace, TrialData
-from tactile_lab.report.splice import spliced
-from tactile_lab.report.summary import summary
+from tactile_lab.report.overview import overview
+from tactile_lab.report.run_data import RunData
+from tactile_lab.report.splice import ClosedTime
 from tactile_lab.report.write import write
 from tactile_lab.waveform import Waveform
 
 NEWTONS_PER_AMPERE = 0.2
+LEVELS = (0.05, 0.1)
 
 
-def modelled(protocol, steps, *, circuit=None, bins=2000, **entries):
+def modelled(protocol, steps, *, circuit=None, bins=2000, parameters=None, **entries):
     """A run of (label, level, force, pause) steps as the model answers them."""
     circuit = circuit or Circuit()
     force, starts = None, []
@@ -36,7 +42,7 @@ def modelled(protocol, steps, *, circuit=None, bins=2000, **entries):
     for start, (label, level, wave, pause) in zip(starts, steps, strict=True):
         inside = (found.spike_times >= start) & (found.spike_times < start + wave.end)
         trials.append(
-            TrialData(
+            MeasuredTrial(
                 label=label,
                 level=level,
                 start=start,
@@ -47,11 +53,12 @@ def modelled(protocol, steps, *, circuit=None, bins=2000, **entries):
             )
         )
     traces = tuple(
-        Trace(signal=s, time=time, mean=found.sample(s, time)) for s in ("V_C1", "V_C2")
+        RecordedSignal(signal=s, time=time, mean=found.sample(s, time))
+        for s in ("V_C1", "V_C2")
     )
     plain = {
         "title": protocol,
-        "protocol": protocol,
+        "protocol": protocol_class(protocol)(**(parameters or {})),
         "run": "a run",
         "status": "complete",
         "simulated": True,
@@ -62,7 +69,6 @@ def modelled(protocol, steps, *, circuit=None, bins=2000, **entries):
         "current": np.column_stack([force.time, force.value / NEWTONS_PER_AMPERE]),
         "traces": traces,
         "circuit": Circuit(),
-        "parameters": {"ramp": "0.25 s", "hold": "1.0 s"},
     }
     return RunData(**{**plain, **entries})
 
@@ -93,27 +99,36 @@ def test_rate_force_brackets_the_critical_force_and_compares_with_eq_15(rate_for
 
 
 def test_a_figure_closes_up_over_recoveries(rate_force):
-    shown, cuts = spliced(rate_force)
+    shown = overview(find(rate_force).run)
+    force, voltage, *_ = shown.panels
+    cuts = [g for g in force.guides if g.to is None]
     assert len(cuts) == 3
-    assert shown.duration == pytest.approx(rate_force.duration - 150.0)
-    assert [t.start for t in shown.trials] == pytest.approx([0.0, 2.0, 4.0, 6.0])
-    assert shown.force.end == pytest.approx(shown.duration)
-    assert shown.force.at(4.5) == pytest.approx(0.15)
-    trace = shown.trace("V_C1")
-    assert np.all(np.diff(trace.time) > -1e-9)
-    assert trace.time[-1] <= shown.duration
-    *_, last = figure(find(rate_force)).axes
+    duration = shown.x_limits[1]
+    assert duration == pytest.approx(rate_force.duration - 150.0)
+    holds = [g.at - 0.25 for g in force.guides if g.to is not None]
+    assert holds == pytest.approx([0.0, 2.0, 4.0, 6.0])
+    pushed = force.series[0]
+    assert pushed.x[-1] == pytest.approx(duration)
+    assert np.interp(4.5, pushed.x, pushed.y) == pytest.approx(0.15)
+    V_C1 = next(s for s in voltage.series if s.name == "V_C1")
+    known = V_C1.x[np.isfinite(V_C1.x)]
+    assert np.all(np.diff(known) > -1e-9)
+    assert known[-1] <= duration
+    *_, last = draw(shown, "a run").axes
     assert "recoveries left out" in last.get_xlabel()
 
 
 def test_a_run_without_recoveries_is_left_as_it_is(demo):
-    assert spliced(demo) == (demo, ())
+    axis, time = ClosedTime(demo), np.linspace(0, demo.duration, 7)
+    assert axis.cuts == ()
+    assert axis.closed(time).tolist() == time.tolist()
+    assert axis.shown(time).all()
 
 
 def test_rate_force_gets_a_second_figure_and_the_demo_does_not(
     rate_force, demo, tmp_path
 ):
-    assert summary(find(demo)) is None
+    assert find(demo).answers == ()
     report = write(tmp_path, rate_force)
     assert (tmp_path / "summary.png").exists()
     assert (tmp_path / "twin.png").exists()
@@ -126,7 +141,7 @@ def test_repeat_tells_the_decrement():
     rates = found.conclusion.values["peak_rates_Hz"]
     assert rates == sorted(rates, reverse=True)
     assert "Peak rate from one presentation" in found.conclusion.sentences[0]
-    assert summary(found) is not None
+    assert [plot.name for plot in found.answers] == ["summary"]
 
 
 def test_bipolar_tells_the_currents_and_tau():
@@ -140,7 +155,7 @@ def test_bipolar_tells_the_currents_and_tau():
         replace(t, hold=(0.25, 6.25)) if t.level else replace(t, hold=None)
         for t in run.trials
     )
-    values = find(replace(run, trials=held)).conclusion.values
+    values = find(replace(run, trials=held)).conclusion.plain
     push, pull = values["I_DS_changes"]
     assert push["change_A"] > 30e-9
     assert pull["change_A"] < -5e-9
@@ -172,7 +187,7 @@ def test_calibrate_field_reads_both_branches(tmp_path):
     ):
         for level in order:
             trials.append(
-                TrialData(
+                MeasuredTrial(
                     label=f"{branch} {level * 1e3:.0f} mA", level=None, start=time,
                     duration=1.8, spike_times=np.empty(0), hold=(0.8, 1.8),
                 )
@@ -182,7 +197,7 @@ def test_calibrate_field_reads_both_branches(tmp_path):
                 readings.append((at, 0.011 * level + sign * 3e-4))
             time += 1.8
     run = RunData(
-        title="", protocol="calibrate_field", run="", status="complete", bench="",
+        title="", protocol=CalibrateField(), run="", status="complete", bench="",
         simulated=True, duration=time, trials=tuple(trials),
         force=Waveform.constant(0.0), current=np.array(rows),
         field=np.array(readings), searched=False,
@@ -195,20 +210,23 @@ def test_calibrate_field_reads_both_branches(tmp_path):
     written = read_calibration(tmp_path / "calibration.csv")
     assert written.whole
     assert written.head["date"] == "2026-11-21"
-    write(tmp_path, dated)  # again: the calibration stays
+    kept = (tmp_path / "calibration.csv").read_text()
+    write(tmp_path, replace(dated, field=dated.field * 1.5))
+    assert (tmp_path / "calibration.csv").read_text() == kept, "never overwritten"
+    assert not (tmp_path / "calibration.csv").stat().st_mode & 0o222
     without = find(replace(run, field=None)).conclusion
     assert "no teslameter readings" in without.sentences[0]
 
 
 def test_force_check_finds_the_slip_in_table_1():
     run = modelled("force_check", [pulse(0.05), pulse(0.1)])
-    read = {"readings": "0.0051 N, 0.0099 N"}
-    found = find(replace(run, parameters=read)).conclusion
+    read = replace(run, protocol=ForceCheck(levels=LEVELS, readings=(0.0051, 0.0099)))
+    found = find(read).conclusion
     assert found.values["read_over_eq2"] == pytest.approx(0.0996, rel=1e-3)
     assert "2.25e-4" in found.sentences[0]
     assert "No independent readings" in find(run).conclusion.sentences[0]
     assert "eq2_uncertainty_95" not in found.values
-    known = replace(run, parameters=read, force_uncertainty=ForceUncertainty(0.0, 0.1))
+    known = replace(read, force_uncertainty=ForceUncertainty(0.0, 0.1))
     values = find(known).conclusion.values
     assert values["eq2_uncertainty_95"] == pytest.approx(0.1 * values["read_over_eq2"])
 
@@ -239,7 +257,7 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
     wave = Waveform(phase / frequency, 0.005 * np.sin(2 * np.pi * phase))
     run = modelled("sine_sweep", [("0.5 Hz", None, wave, False)], searched=False)
     held = (replace(run.trials[0], hold=(0.0, cycles / frequency)),)
-    (found,) = find(replace(run, trials=held)).conclusion.values["V_C1_over_force"]
+    (found,) = find(replace(run, trials=held)).conclusion.plain["V_C1_over_force"]
     # small signal: dV_C1/dF = -k_F g_m R, low-passed by node A at 27 Hz
     circuit = Circuit()
     steep = 24.69e-9 / (circuit.m * circuit.V_T)
@@ -259,11 +277,11 @@ def test_the_force_s_uncertainty_reaches_the_critical_force(rate_force):
     assert known.values["critical_force_uncertainty_N_95"] == pytest.approx(expected)
     assert "states no uncertainty" in " ".join(sure.sentences)
     wide, narrow = known.values["slope_Hz_per_N"], sure.values["slope_Hz_per_N"]
-    rates = [t.response.peak_rate for t in find(rate_force).trials[1:]]
+    rates = [t.response.peak_rate for t in find(rate_force).run.results[1:]]
     line = np.polyfit([0.11, 0.15, 0.2], rates, 1)
-    assert wide["value"] == narrow["value"] == pytest.approx(line[0])
-    assert wide["high_95"] > narrow["high_95"]
-    assert wide["low_95"] < narrow["low_95"]
+    assert wide.value == narrow.value == pytest.approx(line[0])
+    assert wide.high > narrow.high
+    assert wide.low < narrow.low
 
 
 def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
@@ -279,11 +297,12 @@ def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
     page = report.html.read_text(encoding="utf-8")
     assert "200 mN ± 8.5 mN" in page
     assert "± 2 ms" in page
-    assert summary(report.findings).axes[0].collections, "error bars"
+    (answer,) = report.findings.answers
+    assert draw(answer, "a run").axes[0].collections, "error bars"
 
 
 def test_too_few_spikes_to_fit_are_said(rate_force, tmp_path):
-    held = replace(rate_force, protocol="hold", trials=rate_force.trials[2:3])
+    held = replace(rate_force, protocol=Hold(), trials=rate_force.trials[2:3])
     report = write(tmp_path, held)
     (said,) = report.findings.missing
     assert said.startswith("No time constant: not identifiable: ")
@@ -308,7 +327,9 @@ def test_too_few_spikes_to_fit_are_said(rate_force, tmp_path):
 def test_a_run_without_its_signal_says_so_and_claims_nothing(
     rate_force, protocol, says
 ):
-    blind = replace(rate_force, protocol=protocol, searched=False, traces=())
+    blind = replace(
+        rate_force, protocol=protocol_class(protocol)(), searched=False, traces=()
+    )
     found = find(blind)
     assert says in found.missing[0]
     assert not found.conclusion.sentences
@@ -334,7 +355,7 @@ def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_pa
     report = write(tmp_path, broken)
     assert any("No I_DS" in text for text in report.findings.missing)
     assert "Not determined" in report.html.read_text(encoding="utf-8")
-    assert sum(t.response.spikes for t in report.findings.trials) > 30
+    assert sum(t.response.spikes for t in report.findings.run.results) > 30
     assert report.html.exists()
 
 

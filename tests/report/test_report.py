@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_lab.report.figure import figure
-from tactile_lab.report.findings import find, stretches
+from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import stimulus_onset
-from tactile_lab.report.run_data import TrialData
-from tactile_lab.report.table import table
+from tactile_lab.report.overview import overview
+from tactile_lab.report.splice import stretches
+from tactile_lab.report.table import trials_table
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
@@ -125,7 +126,7 @@ def test_text_of_others_cannot_break_the_page(demo, tmp_path):
 
 
 def test_the_table_has_one_row_per_trial(demo):
-    shown = table(find(demo))
+    shown = trials_table(find(demo).run)
     assert [row[0] for row in shown.rows] == ["80 mN", "120 mN", "160 mN", "200 mN"]
     assert shown.rows[0][1:] == ("0", "–", "–", "–", "–", "–")
     spikes = [int(row[1]) for row in shown.rows]
@@ -135,7 +136,7 @@ def test_the_table_has_one_row_per_trial(demo):
 
 
 def test_the_table_stands_in_columns(demo):
-    lines = table(find(demo)).text.splitlines()
+    lines = trials_table(find(demo).run).text.splitlines()
     assert sum(not line.startswith(" ") for line in lines) == 6
     assert max(map(len, lines)) <= 100
     column = lines[0].index("Time constant")
@@ -144,10 +145,10 @@ def test_the_table_stands_in_columns(demo):
 
 def test_a_long_hold_gives_a_time_constant(run_maker):
     findings = find(run_maker((0.2,), ramp=0.01, hold=10.0, rest=0.5))
-    fit = findings.trials[0].adaptation
+    fit = findings.run.results[0].adaptation
     assert fit is not None
     assert 1 < fit.time_constant.value < 5
-    assert re.match(r"[\d.]+ s \([\d.]+ to", table(findings).rows[0][-1])
+    assert re.match(r"[\d.]+ s \([\d.]+ to", trials_table(findings.run).rows[0][-1])
 
 
 def test_i_ds_is_derived_where_v_c1_is_known(demo):
@@ -160,12 +161,12 @@ def test_i_ds_is_derived_where_v_c1_is_known(demo):
 
 
 def test_pauses_are_no_results(demo):
-    pause = TrialData(
+    pause = MeasuredTrial(
         label="recovery", level=None, start=18.0, duration=50.0,
         spike_times=np.array([]), pause=True,
     )  # fmt: skip
     findings = find(replace(demo, trials=(*demo.trials, pause), duration=68.0))
-    assert len(findings.trials) == 4
+    assert len(findings.run.results) == 4
 
 
 def test_gaps_in_a_trace_split_it():
@@ -181,7 +182,7 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
     )  # fmt: skip
     report = write(tmp_path, empty)
     assert "No trial was completed" in report.html.read_text(encoding="utf-8")
-    assert len(figure(report.findings).axes) == 2
+    assert len(overview(report.findings.run).panels) == 2
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.shunt_check import shunt_over_source
+from tactile_lab.report.driven import shunt_over_source
 from tactile_lab.store.applied import applied_current
 
 STEPS = np.array([0.0, 0.5, 1.0, 0.2])

@@ -1,0 +1,226 @@
+"""What one run measured, as plain values: what a protocol concludes from and draws.
+
+It knows neither how a run is stored nor how it was made; whoever has a run fills it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.analysis.adaptation import Adaptation, fit_adaptation
+from tactile_lab.analysis.spike_train import Response, respond
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.magnetics import ForceUncertainty
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.signals import Source
+from tactile_lab.waveform import Waveform
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedSignal:
+    """One signal over the run, decimated to a few thousand bins.
+
+    Attributes:
+        signal: a name of `tactile_lab.signals`.
+        time: shape (n,), middle of each bin, s on the run's time axis; a step more
+            than 1.5 times the usual one is drawn as a gap.
+        mean: shape (n,), SI.
+        low, high: shape (n,), extremes within each bin, SI, or None.
+        source: "measured", "derived" or "model".
+        scale: unit per volt at the scope's input.
+        code: one code of the converter, SI; None where it is not digitised.
+    """
+
+    signal: str
+    time: FloatArray
+    mean: FloatArray
+    low: FloatArray | None = None
+    high: FloatArray | None = None
+    source: Source = "measured"
+    scale: float = 1.0
+    code: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredTrial:
+    """One trial of the run.
+
+    Attributes:
+        label: for people ("120 mN").
+        level: force the result is filed under, N; None where there is no one level.
+        start: on the run's time axis, s.
+        duration: s.
+        spike_times: shape (k,), s from the trial's start.
+        onset: when the stimulus begins, s from the trial's start.
+        hold: (start, end) of the constant part, s from the trial's start, or None.
+        pause: a planned recovery; listed nowhere but in the time axis.
+        rest: V_C1 just before the trial, V, or None.
+        drift: change of that since the first trial, V, less what the film still
+            remembers of the forces; None where it was not judged.
+        clock_uncertainty: bound on how far spike times lie from the coil's, s: how well
+            the scope's clock is aligned with the host's; None if not known.
+    """
+
+    label: str
+    level: float | None
+    start: float
+    duration: float
+    spike_times: FloatArray
+    onset: float = 0.0
+    hold: tuple[float, float] | None = None
+    pause: bool = False
+    rest: float | None = None
+    drift: float | None = None
+    clock_uncertainty: float | None = None
+
+    @property
+    def held(self) -> tuple[float, float] | None:
+        """(start, end) of the constant part on the run's time axis, s, or None."""
+        if self.hold is None:
+            return None
+        return self.start + self.hold[0], self.start + self.hold[1]
+
+    @cached_property
+    def response(self) -> Response:
+        """Its spikes described: count, latency, highest and final rate, fall."""
+        return respond(self.spike_times, onset=self.onset, hold=self.hold)
+
+    @property
+    def adaptation(self) -> Adaptation | None:
+        """The decay of the rate in the hold; None where `why_not` says why."""
+        return self._fitted[0]
+
+    @property
+    def why_not(self) -> str:
+        """Why there is no `adaptation`; "" where there is one."""
+        return self._fitted[1]
+
+    @cached_property
+    def _fitted(self) -> tuple[Adaptation | None, str]:
+        if self.response.spikes == 0:
+            return None, "no spikes"
+        if self.hold is None:
+            return None, "no hold"
+        try:
+            return fit_adaptation(self.spike_times, self.hold), ""
+        except NotIdentifiableError as error:
+            return None, f"not identifiable: {error}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measurement:
+    """What one run measured, and under which conditions.
+
+    Attributes:
+        simulated: whether the bench's physics was computed.
+        bench: its name.
+        started: date and time as "2026-11-21 12:27:20", or "".
+        duration: of the experiment, s.
+        trials: in order, pauses included.
+        force: N on the run's time axis, as applied (limited and stepped).
+        current: applied coil current as read back, shape (n, 2), s and A, or None.
+        warming: of the coil's winding from the first to the last look at its
+            resistance, K; None where it was not looked at twice.
+        force_uncertainty: what calibration and geometry leave open; None where
+            neither states any.
+        field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
+        newtons_per_tesla: force over B2 by Eq. (2), N/T, or None.
+        field: teslameter readings, shape (m, 2), s and T, or None.
+        traces: decimated signals, the derived I_DS and the model's V_C1 among them.
+        circuit: the sensor as it is believed to be, to compare with, or None.
+        searched: whether spikes were looked for.
+        settings: settings read back, by instrument, then by name.
+        conditions: temperature, operator, sensor and notes, as text by name.
+    """
+
+    simulated: bool
+    bench: str
+    duration: float
+    trials: tuple[MeasuredTrial, ...]
+    force: Waveform
+    started: str = ""
+    current: FloatArray | None = None
+    warming: float | None = None
+    force_uncertainty: ForceUncertainty | None = None
+    field_per_ampere: float | None = None
+    newtons_per_tesla: float | None = None
+    field: FloatArray | None = None
+    traces: tuple[RecordedSignal, ...] = ()
+    circuit: Circuit | None = None
+    searched: bool = True
+    settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
+    conditions: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @cached_property
+    def results(self) -> tuple[MeasuredTrial, ...]:
+        """Trials with something to say: no pauses, no silent looks at the rest."""
+        played = tuple(trial for trial in self.trials if not trial.pause)
+        telling = tuple(
+            t
+            for t in played
+            if t.level is not None or t.hold is not None or t.spike_times.size
+        )
+        return telling or played
+
+    @property
+    def origin(self) -> str:
+        """For legends: "simulated bench" or "measured"."""
+        return "simulated bench" if self.simulated else "measured"
+
+    @property
+    def spike_times(self) -> FloatArray:
+        """All spikes outside pauses, shape (k,), s on the run's time axis."""
+        played = [t.spike_times + t.start for t in self.trials if not t.pause]
+        return np.concatenate(played or [np.empty(0)])
+
+    def trace(self, signal: str, *, model: bool = False) -> RecordedSignal | None:
+        """The measured or derived trace of `signal`, or the model's; None if none."""
+        return next(
+            (
+                t
+                for t in self.traces
+                if t.signal == signal and (t.source == "model") == model
+            ),
+            None,
+        )
+
+    def mean(self, signal: str, start: float, end: float) -> float:
+        """Mean of a signal in [start, end] s, SI; not a number where it has none."""
+        trace = self.trace(signal)
+        if trace is None:
+            return float("nan")
+        inside = (trace.time >= start) & (trace.time <= end)
+        return float(trace.mean[inside].mean()) if inside.any() else float("nan")
+
+    def field_between(self, start: float, end: float) -> FloatArray:
+        """Field read in [start, end] s of run time, T; empty where none was."""
+        trace = self.trace("field")
+        if self.field is not None and len(self.field):
+            time, value = self.field.T
+        elif trace is not None:
+            time, value = trace.time, trace.mean
+        else:
+            return np.empty(0)
+        found: FloatArray = value[(time >= start) & (time <= end)]
+        return found
+
+    def current_at(self, time: float) -> float | None:
+        """Applied coil current at `time` s, A; None before the first set-point."""
+        if self.current is None:
+            return None
+        before = self.current[:, 0] <= time
+        return float(self.current[before][-1, 1]) if before.any() else None
+
+    def uncertain(self, force: float | None) -> float | None:
+        """Half of the 95 % band of `force` N, N; None where nothing is stated."""
+        if force is None or self.force_uncertainty is None:
+            return None
+        return float(self.force_uncertainty.of(force))

@@ -1,0 +1,244 @@
+"""Plain descriptions of plots: what is drawn, not how.
+
+The report draws them with matplotlib, the window paints them, results.json holds them.
+All values are in SI; whoever draws chooses the prefix of the unit, so that a force of
+0.2 N stands as 200 on an axis "Force (mN)". Names such as V_C1 get a subscript.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_lab.errors import ParameterError
+from tactile_lab.quantity import PREFIXES, prefix_of
+
+FloatArray = NDArray[np.float64]
+
+Mark = Literal[
+    "line", "dashed", "dotted", "steps", "filled",
+    "points", "dots", "open", "up", "down", "joined", "ticks", "range", "band", "text",
+]  # fmt: skip
+"""Lines, one of them in steps and one filled down to 0; discs, small ones, open ones,
+triangles, discs joined by a line; ticks along the top at `x`; the range from `low` to
+`high` as the trace itself, or as a pale band alone; `texts` beside the points."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Series:
+    """Points or a line; a value that is not a number is a gap.
+
+    Attributes:
+        x, y: shape (n,), SI; `y` may be missing for ticks and ranges.
+        name: in the legend; "" for no entry.
+        mark: how it is drawn.
+        colour: of a signal ("V_C1", "force", "rate", ...), "model", "ink" or "quiet".
+        x_error, y_error: half-widths of the 95 % interval, shape (n,), SI.
+        low, high: shape (n,), SI: shaded between, such as extremes or a tolerance.
+        texts: n of them, beside the points.
+    """
+
+    x: ArrayLike
+    y: ArrayLike = ()
+    name: str = ""
+    mark: Mark = "line"
+    colour: str = "rate"
+    x_error: ArrayLike | None = None
+    y_error: ArrayLike | None = None
+    low: ArrayLike | None = None
+    high: ArrayLike | None = None
+    texts: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        size, others = (
+            np.size(self.x),
+            (self.x_error, self.y_error, self.low, self.high),
+        )
+        y = () if np.size(self.y) == 0 else (self.y,)
+        for values in (*y, *(v for v in others if v is not None)):
+            if np.shape(values) != (size,):
+                raise ParameterError(
+                    f"series {self.name or self.colour!r} has {size} values of x and "
+                    f"others of shape {np.shape(values)}; give as many."
+                )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guide:
+    """A reference line, or a shaded band where `to` is given.
+
+    Attributes:
+        at: where it lies or begins, SI.
+        to: where the band ends; None for a line.
+        along: "x" for one across at that y, "y" for one upright at that x.
+        text: beside the line.
+        colour: as of a series; bands are grey.
+        dashed: whether the line is.
+    """
+
+    at: float
+    to: float | None = None
+    along: Literal["x", "y"] = "y"
+    text: str = ""
+    colour: str = "quiet"
+    dashed: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes:
+        label: of its y axis.
+        unit: SI unit of y, "" for none.
+        prefix: of that unit; None for the one that suits the values.
+        series: drawn in this order.
+        guides: reference lines and bands.
+        limits: of y, SI; None at either end for what the values need.
+        log: whether y is logarithmic.
+        text: some lines within it, such as fitted values.
+        corner: the one on the right where they stand.
+        note: a small line above it.
+        height: inches in the report.
+    """
+
+    label: str
+    unit: str = ""
+    prefix: str | None = None
+    series: tuple[Series, ...]
+    guides: tuple[Guide, ...] = ()
+    limits: tuple[float | None, float | None] = (None, None)
+    log: bool = False
+    text: str = ""
+    corner: Literal["upper", "lower"] = "upper"
+    note: str = ""
+    height: float = 2.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plot:
+    """Panels above one another on one x axis, or side by side.
+
+    Attributes:
+        name: of its files without the ending. "figure" takes the place of the general
+            one (force, voltages, spikes).
+        caption: for the report, one or more sentences.
+        title: what it shows, after the protocol's own title; "" where that says it.
+        x_label, x_unit, x_prefix: of the x axis, as a panel's of y.
+        panels: at least one.
+        x_limits: SI; None for what the values need.
+        x_ticks: where the x axis has numbers, SI; empty for where they fall.
+        x_log: whether x is logarithmic.
+        whole: whether x counts something.
+        beside: side by side, each with an x axis of its own.
+        letters: whether panels are called a, b, c.
+    """
+
+    name: str
+    caption: str
+    title: str = ""
+    x_label: str
+    x_unit: str = ""
+    x_prefix: str | None = None
+    panels: tuple[Panel, ...]
+    x_limits: tuple[float, float] | None = None
+    x_ticks: tuple[float, ...] = ()
+    x_log: bool = False
+    whole: bool = False
+    beside: bool = False
+    letters: bool = False
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z0-9_]+", self.name):
+            raise ParameterError(
+                f"a plot cannot be called {self.name!r}: small letters, digits and _ "
+                "make the name of its files."
+            )
+
+    def x_scale(self) -> tuple[float, str]:
+        """(Factor, axis text): SI values times the factor are what the axis shows."""
+        values = [s.x for p in self.panels for s in p.series]
+        return scale(self.x_label, self.x_unit, self.x_prefix, values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON takes it: only what differs from the defaults; null is a gap."""
+        found: dict[str, Any] = _plain(self)
+        return found
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Plot:
+        """The plot that `to_dict` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is not one.
+        """
+        panels = tuple(
+            Panel(
+                **{
+                    **panel,
+                    "series": tuple(_series(s) for s in panel["series"]),
+                    "guides": tuple(Guide(**g) for g in panel.get("guides", ())),
+                    "limits": tuple(panel.get("limits", (None, None))),
+                }
+            )
+            for panel in data["panels"]
+        )
+        return cls(**{**data, "panels": panels})
+
+
+def y_scale(panel: Panel) -> tuple[float, str]:
+    """(Factor, axis text): SI values times the factor are what the y axis shows."""
+    values = [v for s in panel.series for v in (s.y, s.low, s.high) if v is not None]
+    values += [limit for limit in panel.limits if limit is not None]
+    return scale(panel.label, panel.unit, panel.prefix, values)
+
+
+def scale(
+    label: str, unit: str, prefix: str | None, values: list[ArrayLike]
+) -> tuple[float, str]:
+    """Factor from SI to what an axis shows, and its text: (1000, "Force (mN)")."""
+    if prefix is None:
+        largest = max((_largest(v) for v in values), default=0.0)
+        prefix = prefix_of(largest, unit)
+    whole = f"{prefix}{unit}"
+    return 1 / PREFIXES[prefix], f"{label} ({whole})" if whole else label
+
+
+def _largest(values: ArrayLike) -> float:
+    known = np.abs(np.asarray(values, dtype=np.float64))
+    return float(np.max(known[np.isfinite(known)], initial=0.0))
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return {
+            f.name: _plain(getattr(value, f.name))
+            for f in dataclasses.fields(value)
+            if not _same(getattr(value, f.name), f.default)
+        }
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _same(value: Any, default: Any) -> bool:
+    return not isinstance(value, np.ndarray) and bool(value == default)
+
+
+def _series(data: Mapping[str, Any]) -> Series:
+    if data.get("mark", "line") not in get_args(Mark):
+        raise ValueError(f"no such mark: {data['mark']!r}")
+    arrays = ("x", "y", "x_error", "y_error", "low", "high")
+    numbers = {k: np.array(data[k], dtype=np.float64) for k in arrays if k in data}
+    return Series(**{**data, **numbers, "texts": tuple(data.get("texts", ()))})

@@ -1,0 +1,198 @@
+"""The model beside a run as its report needs it: computed, told, and drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from tactile_lab.analysis.spike_pairs import PART, Matched
+from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
+from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
+from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.report.run_data import RunData
+from tactile_lab.report.splice import ClosedTime
+from tactile_lab.waveform import Waveform
+
+
+def with_twin(run: RunData) -> tuple[RunData, Twin | None]:
+    """The run with the model's V_C1 among its traces, and the twin behind it.
+
+    The model is driven by the applied current's force. None where the run has no
+    circuit, no applied current, or nothing to compare.
+
+    Raises:
+        SolverError: the model cannot follow this force.
+    """
+    voltages = tuple(
+        Measured(name, trace.time, trace.mean, trace.code or 0.0)
+        for name in ("V_C1", "V_C2")
+        if (trace := run.trace(name)) and trace.time.size
+    )
+    if run.circuit is None or run.current is None or not len(run.current):
+        return run, None
+    if not voltages and not run.searched:
+        return run, None
+    pauses = [(t.start, t.start + t.duration) for t in run.trials if t.pause]
+    found = twin(
+        run.circuit,
+        run.force,
+        run.duration,
+        voltages=voltages,
+        spike_times=run.spike_times if run.searched else None,
+        pauses=pauses,
+        start=run.start,
+        displaced=displaced(run),
+        clock=max((t.clock_uncertainty or 0.0 for t in run.trials), default=0.0),
+    )
+    node_a = found.residual("V_C1")
+    if node_a is None:
+        return run, found
+    model = RecordedSignal(
+        signal="V_C1", time=node_a.time, mean=node_a.predicted, source="model"
+    )
+    return replace(run, traces=(*run.traces, model)), found
+
+
+def displaced(run: Measurement) -> list[Waveform]:
+    """The force moved a little by each cause of its uncertainty."""
+    known, force = run.force_uncertainty, run.force
+    if known is None:
+        return []
+    # at rest there is no force, by definition
+    pushed = np.where(force.value == 0, 0.0, PART * known.absolute)
+    moved = [
+        Waveform(force.time, force.value + pushed),
+        force.scaled(1 + PART * known.relative),
+    ]
+    causes = (known.absolute, known.relative)
+    return [w for w, size in zip(moved, causes, strict=True) if size > 0]
+
+
+def sentences(run: Measurement, found: Twin) -> tuple[str, ...]:
+    """What the twin says, for people."""
+    if run.force_uncertainty is None:
+        said = [
+            "Tolerance: what the scope's codes and the clocks leave open; no "
+            "uncertainty of the force is stated."
+        ]
+    else:
+        said = [
+            "Tolerance: what the scope's codes, the clocks and the force's uncertainty "
+            "leave open."
+        ]
+    for residual in found.residuals:
+        shifted = (
+            "; while it fires, spikes that come early or late make volts of difference"
+            if residual.signal == "V_C2" and found.spikes is not None
+            else ""
+        )
+        # adding 0 makes a rounded -0 plain
+        offset = f"{round(residual.offset * 1e3, 1) + 0.0:+.1f}".replace("-", "−")
+        said.append(
+            f"{residual.signal}: measured less model is {offset} mV on average, "
+            f"{residual.rms * 1e3:.1f} mV rms, within {residual.band * 1e3:.1f} mV for "
+            f"95 % of the time; {100 * residual.within:.0f} % lie within the "
+            f"tolerance of {np.median(residual.tolerance) * 1e3:.1f} mV "
+            f"(median){shifted}."
+        )
+    if found.spikes is not None:
+        text = f"Spikes: {found.spikes.sentence}"
+        if np.isfinite(found.spikes.within):
+            open_ = np.nanmedian(found.spikes.tolerance) * 1e3
+            text += (
+                f"; {100 * found.spikes.within:.0f} % of the offsets lie within the "
+                f"tolerance of {open_:.2g} ms (median)"
+            )
+        said.append(f"{text}.")
+    return tuple(said)
+
+
+def twin_plot(run: Measurement, twin: Twin) -> Plot | None:
+    """Residual of V_C1, offsets of the spikes, error of the rate; None without any."""
+    axis, panels, said = ClosedTime(run), [], []
+    node_a, matched = twin.residual("V_C1"), twin.spikes
+    if node_a is not None:
+        panels.append(_voltage(node_a, axis))
+        said.append("V_C1")
+    if matched is not None and matched.offsets.size:
+        panels += _matched(matched, axis)
+        said += ["Times of matched spikes", "Rate 1/ISI"]
+    if not panels:
+        return None
+    parts = " ".join(f"({'abc'[i]}) {text}." for i, text in enumerate(said))
+    return Plot(
+        name="twin",
+        title="measured less model",
+        caption="Measured less model, the model driven by the applied current. "
+        f"{parts} Shaded: the tolerance, what the scope's codes, the clocks and the "
+        "stated uncertainty of the force leave open (95 %). Short peaks at steps of "
+        "the force are the field's lag behind the current, which the model does not "
+        "know.",
+        x_label="Time, recoveries left out at dotted lines" if axis.cuts else "Time",
+        x_unit="s",
+        x_prefix="",
+        x_limits=(0.0, axis.end),
+        letters=True,
+        panels=tuple(
+            Panel(
+                label=label,
+                unit=unit,
+                series=series,
+                limits=(-most, most),
+                guides=(
+                    Guide(at=0.0, along="x", dashed=False),
+                    *(Guide(at=cut) for cut in axis.cuts),
+                ),
+                height=1.2,
+            )
+            for label, unit, series, most in panels
+        ),
+    )
+
+
+def _voltage(
+    residual: Residual, axis: ClosedTime
+) -> tuple[str, str, tuple[Series, ...], float]:
+    time, difference, tolerance = axis.spliced(
+        residual.time, residual.difference, residual.tolerance
+    )
+    # single bins at an edge of the force would hide everything else
+    most = 1.3 * max(
+        float(np.nanpercentile(np.abs(difference), 99.5)),
+        float(np.nanmedian(tolerance)),
+    )
+    return "V_C1", "V", _tolerated(time, difference, tolerance, "line"), most or 1e-3
+
+
+def _matched(
+    matched: Matched, axis: ClosedTime
+) -> list[tuple[str, str, tuple[Series, ...], float]]:
+    panels = []
+    for label, unit, time, value, tolerance in (
+        ("Spikes", "s", matched.measured, matched.offsets, matched.tolerance),
+        ("Rate", "%", matched.rated, 100 * matched.rate_error,
+         100 * matched.rate_tolerance),
+    ):  # fmt: skip
+        # tolerances grow beyond all bounds where a spike only just comes
+        known = tolerance[np.isfinite(tolerance)]
+        usual = float(np.median(known)) if known.size else 0.0
+        most = 1.2 * max(float(np.max(np.abs(value), initial=0.0)), usual)
+        series = _tolerated(axis.closed(time), value, tolerance, "dots")
+        panels.append((label, unit, series, most or 1e-3))
+    return panels
+
+
+def _tolerated(
+    time: FloatArray,
+    value: FloatArray,
+    tolerance: FloatArray,
+    mark: Literal["line", "dots"],
+) -> tuple[Series, ...]:
+    """The tolerance either side of 0, and what lies within it or beyond."""
+    around: Any = {"low": -tolerance, "high": tolerance}
+    if mark == "dots":
+        return (Series(x=time, y=value, mark=mark, **around),)
+    band = Series(x=time, mark="band", colour="model", **around)
+    return band, Series(x=time, y=value, mark=mark, colour="V_C1")
