@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QApplication
 from gui.look import fonts
 from gui.look.theme import Theme
 from gui.session.session import Session
-from gui.session.threads import start
 from gui.window import Window
+from tactile_lab.engine.threads import start
 
 
 def application(arguments: Sequence[str] = ()) -> QApplication:

@@ -16,21 +16,21 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QWidget
 
 from gui.actions import Actions
 from gui.banner import Banner
+from gui.centre import Centre
 from gui.dialogs.closing import Closing
-from gui.dialogs.errand import ErrandCard
 from gui.dialogs.overlay import Overlay
+from gui.dialogs.question import QuestionCard
+from gui.frames import Frames
 from gui.header.header import Header
 from gui.look.theme import Theme
+from gui.opening import Opening
+from gui.panels import Panels
 from gui.parts import column
+from gui.reading import move_on
 from gui.review.panel import ReviewPanel
-from gui.screen.centre import Centre
-from gui.screen.frames import Frames
-from gui.screen.panels import Panels
-from gui.screen.screen import Screen
 from gui.session.session import Session
 from gui.setup.panel import SetupPanel
 from gui.state import Snapshot, State
-from gui.tab_order import move_on
 
 NARROW = 1280
 """Window width, px, below which there is room for one side panel."""
@@ -66,11 +66,11 @@ class Window(QMainWindow):
         self.columns = QSplitter(Qt.Orientation.Horizontal)
         self._lay_out()
         self.closing = Closing(self, theme)
-        self.errand = ErrandCard(self, session, theme)
+        self.question = QuestionCard(self, session, theme)
         self.panels = Panels(
             session, theme, self.header, self.setup, self.centre, self.review
         )
-        self.opening = Screen(self.panels)
+        self.opening = Opening(self.panels)
         self.frames = Frames(self.panels, self.opening)
         self.actions_ = Actions(self, self.panels, self.opening, self.closing)
         self._leaving = False
@@ -87,7 +87,7 @@ class Window(QMainWindow):
         self.setup.render_snapshot(snapshot)
         self._render_manual(snapshot)
         if self._bench_changed():
-            self.review.manual.show_bench(self.session.spec)
+            self.review.manual.show_bench(self.session.bench.spec)
         self.centre.show_empty(
             snapshot.state in (State.DISCONNECTED, State.CONNECTING)
             and self.opening.run is None
@@ -109,7 +109,7 @@ class Window(QMainWindow):
     def _render_manual(self, snapshot: Snapshot) -> None:
         session = self.session
         self.review.manual.render_snapshot(
-            snapshot, session.readings.get("field"), reading=session.reading_field
+            snapshot, session.bench.field, reading=session.bench.reading
         )
         self.review.manual.follow(session.manual)
 
@@ -216,23 +216,23 @@ class Window(QMainWindow):
     # --- assembly
 
     def _bench_changed(self) -> bool:
-        spec = self.session.spec
+        spec = self.session.bench.spec
         changed = spec is not getattr(self, "_shown_spec", 0)
         self._shown_spec = spec
         return changed
 
     def _connect(self) -> None:
         session = self.session
-        session.changed.connect(self.render_state)
+        session.status.changed.connect(self.render_state)
         self.opening.changed.connect(self.render_state)
         self.frames.told.connect(self.render_clock)
         self.actions_.fold_asked.connect(self.fold)
-        session.logged.connect(self.centre.log.add)
-        session.planned.connect(self.opening.plan_arrived)
+        session.log.added.connect(self.centre.log.add)
+        session.plan.arrived.connect(self.opening.plan_arrived)
         session.source_changed.connect(self.opening.follow_run)
-        session.trial_ended.connect(self.opening.trial_ended)
-        session.run_ended.connect(self.opening.run_ended)
-        session.reported.connect(self.opening.reported)
+        session.run.trial_ended.connect(self.opening.trial_ended)
+        session.run.ended.connect(self.opening.run_ended)
+        session.run.reported.connect(self.opening.reported)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
         self.banner.log_asked.connect(self.centre.log.show_safety)
@@ -246,16 +246,16 @@ class Window(QMainWindow):
         self.centre.tools.monitor.clicked.connect(session.watch)
         self.centre.watch_bar.record_asked.connect(session.record)
         self.centre.watch_bar.closed.connect(lambda: session.watch(False))
-        session.recorded.connect(lambda folder: self.opening.list_runs())
+        session.monitor.recorded.connect(lambda folder: self.opening.list_runs())
         self.setup.scene_wanted.connect(self.opening.ask_scene)
         manual = self.review.manual
         manual.begun.connect(session.begin_manual)
         manual.field_asked.connect(session.read_field)
         manual.inputs.asked.connect(self._set_inputs)
-        manual.set_asked.connect(self._set_current)
+        manual.set_asked.connect(session.manual.hold)
         manual.off_asked.connect(lambda: session.stop("manual off"))
         manual.checked.connect(
-            lambda: session.connect_bench(session.bench_choice or "sim")
+            lambda: session.connect_bench(session.bench.choice or "sim")
         )
 
     def _set_inputs(self, channels: str) -> None:
@@ -263,10 +263,6 @@ class Window(QMainWindow):
         self.review.manual.inputs.say(problem)
         if not problem:
             self.setup.plan_now()
-
-    def _set_current(self, current: float) -> None:
-        if self.session.manual is not None:
-            self.session.manual.hold(current)
 
     def _lay_out(self) -> None:
         page = self.page

@@ -26,7 +26,8 @@ from gui.dialogs.wiring import Wiring
 from gui.look.theme import Theme
 from gui.parts import Segments, column, label, push, scrolling
 from gui.review.conclusion import conclusion_of
-from gui.session.messages import Level, Planned
+from gui.session.form_plan import Planned
+from gui.session.log import Level
 from gui.session.session import Session
 from gui.state import State, minutes
 from tactile_lab.acquisition.events import RunState
@@ -35,8 +36,8 @@ from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 
 if TYPE_CHECKING:
-    from gui.screen.panels import Panels
-    from gui.screen.screen import Screen
+    from gui.opening import Opening
+    from gui.panels import Panels
     from tactile_lab.acquisition.ending import Executed
 
 WIRING, FIELD = "wiring_check", "calibrate_field"
@@ -90,15 +91,15 @@ class Connect(Overlay):
         self.calibration.field_asked.connect(lambda: self._run(FIELD))
         self.calibration.force_asked.connect(self._prepare_force)
         self.calibration.use_asked.connect(self._ask_and_use)
-        session.changed.connect(self._follow)
-        session.planned.connect(self._planned)
-        session.trial_ended.connect(self._trial_ended)
-        session.run_ended.connect(self._run_ended)
-        session.reported.connect(self._reported)
+        session.status.changed.connect(self._follow)
+        session.plan.arrived.connect(self._planned)
+        session.run.trial_ended.connect(self._trial_ended)
+        session.run.ended.connect(self._run_ended)
+        session.run.reported.connect(self._reported)
 
     def show_bench(self) -> None:
         """Show the connected bench, where there is one."""
-        spec = self.session.spec
+        spec = self.session.bench.spec
         if spec is not None and spec is not self._shown:
             self._shown = spec
             show_bench(self._choice, spec)
@@ -125,14 +126,14 @@ class Connect(Overlay):
             self._say(str(error))
             return False
         self._say("")
-        self.session.log(Level.GOOD, "bench", f"Saved {path}")
+        self.session.log.add(Level.GOOD, "bench", f"Saved {path}")
         self.hide()
         self.session.connect_bench(str(path))
         return True
 
     def use_calibration(self, calibration: Path, path: Path) -> bool:
         """Save the connected bench with a calibration, and connect to it."""
-        spec = self.session.spec
+        spec = self.session.bench.spec
         if spec is None:
             self._say("No bench is connected that the calibration could belong to.")
             return False
@@ -142,7 +143,7 @@ class Connect(Overlay):
             self._say(str(error))
             return False
         self._say("")
-        self.session.log(Level.GOOD, "bench", f"Saved {path} with its calibration")
+        self.session.log.add(Level.GOOD, "bench", f"Saved {path} with its calibration")
         self.session.connect_bench(str(path))
         self.show_bench()
         return True
@@ -194,12 +195,14 @@ class Connect(Overlay):
         session = self.session
         if self._running:
             if session.state is State.FAULT:
-                self._end(session.fault.title if session.fault else "Fault")
-            elif session.state is State.RUNNING and session.trial is not None:
-                index, words = session.trial
+                self._end(
+                    session.status.fault.title if session.status.fault else "Fault"
+                )
+            elif session.state is State.RUNNING and session.run.trial is not None:
+                index, words = session.run.trial
                 left = ""
-                if session.expected is not None:
-                    rest = minutes(max(0.0, session.expected - session.elapsed))
+                if session.run.expected is not None:
+                    rest = minutes(max(0.0, session.run.expected - session.run.elapsed))
                     left = f", {rest} left"
                 self._say_progress(f"Step {index + 1}: {words}{left}", busy=True)
             return
@@ -208,7 +211,7 @@ class Connect(Overlay):
             State.DISCONNECTED: "Connect a bench first.",
             State.CONNECTING: "The bench is still connecting.",
         }.get(session.state, "Another run is in progress.")
-        if session.manual is not None:
+        if session.manual.alive:
             reason = "The coil is driven by hand; switch it off first."
         for page, button, ended in (
             (self.wiring, self.wiring.check, self._ended[WIRING]),
@@ -246,7 +249,7 @@ class Connect(Overlay):
             self.session.connect_bench(name)
 
     def _ask_and_use(self, calibration: Path | None) -> None:
-        spec = self.session.spec
+        spec = self.session.bench.spec
         if calibration is None or spec is None:
             return
         start = "bench.toml" if spec.path is None else str(spec.path)
@@ -291,7 +294,7 @@ class Connect(Overlay):
         self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
 
-def show_connect(window: QWidget, panels: Panels, opening: Screen) -> None:
+def show_connect(window: QWidget, panels: Panels, opening: Opening) -> None:
     """Open the dialog."""
     found = window.findChild(Connect)
     if isinstance(found, Connect):

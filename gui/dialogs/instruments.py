@@ -13,7 +13,7 @@ from gui.dialogs.attached import Attached
 from gui.dialogs.bench_text import BY_PERSON, Choice
 from gui.look.theme import Theme
 from gui.parts import column, label, line, push, set_role
-from gui.session.threads import start
+from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.instruments.dialects import dialect_ids
 from tactile_lab.quantity import show

@@ -21,13 +21,13 @@ from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.tokens import LIGHT, Tokens
-from gui.session.messages import Level
+from gui.session.log import Level
 from gui.setup.texts import FieldError
 from tactile_lab.errors import TactileLabError
 from tactile_lab.trace import FloatArray
 
 if TYPE_CHECKING:
-    from gui.screen.panels import Panels
+    from gui.panels import Panels
 
 TITLE = 34
 CSV_POINTS = 20_000
@@ -50,9 +50,9 @@ def write_scene(panels: Panels, path: Path) -> None:
     try:
         path.write_text(panels.setup.request().load().to_toml(), encoding="utf-8")
     except (TactileLabError, FieldError, OSError) as error:
-        panels.session.log(Level.ERROR, "scene", f"{path} was not saved: {error}")
+        panels.session.log.add(Level.ERROR, "scene", f"{path} was not saved: {error}")
     else:
-        panels.session.log(Level.GOOD, "scene", f"Saved {path}")
+        panels.session.log.add(Level.GOOD, "scene", f"Saved {path}")
 
 
 def export_view(panels: Panels, run: Source | None) -> None:
@@ -70,10 +70,10 @@ def export_view(panels: Panels, run: Source | None) -> None:
 def write_view(panels: Panels, run: Source | None, path: Path) -> None:
     """Write the visible time of all visible lanes; the ending chooses the format."""
     stack = panels.centre.stack
-    simulated = panels.session.spec is None or panels.session.spec.simulated
+    simulated = panels.session.bench.spec is None or panels.session.bench.spec.simulated
     if run is not None:
         simulated = run.simulated
-    title = panels.session.run_name or "plan"
+    title = panels.session.run.name or "plan"
     title += " · SIMULATED" if simulated else " · measured"
     try:
         if path.suffix == ".csv":
@@ -83,9 +83,11 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
         elif not picture(stack, title).save(str(path)):
             raise OSError(f"{path} cannot be written as a picture; end it in .png.")
     except OSError as error:
-        panels.session.log(Level.ERROR, "export", f"The view was not exported: {error}")
+        panels.session.log.add(
+            Level.ERROR, "export", f"The view was not exported: {error}"
+        )
     else:
-        panels.session.log(Level.GOOD, "export", f"View exported to {path}")
+        panels.session.log.add(Level.GOOD, "export", f"View exported to {path}")
 
 
 def picture(stack: LaneStack, title: str, scale: int = 2) -> QImage:

@@ -10,7 +10,8 @@ import numpy as np
 
 from gui.lanes.expected import Hold, settled
 from gui.lanes.source import Source
-from gui.lanes.twin import MARGIN, Look, Twin, TwinSlice
+from gui.lanes.twin import MARGIN, Look, Twin
+from tactile_lab.engine.events import ModelPart
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Run
@@ -95,13 +96,13 @@ class RunSource(Source):
 
     # --- the twin
 
-    def add_twin(self, whole: TwinSlice, look: Look) -> None:
+    def add_twin(self, whole: ModelPart, look: Look) -> None:
         """Put the twin beside the data; `look` has a part of it computed closely."""
         self.model = Twin(look)
         self.model.add(whole)
         self.fetched.set()
 
-    def add_twin_part(self, part: TwinSlice) -> None:
+    def add_twin_part(self, part: ModelPart) -> None:
         """A part of the twin that was asked for has come."""
         if self.model is not None:
             self.model.refine(part)

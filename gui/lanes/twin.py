@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.engine.events import ModelPart
 from tactile_lab.pyramid import Pyramid
 from tactile_lab.trace import FloatArray, Trace
 
@@ -18,21 +18,6 @@ CLOSE = 4096
 
 Look = Callable[[float, float, int], None]
 """Has the model computed between two times, s, in so many cells."""
-
-
-@dataclass(frozen=True, eq=False)
-class TwinSlice:
-    """What the twin did in one slice of time.
-
-    Attributes:
-        bins: signal -> its trace.
-        spikes: times, ascending, s.
-        end: time up to which the twin has come, s.
-    """
-
-    bins: dict[str, Trace]
-    spikes: FloatArray
-    end: float
 
 
 class Twin:
@@ -52,7 +37,7 @@ class Twin:
         self._pyramids: dict[str, Pyramid] = {}
         self._spikes: list[FloatArray] = []
 
-    def add(self, part: TwinSlice) -> None:
+    def add(self, part: ModelPart) -> None:
         """Append the next slice."""
         for signal, bins in part.bins.items():
             self._pyramids.setdefault(signal, Pyramid()).add(bins)
@@ -60,7 +45,7 @@ class Twin:
             self._spikes.append(part.spikes)
         self.end = part.end
 
-    def refine(self, part: TwinSlice) -> None:
+    def refine(self, part: ModelPart) -> None:
         """A closer look has come; if another is wanted, it is asked for when drawn."""
         for signal, bins in part.bins.items():
             self._pyramids[signal].refine(float(bins.time[0]), part.end, bins)

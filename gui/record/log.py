@@ -23,7 +23,7 @@ from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, column, label
 from gui.record.log_table import LogTable
-from gui.session.messages import Level, Line
+from gui.session.log import Level, Line
 
 Index = QModelIndex | QPersistentModelIndex
 ROOT = QModelIndex()

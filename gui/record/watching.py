@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy
 
 from gui.lanes.axis import number
 from gui.parts import column, label, push, set_role
-from gui.session.monitor import Standing
+from tactile_lab.engine.sensor import SensorState
 
 
 class WatchBar(QFrame):
@@ -56,7 +56,7 @@ class WatchBar(QFrame):
         values = ", ".join(f"{n} {v.text()}" for n, v in self._values.items())
         return f"{values}, {self.side.text()}"
 
-    def show_standing(self, now: Standing, *, recording: bool) -> None:
+    def show_sensor(self, now: SensorState, *, recording: bool) -> None:
         """Show where the sensor stands; whether the last minute is being kept."""
         distance = now.distance
         for name, text in (
@@ -69,7 +69,7 @@ class WatchBar(QFrame):
             ),
         ):
             self._values[name].setText(text)
-        critical = f" {now.critical:.3f} V"
+        critical = f" {now.critical_V_C1:.3f} V"
         if distance is None:
             self.side.setText("opening the oscilloscope …")
             set_role(self.side, "pill")

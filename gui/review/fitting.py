@@ -8,9 +8,9 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import Source
 from gui.session.finding import Finding
-from gui.session.fit import Beside, beside
-from gui.session.messages import Fitted
+from gui.session.fit import Beside, Fit, FitSteps, beside
 from gui.session.session import Session
+from tactile_lab.engine.engine import Reply
 
 
 class Fitting(QObject):
@@ -31,7 +31,6 @@ class Fitting(QObject):
         self._serial = 0
         self._busy = False
         self._next: tuple[tuple[Finding, ...], Beside] | None = None
-        session.fitted.connect(self._take)
 
     def ask(self, findings: Sequence[Finding], source: Source | None) -> None:
         """Fit `findings`, and compare `source` with the model beside it."""
@@ -54,10 +53,13 @@ class Fitting(QObject):
             return
         (steps, seen), self._next = self._next, None
         self._busy = True
-        self._session.fit(self._serial, steps, seen)
+        serial = self._serial
+        self._session.desk.ask(
+            FitSteps(steps, seen), lambda reply: self._take(serial, reply)
+        )
 
-    def _take(self, told: Fitted) -> None:
+    def _take(self, serial: int, reply: Reply[Fit]) -> None:
         self._busy = False
-        if told.serial == self._serial:
-            self.fitted.emit(told.found)
+        if serial == self._serial:
+            self.fitted.emit(reply.value)
         self._go_on()

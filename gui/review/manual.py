@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
 from gui.review.scope_inputs import ScopeInputs
-from gui.session.link import HandAfar
+from gui.session.live_manual import LiveManual
 from gui.state import CoilView, Snapshot, State, Truth, milliamperes, truth
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse, show
@@ -128,10 +128,10 @@ class ManualView(QWidget):
         """What the coil does, in words."""
         return self._force.text()
 
-    def follow(self, hand: HandAfar | None) -> None:
+    def follow(self, manual: LiveManual) -> None:
         """Show what was asked of the coil, unless somebody is about to ask anew."""
-        asked = 0.0 if hand is None else hand.asked
-        if hand is not None and not hand.opened:
+        asked = manual.current
+        if manual.alive and not manual.opened:
             self._force.setText("opening the source …")
         edited = self.current.isModified() or self.current.hasFocus()
         if not edited and not self.slider.isSliderDown():

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 from shiboken6 import isValid
 
 from gui.look.theme import Theme
-from gui.session.threads import start
+from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.store.run import Run
 from tactile_lab.trace import FloatArray

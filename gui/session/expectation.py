@@ -1,13 +1,29 @@
-"""What is expected of a scene, as the window gets it: light to load."""
+"""What is expected of a scene: its plan and the model's run of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from gui.lanes.expected import Preview
-from tactile_lab.planning.estimate import Estimate
-from tactile_lab.planning.needs import Needs
-from tactile_lab.scene.tables import Record
+import numpy as np
+
+from gui.lanes.expected import Hold, Preview
+from tactile_lab.engine.engine import Job
+from tactile_lab.engine.request import Request
+
+if TYPE_CHECKING:
+    # loading these takes a second: the window is on screen before
+    from tactile_lab.engine.engine import Engine
+    from tactile_lab.planning.estimate import Estimate
+    from tactile_lab.planning.needs import Needs
+    from tactile_lab.planning.plan import Plan
+    from tactile_lab.scene.scene import Scene
+    from tactile_lab.scene.tables import Record
+    from tactile_lab.trial import Trial
+
+MODELLED = ("V_C1", "V_C2", "V_K", "I_DS")
+SPACING = 1e-3
+MOST = 400_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,3 +47,77 @@ class Expectation:
     warnings: tuple[str, ...]
     leaves_out: tuple[tuple[str, str], ...]
     assumptions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PlanRequest(Job[Expectation]):
+    """Plan a request and have the model run it."""
+
+    name = "plan"
+    request: Request
+
+    def work(self, engine: Engine) -> Expectation:
+        """What it will do."""
+        return expect(self.request.load())
+
+
+def expect(scene: Scene) -> Expectation:
+    """Plan a scene and have the model run it.
+
+    Raises:
+        SceneError, LimitError: the scene cannot be run on its bench.
+    """
+    from tactile_lab.planning.plan import plan
+
+    made = plan(scene)
+    return Expectation(
+        record=scene.record,
+        needs=made.needs,
+        estimate=made.estimate,
+        preview=_preview(made),
+        warnings=made.warnings,
+        leaves_out=made.leaves_out,
+        assumptions=made.assumptions,
+    )
+
+
+def _preview(made: Plan) -> Preview:
+    """The plan's own prediction on the run's axis, which starts a baseline earlier."""
+    from tactile_lab.acquisition.runner import BASELINE
+
+    drive, result = made.timeline, made.preview
+    length = drive.duration + BASELINE
+    holds = [_hold(step.start + BASELINE, step.trial) for step in drive.steps]
+    force, none = drive.force.shifted(BASELINE), np.empty(0)
+    if result is None:
+        return Preview(force, {}, none, holds, length)
+    count = int(np.clip(drive.duration / SPACING, 2000, MOST))
+    time = np.linspace(0.0, drive.duration, count)
+    traces = {}
+    for name in MODELLED:
+        if name not in made.scene.record.signals:
+            continue
+        at = time
+        if name == "V_K" and result.spike_times is not None:
+            at = np.union1d(time, _around(result.spike_times, drive.duration))
+        traces[name] = (at + BASELINE, result.sample(name, at))
+    spikes = none if result.spike_times is None else result.spike_times + BASELINE
+    return Preview(force, traces, spikes, holds, length)
+
+
+def _hold(start: float, trial: Trial) -> Hold:
+    """A trial that starts at `start` s of the run."""
+    held = None
+    if trial.hold is not None:
+        held = start + trial.hold[0], start + trial.hold[1]
+    return Hold(start, start + trial.length, trial.label, trial.pause, held)
+
+
+def _around(spikes: np.ndarray, length: float) -> np.ndarray:
+    """Times at which a pulse of V_K shows its height, around each of the spikes."""
+    if spikes.size > 20_000:
+        return np.empty(0)
+    offsets = np.array([-2e-6, 0.0, 1e-6, 3e-6, 1e-5, 4e-5])
+    times = (spikes[:, None] + offsets[None, :]).ravel()
+    clipped: np.ndarray = np.clip(times, 0.0, length)
+    return clipped

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +19,12 @@ from gui.session.finding import Finding, finding
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match
+from tactile_lab.engine.engine import Job
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.trace import FloatArray, Trace
+
+if TYPE_CHECKING:
+    from tactile_lab.engine.engine import Engine
 
 COLUMNS = 2000
 """Columns in which measured and modelled voltages are compared."""
@@ -106,6 +111,19 @@ def beside(source: Source) -> Beside:
             for name in ("V_C1", "V_C2")
         },
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FitSteps(Job[Fit]):
+    """Fit steps, and compare what was seen with the model."""
+
+    name = "fit"
+    steps: tuple[Finding, ...]
+    seen: Beside
+
+    def work(self, engine: Engine) -> Fit:
+        """The fit."""
+        return fit(self.steps, self.seen)
 
 
 def fit(findings: Sequence[Finding], seen: Beside) -> Fit:

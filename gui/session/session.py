@@ -1,7 +1,7 @@
-"""The one state machine behind the window. It decides nothing about instruments.
+"""What is behind the window: puts its parts together and says what may follow what.
 
-The engine, a process of its own, does. What it tells is put into one queue; the
-window's timer calls `poll`, which takes it all and moves the state. Nothing blocks.
+It decides nothing about instruments: the engine, a process of its own, does. The
+window's timer calls `poll`, which hands over all that the engine told. Nothing blocks.
 """
 
 from __future__ import annotations
@@ -10,152 +10,98 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gui.session import chips
-from gui.session.commands import (
-    CheckBench,
-    FitSteps,
-    LookAtTwin,
-    MakePlan,
-    MakeTwin,
-    ReadField,
-)
-from gui.session.core import Core, Queued
-from gui.session.incoming import Incoming
-from gui.session.messages import Level
-from gui.session.request import Request, bench_request
-from gui.state import Fault, Snapshot, State
+from PySide6.QtCore import QObject, Signal
+
+from gui.lanes.source import LiveSource
+from gui.session.bench import ConnectedBench
+from gui.session.chips import Chips
+from gui.session.form_plan import FormPlan
+from gui.session.live_manual import LiveManual
+from gui.session.live_monitor import LiveMonitor
+from gui.session.live_run import LiveRun
+from gui.session.log import Level, Log
+from gui.session.queue import Queue, Queued
+from gui.session.status import Status
+from gui.state import CoilView, Snapshot, State
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
-from tactile_lab.instruments.registry import check_scope
-from tactile_lab.quantity import show
-from tactile_lab.scene.load import load_bench
 
 if TYPE_CHECKING:
-    from gui.session.finding import Finding
-    from gui.session.fit import Beside
+    from gui.session.expectation import Expectation
 
-__all__ = ["Core", "Queued", "Session"]
+BUSY = (State.RUNNING, State.ABORTING)
 
 
-class Session(Incoming):
-    """What the window asks for, and what it shows."""
+class Session(QObject):
+    """The parts, and the rules between them.
+
+    Args:
+        out: folder for run folders.
+        separate: benches are driven in a process of its own.
+        realtime: a simulated bench is paced by the wall clock.
+
+    Attributes:
+        log: what happened.
+        status: the one state, and the coil.
+        link: to the engine, which drives instruments.
+        desk: to a second one that fits and solves models and holds no instrument: its
+            work delays no set-point, and as a thread of the window it would delay
+            frames.
+        bench: connected to.
+        plan: of what the form asks for.
+        queue: of runs.
+        run, monitor, manual: what uses the bench, one at a time.
+        source: what is seen live: the run in progress or the last one, or the monitor.
+    """
+
+    source_changed = Signal(object)
+
+    def __init__(
+        self, out: Path, *, separate: bool = True, realtime: bool = True
+    ) -> None:
+        super().__init__()
+        self.out = out
+        self.log = Log()
+        self.status = Status(self.log)
+        self.link = Link(separate=separate, realtime=realtime, lost=self._engine_lost)
+        self.desk = Link(separate=separate, lost=self._desk_lost)
+        parts = self.link, self.status, self.log
+        self.bench = ConnectedBench(*parts)
+        self.plan = FormPlan(self.link)
+        self.run = LiveRun(*parts, out, self.bench.note_field)
+        self.monitor = LiveMonitor(*parts)
+        self.manual = LiveManual(*parts)
+        self.queue = Queue(
+            self.link,
+            self.log,
+            lambda: self._free,
+            lambda item: self.start(item.request, item.title, item.expectation),
+        )
+        self._chips = Chips(self.status, self.bench, self.run, self.monitor)
+        self.source: LiveSource | None = None
+        self._after_monitor: tuple[Request, str, Expectation | None] | None = None
+        self.status.faulted.connect(self.queue.hold)
+        self.bench.ready.connect(self.queue.next)
+        self.run.completed.connect(self.queue.next)
+        self.plan.arrived.connect(lambda planned: self.status.changed.emit())
+        self.run.begun.connect(self._show_live)
+        self.monitor.begun.connect(self._show_live)
+        self.monitor.ended.connect(self._start_after_monitor)
 
     # --- what the window asks for
 
     def connect_bench(self, choice: str) -> None:
         """Ask the instruments of a bench ("sim" or a bench file) who they are."""
-        if self.state not in (State.DISCONNECTED, State.READY) or self.manual:
-            return
-        self.bench_choice = choice
-        try:
-            self.spec = load_bench(choice)
-        except (TactileLabError, OSError) as error:
-            self._set_fault(Fault("The bench cannot be used.", str(error)))
-            return
-        self.bench_overrides = ()
-        self._check_request = bench_request(choice, self.spec)
-        self.coil.use(None)
-        self.bench = None
-        self._enter(State.CONNECTING)
-        self.log(Level.INFO, "bench", f"Asking the instruments of {self.spec.name}")
-        self.link.ask(CheckBench(self._check_request))
+        idle = self.state in (State.DISCONNECTED, State.READY)
+        if idle and not self.manual.alive:
+            self.bench.connect_to(choice)
 
     def disconnect_bench(self) -> None:
         """Let go of the bench."""
-        if self.state is State.READY and self.manual is None:
-            self.bench, self.bench_choice, self.spec = None, None, None
-            self.coil.use(None)
-            self._enter(State.DISCONNECTED)
-
-    def enqueue_scene(self, scene: str, title: str) -> str:
-        """Have a scene follow the runs before it; why not, "" if it does."""
-        request = Request(scene, self.bench_overrides, self.bench_choice)
-        try:
-            request.load()
-        except (TactileLabError, OSError) as error:
-            return str(error)
-        self.enqueue(Queued(title, request))
-        return ""
-
-    def plan(self, request: Request) -> None:
-        """Have `request` planned; `planned` tells the result."""
-        self._serial += 1
-        self.link.ask(MakePlan(self._serial, request))
-
-    def make_twin(self, folder: Path) -> None:
-        """Have the twin of a run on disk computed; `twinned` tells the result."""
-        self.desk.ask(MakeTwin(folder))
-
-    def look_at_twin(self, folder: Path, start: float, end: float, bins: int) -> None:
-        """Have that twin sampled between two times, s; `twin_seen` tells the result."""
-        self.desk.ask(LookAtTwin(folder, start, end, bins))
-
-    def fit(self, serial: int, steps: tuple[Finding, ...], seen: Beside) -> None:
-        """Have steps fitted and compared with the model; `fitted` tells the result."""
-        self.desk.ask(FitSteps(serial, steps, seen))
-
-    def stop(self, reason: str = "STOP in the window") -> None:
-        """Coil off, now. Reaches the coil's thread directly and never waits.
-
-        Runs that wait in the queue are held until somebody resumes it.
-        """
-        self._hold_queue()
-        if self.manual is not None:
-            self.manual.stop(reason)
-            self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
-        elif self._run is not None and self._run.alive:
-            self._run.stop(reason)
-            if self.state is State.RUNNING:
-                self._enter(State.ABORTING)
-                self.log(Level.WARNING, "safety", f"{reason}: coil off", safety=True)
-        elif self.monitor.alive:
-            self.monitor.stop()
-            self.log(Level.INFO, "safety", "Monitor off; the coil was not in use")
-        elif self.state is State.READY and self._check_request is not None:
-            self.log(Level.INFO, "safety", "Coil off sent again", safety=True)
-            self._enter(State.CONNECTING)
-            self.link.ask(CheckBench(self._check_request))
-
-    def acknowledge(self) -> None:
-        """The user has read the fault."""
-        if self.state is State.FAULT:
-            self.fault = None
-            known = self.bench is not None
-            self._enter(State.READY if known else State.DISCONNECTED)
-
-    def errand_done(self, answer: str = "") -> None:
-        """The person has done what the run waits for, and typed `answer`."""
-        if self.errand is not None:
-            said = f"Done: {self.errand.text}"
-            if self.errand.current is not None:
-                at = show(self.errand.current, "A")
-                said = f"Typed {answer.replace('-', '−')} at {at}"
-            self.log(Level.INFO, "runner", said)
-            self.errand = None
-            if self._run is not None:
-                self._run.errand_done(answer)
-            self.changed.emit()
-
-    def begin_manual(self) -> None:
-        """Open the coil source to drive it by hand."""
-        request = self._check_request
-        if self.state is not State.READY or self.manual or request is None:
-            return
-        self.monitor.stop()
-        self.manual = self.link.take_coil(request, self.inbox)
-        self.log(Level.WARNING, "coil", "Manual control on", safety=True)
-        self.changed.emit()
-
-    def read_field(self) -> None:
-        """Read the field between runs, or while the coil is driven by hand."""
-        manual, request = self.manual, self._check_request
-        if self.reading_field or self.state is not State.READY or request is None:
-            return
-        if manual is not None:
-            manual.read_field(request)
-        else:
-            self.link.ask(ReadField(0, request))
-        self.reading_field = True
-        self.changed.emit()
+        if self._free:
+            self.bench.let_go()
+            self.status.enter(State.DISCONNECTED)
 
     def set_inputs(self, channels: str) -> str:
         """Set the scope's inputs for all that follows; why not, "" if it went well.
@@ -163,79 +109,153 @@ class Session(Incoming):
         Args:
             channels: ``[[scope.channels]]`` of a bench file as one TOML list.
         """
-        if self.state is not State.READY or not self.bench_choice or not self.spec:
+        if self.state is not State.READY:
             return "The scope's inputs are set between runs."
-        overrides = (f"bench.scope.channels={channels}",)
-        request = bench_request(self.bench_choice, self.spec, overrides)
+        return self.bench.set_inputs(channels)
+
+    def read_field(self) -> None:
+        """Read the field between runs, or while the coil is driven by hand."""
+        if self.state is State.READY:
+            task = self.manual.task
+            self.bench.read_field(0 if task is None else task.number)
+
+    def start(
+        self, request: Request, title: str, expectation: Expectation | None = None
+    ) -> None:
+        """Run `request` now, or as soon as the monitor has let go of the scope.
+
+        Args:
+            request: what to run.
+            title: for people.
+            expectation: its plan; None if nobody planned it.
+        """
+        if not self._free:
+            return
+        if self.monitor.alive:
+            self.monitor.stop("a run begins")
+            self._after_monitor = (request, title, expectation)
+            return
+        self.status.fault, self.source = None, None
+        self.run.start(request, title, expectation)
+        self.status.enter(State.RUNNING)
+
+    def enqueue_scene(self, scene: str, title: str) -> str:
+        """Have a scene follow the runs before it; why not, "" if it does."""
+        request = Request(scene, self.bench.overrides, self.bench.choice)
         try:
-            scene = request.load()
-            assert scene.bench.scope is not None
-            wired = scene.bench.scope.channels
-            check_scope(scene.bench.scope, wired, scene.record.sample_rate)
+            request.load()
         except (TactileLabError, OSError) as error:
             return str(error)
-        self.spec, self.bench_overrides = scene.bench, overrides
-        self._check_request = request
-        words = (f"{one.signal} ±{show(one.range, 'V')}" for one in wired)
-        self.log(Level.INFO, "scope", f"Inputs set: {', '.join(words)}")
-        self.changed.emit()
+        self.queue.add(Queued(title, request))
         return ""
+
+    def begin_manual(self) -> None:
+        """Open the coil source to drive it by hand."""
+        if self._free and self.bench.request is not None:
+            self.monitor.stop("manual control begins")
+            self.manual.start(self.bench.request)
+            self.status.changed.emit()
 
     def watch(self, on: bool) -> None:
         """Show the sensor live between runs, coil off; or stop that."""
         if not on:
-            self.monitor.stop()
-        elif self.state is State.READY and self.manual is None and self.bench_choice:
-            if not self.monitor.alive:
-                self.monitor.start(self.bench_choice, self.bench_overrides)
+            self.monitor.stop("monitor off")
+        elif self._free and self.bench.choice and not self.monitor.alive:
+            self.monitor.start(self.bench.choice, self.bench.overrides)
 
     def record(self) -> None:
         """Keep the last minute of what is watched as a run."""
-        self.monitor.record(self.out, self.notes)
+        self.monitor.record(self.out, self.run.notes)
 
     def note(self, text: str) -> None:
         """A note of the user, stamped with wall-clock and run time."""
-        at = f" (at {self.elapsed:.1f} s)" if self.state is State.RUNNING else ""
-        self.log(Level.NOTE, "note", text + at)
-        if self._run is not None and self._run.alive:
-            self._run.note(text, self.elapsed)
+        at = f" (at {self.run.elapsed:.1f} s)" if self.state is State.RUNNING else ""
+        self.log.add(Level.NOTE, "note", text + at)
+        self.run.note(text)
+
+    def stop(self, reason: str = "STOP in the window") -> None:
+        """Coil off, now. Reaches the coil's thread directly and never waits.
+
+        Runs that wait in the queue are held until somebody resumes it.
+        """
+        self.queue.hold()
+        self._after_monitor = None
+        if self.manual.alive:
+            self.manual.stop(reason)
+            self._log_stop(f"{reason}: coil off", Level.WARNING)
+        elif self.run.alive:
+            self.run.stop(reason)
+            if self.state is State.RUNNING:
+                self.status.enter(State.ABORTING)
+                self._log_stop(f"{reason}: coil off", Level.WARNING)
+        elif self.monitor.alive:
+            self.monitor.stop("monitor off")
+            self._log_stop("Monitor off; the coil was not in use")
+        elif self.state is State.READY and self.bench.request is not None:
+            self._log_stop("Coil off sent again")
+            self.bench.check()
+
+    def acknowledge(self) -> None:
+        """The user has read the fault."""
+        if self.state is State.FAULT:
+            self.status.fault = None
+            known = self.bench.found is not None
+            self.status.enter(State.READY if known else State.DISCONNECTED)
 
     # --- what the window shows
 
     @property
+    def state(self) -> State:
+        """Of the window."""
+        return self.status.state
+
+    @property
     def busy(self) -> bool:
         """Whether closing needs a question first."""
-        live = self._run is not None and self._run.alive
-        running = self.state in (State.RUNNING, State.ABORTING)
-        return live or running or self.manual is not None
+        return self.run.alive or self.state in BUSY or self.manual.alive
+
+    @property
+    def plan_on_screen(self) -> Expectation | None:
+        """The plan of the run in progress, else that of the form."""
+        busy = self.state in BUSY
+        return self.run.expectation if busy else self.plan.expectation
+
+    def coil_view(self) -> CoilView | None:
+        """The coil as it is known now."""
+        coil = self.manual.coil if self.manual.alive else self.run.coil
+        return self.status.coil.view(coil)
 
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""
-        coil = self.coil_view()
-        name = "No bench connected" if self.spec is None else self.spec.name
-        if self.run_name and self.state is not State.DISCONNECTED:
-            name = self.run_name
+        coil, spec = self.coil_view(), self.bench.spec
+        name = "No bench connected" if spec is None else spec.name
+        if self.run.name and self.state is not State.DISCONNECTED:
+            name = self.run.name
         return Snapshot(
             state=self.state,
-            bench="" if self.spec is None else self.spec.name,
-            simulated=self.spec is not None and self.spec.simulated,
+            bench="" if spec is None else spec.name,
+            simulated=spec is not None and spec.simulated,
             title=name,
             coil=coil,
-            instruments=chips.instruments(self, coil),
-            elapsed=self.elapsed,
-            expected=self.expected,
-            manual=self.manual is not None,
-            fault=self.fault,
-            problem=self.plan_problem,
+            instruments=self._chips.views(self.plan_on_screen, coil),
+            elapsed=self.run.elapsed,
+            expected=self.run.expected,
+            manual=self.manual.alive,
+            fault=self.status.fault,
+            problem=self.plan.problem,
         )
+
+    def poll(self) -> bool:
+        """Take all that the engine told; whether samples came too."""
+        self.link.poll()
+        self.desk.poll()
+        return self.source is not None and self.source.take_new()
 
     def wait_for_end(self, timeout: float) -> bool:
         """Block until nothing drives the coil any more, at most `timeout` s."""
         until = time.monotonic() + timeout
-        if self._run is not None:
-            self._run.join(timeout)
-        if self.manual is not None:
-            self.manual.join(max(0.0, until - time.monotonic()))
+        for task in (self.run, self.manual):
+            task.wait_for_end(max(0.0, until - time.monotonic()))
         self.poll()
         return not self.busy
 
@@ -243,3 +263,30 @@ class Session(Incoming):
         """Let go of the engine; nothing drives a coil any more."""
         self.link.close()
         self.desk.close()
+
+    # --- inside
+
+    @property
+    def _free(self) -> bool:
+        """Whether something may begin to use the bench."""
+        ready = self.state is State.READY and not self.manual.alive
+        return ready and self._after_monitor is None
+
+    def _show_live(self, source: LiveSource) -> None:
+        self.source = source
+        self.source_changed.emit(source)
+
+    def _start_after_monitor(self) -> None:
+        wanted, self._after_monitor = self._after_monitor, None
+        if wanted is not None:
+            self.start(*wanted)
+
+    def _log_stop(self, text: str, level: Level = Level.INFO) -> None:
+        self.log.add(level, "safety", text, safety=True)
+
+    def _engine_lost(self, why: str) -> None:
+        self.log.add(Level.ERROR, "engine", f"The engine ended: {why}")
+
+    def _desk_lost(self, why: str) -> None:
+        text = f"Fits and the model beside runs were interrupted: {why}"
+        self.log.add(Level.WARNING, "desk", text)

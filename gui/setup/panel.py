@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout
 
 from gui.look.theme import Theme
 from gui.parts import BAR, IconButton, label, line, stack
-from gui.session.messages import Planned
-from gui.session.request import Request
-from gui.session.session import Queued, Session
+from gui.session.form_plan import Planned
+from gui.session.queue import Queued
+from gui.session.session import Session
 from gui.setup.buttons import Buttons
 from gui.setup.estimate import EstimateView
 from gui.setup.page import Page
@@ -23,6 +23,7 @@ from gui.setup.strip import Strip
 from gui.setup.subject import Subject
 from gui.setup.texts import FieldError
 from gui.state import Snapshot, State, run_problem
+from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 
 LOW = 660
@@ -78,13 +79,11 @@ class SetupPanel(QFrame):
         buttons.save.clicked.connect(self.save)
         buttons.cancel.clicked.connect(self.cancel)
         queue.edited.connect(self.edit)
-        queue.removed.connect(lambda item: session.unqueue(session.queue.index(item)))
-        queue.moved.connect(
-            lambda item, by: session.move_queued(session.queue.index(item), by)
-        )
-        queue.resumed.connect(session.resume_queue)
-        session.queue_changed.connect(self._show_queue)
-        session.planned.connect(self._planned)
+        queue.removed.connect(session.queue.remove)
+        queue.moved.connect(session.queue.move)
+        queue.resumed.connect(session.queue.resume)
+        session.queue.changed.connect(self._show_queue)
+        session.plan.arrived.connect(self._planned)
 
     # --- scenes ---------------------------------------------------------------------
 
@@ -118,18 +117,20 @@ class SetupPanel(QFrame):
             self._show_problem(self.form.problem)
             return
         try:
-            self._session.plan(self.request())
+            self._session.plan.make(self.request())
         except FieldError as error:
             self._show_problem(str(error))
 
     def start(self) -> None:
         """Run what the form says, as soon as that is planned."""
         if not self._blocked() and self._is_planned(self.start):
-            self._session.start(self.request(), self.title, self._session.expectation)
+            self._session.start(
+                self.request(), self.title, self._session.plan.expectation
+            )
 
     def start_when_planned(self) -> None:
         """Have the plan that is being computed run, unless something is in its way."""
-        self._session.expectation = None
+        self._session.plan.expectation = None
         self._once_planned = self.start
 
     def enqueue(self) -> None:
@@ -137,8 +138,8 @@ class SetupPanel(QFrame):
         if self.subject.edited is not None:
             self.save()
         elif not self._unusable and self._is_planned(self.enqueue):
-            expectation = self._session.expectation
-            self._session.enqueue(Queued(self.title, self.request(), expectation))
+            expectation = self._session.plan.expectation
+            self._session.queue.add(Queued(self.title, self.request(), expectation))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show as much of the queue as leaves room for the form."""
@@ -155,13 +156,13 @@ class SetupPanel(QFrame):
 
     def save(self) -> None:
         """Replace the edited run's parameters, as soon as they are planned."""
-        item, plan = self.subject.edited, self._session.expectation
+        item, plan = self.subject.edited, self._session.plan.expectation
         if item is None or self._unusable or not self._is_planned(self.save):
             return
         assert plan is not None
         request = self.request()
         self.subject.leave()
-        self._session.replace_queued(item, request, plan)
+        self._session.queue.replace(item, request, plan)
         self.queue.focus_on(item)
 
     def cancel(self) -> None:
@@ -206,21 +207,21 @@ class SetupPanel(QFrame):
     @property
     def _unusable(self) -> str:
         """Why the form cannot be used, "" if it can."""
-        return self.form.problem or self._session.plan_problem
+        return self.form.problem or self._session.plan.problem
 
     def _blocked(self) -> str:
         """Why a run cannot start now, "" if it can."""
         if self.subject.edited is not None:
             return "Save or cancel the changes to the queued run first."
         problem = self._unusable
-        if not problem and self._session.expectation is None:
+        if not problem and self._session.plan.expectation is None:
             problem = "The plan is being computed."
         return run_problem(self._snapshot, form_problem=problem)
 
     def _is_planned(self, then: Callable[[], None]) -> bool:
         """Whether the plan is that of the form; if not, `then` follows it."""
         planned = self._planned_for == self.request()
-        if not planned or self._session.expectation is None:
+        if not planned or self._session.plan.expectation is None:
             self.plan_now()
             self._once_planned = then
             return False
@@ -241,7 +242,7 @@ class SetupPanel(QFrame):
             then()
 
     def _show_problem(self, problem: str) -> None:
-        self._session.plan_problem = problem
+        self._session.plan.problem = problem
         self.problem.setText(problem)
         self.problem.setVisible(bool(problem))
         if problem:
@@ -269,7 +270,7 @@ class SetupPanel(QFrame):
     def _show_queue(self) -> None:
         session = self._session
         self.queue.show_queue(
-            session.queue, held=session.queue_held, edited=self.subject.edited
+            session.queue.items, held=session.queue.held, edited=self.subject.edited
         )
         self.render_snapshot(self._snapshot)
 
@@ -277,7 +278,7 @@ class SetupPanel(QFrame):
         """Whether the form holds what the run in progress was asked to do."""
         if self.subject.edited is not None or self.form.problem:
             return False
-        return self.request() == self._session.running_request
+        return self.request() == self._session.run.request
 
     def _picked(self, scene: str) -> None:
         try:

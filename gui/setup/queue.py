@@ -17,7 +17,7 @@ from gui.parts import (
     row,
     scrolling,
 )
-from gui.session.session import Queued
+from gui.session.queue import Queued
 from gui.setup.estimate import words_of
 from gui.state import minutes
 

@@ -40,7 +40,7 @@ class Strip(QLabel):
             locked: whether a run is in progress.
             shown: whether that run is the one in the form.
         """
-        item, queue = subject.edited, session.queue
+        item, queue = subject.edited, session.queue.items
         if item is not None:
             place = f"{queue.index(item) + 1} of {len(queue)} in the queue"
             self.say(f"Editing {item.title}, {place}")
@@ -49,7 +49,7 @@ class Strip(QLabel):
         elif locked and shown:
             self.say("The run in progress · locked")
         elif locked:
-            name = session.running_title
+            name = session.run.title
             self.say(f"Your next run · locked while {name} is in progress")
         else:
             self.say("")

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from gui.session.request import Request
-from gui.session.session import Queued, Session
+from gui.session.queue import Queued
+from gui.session.session import Session
 from gui.setup.form import Form
+from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
@@ -43,7 +44,7 @@ class Subject(QObject):
         self._session, self._form = session, form
         self._before = Kept(None, None, {})
         self._taken_up: dict[str, str] = {}
-        session.queue_changed.connect(self._mind_queue)
+        session.queue.changed.connect(self._mind_queue)
 
     def open(self, path: str | None, overrides: tuple[str, ...] = ()) -> None:
         """Fill the form with a scene; an edit of a queued run is given up.
@@ -65,8 +66,8 @@ class Subject(QObject):
         """
         session, texts = self._session, self._form.overrides()
         if self.edited is None:
-            overrides = (*texts, *session.bench_overrides)
-            return Request(self.path, overrides, session.bench_choice)
+            overrides = (*texts, *session.bench.overrides)
+            return Request(self.path, overrides, session.bench.choice)
         asked = self.edited.request
         rest = [text for text in asked.overrides if not text.startswith("protocol.")]
         return Request(asked.path, (*texts, *rest), asked.bench)
@@ -116,7 +117,7 @@ class Subject(QObject):
     def _mind_queue(self) -> None:
         """An edited run that has left the queue: what was changed stays in the form."""
         item = self.edited
-        if item is None or item in self._session.queue:
+        if item is None or item in self._session.queue.items:
             return
         words = f"{item.title} {item.left}."
         if self.touched:

@@ -33,7 +33,7 @@ class Ending:
     """How a run ended.
 
     Attributes:
-        state: complete, aborted or faulted.
+        state: complete, aborted or faulted; refused or lost where an engine was asked.
         off: how the coil was left.
         reason: why it ended early; None if complete.
         failure: the error behind a fault.
@@ -46,6 +46,12 @@ class Ending:
     failure: BaseException | None = None
     signal: int | None = None
 
+    @classmethod
+    def refused(cls, reason: str) -> Ending:
+        """The end of what was never begun."""
+        off = OffReport(True, None, "No instrument was opened.")
+        return cls(RunState.REFUSED, off, reason)
+
     def faulted_by(self, failure: Exception) -> Ending:
         """The same end where something failed after it; an earlier fault stays."""
         if self.state is RunState.FAULTED:
@@ -56,11 +62,13 @@ class Ending:
 
     @property
     def exit_code(self) -> int:
-        """0 complete, 3 faulted, 4 safe state not verified, 128 + signal."""
+        """0 complete, 2 refused, 3 faulted, 4 safe state not verified, 128 + signal."""
         if not self.off.verified:
             return 4
         if self.state is RunState.COMPLETE:
             return 0
+        if self.state is RunState.REFUSED:
+            return 2
         if self.signal is not None:
             return 128 + self.signal
         return 130 if self.state is RunState.ABORTED else 3

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 
 from tactile_lab.trial import Outcome, Trial
 
@@ -25,9 +24,8 @@ class RunState(StrEnum):
     COMPLETE = "complete"
     ABORTED = "aborted"
     FAULTED = "faulted"
-
-
-ENDED = frozenset({RunState.COMPLETE, RunState.ABORTED, RunState.FAULTED})
+    REFUSED = "refused"
+    LOST = "lost"
 
 
 @dataclass(frozen=True)
@@ -36,13 +34,6 @@ class StateChanged:
 
     state: RunState
     text: str
-
-
-@dataclass(frozen=True)
-class FolderMade:
-    """The run's folder exists from now on."""
-
-    folder: Path
 
 
 @dataclass(frozen=True)
@@ -118,7 +109,6 @@ class Message:
 
 Event = (
     StateChanged
-    | FolderMade
     | TrialStarted
     | TrialEnded
     | Progress

@@ -119,7 +119,6 @@ class Execution(Task[Executed]):
             RecordingError: the run could not be begun in its folder.
         """
         began = time.monotonic()
-        self._emit(events.FolderMade(self.folder.path))
         keep_scene(self.folder, self.scene)
         self._runner = runner = Runner(
             self._program(),

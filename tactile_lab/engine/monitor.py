@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from tactile_lab.acquisition import events
@@ -23,6 +22,7 @@ from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
+from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
 from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.plan import plan
@@ -34,48 +34,10 @@ from tactile_lab.store.recorder import Recorder
 from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
 
-KEPT = 60.0
-"""How much is held for `record`, s."""
 MOST = 1_000_000_000
 """Bytes that may be held."""
 LOOK = 0.5
 """Length of the record that the sensor's state is told from, s."""
-SILENT = 2.0
-"""Time without a spike after which the rate counts as 0, s."""
-
-
-@dataclass(frozen=True)
-class SensorState:
-    """The sensor at rest, just now.
-
-    Attributes:
-        critical_V_C1: the sensor fires below it, V.
-        V_C1, V_C2: mean of the newest samples, V; None before there is any.
-        rate: of the last two spikes, Hz; 0 where they are long ago.
-        held: how much `record` would keep, s.
-    """
-
-    critical_V_C1: float
-    V_C1: float | None = None
-    V_C2: float | None = None
-    rate: float = 0.0
-    held: float = 0.0
-
-    @property
-    def distance(self) -> float | None:
-        """V_C1 less the critical one, V; above 0 the sensor is silent."""
-        return None if self.V_C1 is None else self.V_C1 - self.critical_V_C1
-
-    def __str__(self) -> str:
-        """For a person who trims V_GS."""
-        if self.V_C1 is None or self.distance is None:
-            return "no V_C1 yet"
-        side = "above threshold: silent" if self.distance > 0 else "below it: fires"
-        second = "" if self.V_C2 is None else f"  V_C2 {self.V_C2:.3f} V"
-        return (
-            f"V_C1 {self.V_C1:.3f} V, {1e3 * abs(self.distance):.0f} mV {side}{second}"
-            f"  {self.rate:.2f} Hz"
-        )
 
 
 class Monitor(Task[Ending]):

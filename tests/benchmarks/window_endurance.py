@@ -17,10 +17,10 @@ from pathlib import Path
 from window_frames import Bench, memory
 
 from gui.app import begin
-from gui.session.request import Request
 from gui.state import State
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
+from tactile_lab.engine.request import Request
 
 HOUR = """
 [protocol]
@@ -45,7 +45,7 @@ def endurance(seconds: float, folder: Path) -> None:
     bench = Bench(folder, realtime=False)
     session = bench.session
     begin(bench.window, None, "sim")
-    bench.until(lambda: session.state is State.READY and session.expectation, 120)
+    bench.until(lambda: session.state is State.READY and session.plan.expectation, 120)
     (folder / "hour.toml").write_text(HOUR.format(seconds=seconds))
     request = Request(str(folder / "hour.toml"), (), "sim")
     session.start(request, "hour")
@@ -67,7 +67,7 @@ def endurance(seconds: float, folder: Path) -> None:
             f"{now[1]:.0f} ({now[1] - first[1]:+.0f}) |"
         )
     bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
-    fault = "" if session.fault is None else f": {session.fault.title}"
+    fault = "" if session.status.fault is None else f": {session.status.fault.title}"
     bench.say(
         f"Then {session.state.value} {fault}, {session.source.spikes.size} spikes."
     )
@@ -80,7 +80,7 @@ def faults(folder: Path) -> None:
     bench = Bench(folder, separate=False)
     session, window = bench.session, bench.window
     begin(window, None, "sim")
-    bench.until(lambda: session.state is State.READY and session.expectation, 120)
+    bench.until(lambda: session.state is State.READY and session.plan.expectation, 120)
     endings = []
     for name, fault in SLOW.items():
         window.setup.start()
@@ -93,7 +93,9 @@ def faults(folder: Path) -> None:
         session.stop("enough")
         bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
         bench.until(lambda: not session.busy, 60)
-        said = "" if session.fault is None else f" · {session.fault.title}"
+        said = (
+            "" if session.status.fault is None else f" · {session.status.fault.title}"
+        )
         bench.report(name)
         words = f"{session.state.value}{said} · {window.header.stop.words.spoken}"
         endings.append(f"{name}: {words}")

@@ -29,13 +29,13 @@ from gui.app import application, begin
 from gui.lanes.expected import Hold
 from gui.lanes.source import LiveSource
 from gui.look.theme import Theme
-from gui.session.messages import Samples, Told
 from gui.session.session import Session
 from gui.state import State
 from gui.window import Window
 from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.live import Live
 from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.engine.events import Samples, TaskEvent
 from tactile_lab.trace import Trace
 
 OFF = CoilState(False, None, None, None)
@@ -55,7 +55,7 @@ class Bench:
         theme = Theme("light")
         theme.apply()
         self.session = Session(out, **how)
-        self.session.reports = False
+        self.session.run.reports = False
         self.window = Window(self.session, theme)
         self.window.resize(1720, 1080)
         self.window.show()
@@ -125,7 +125,7 @@ class Bench:
 
 
 def emulated(
-    tell: Callable[[Told], None], seconds: float, rate: float = 7.8125e6
+    tell: Callable[[TaskEvent], None], seconds: float, rate: float = 7.8125e6
 ) -> threading.Thread:
     """Decimate four channels at `rate` as the runner does, in this very process."""
     live = Live()
@@ -197,7 +197,7 @@ def main(seconds: float) -> None:
         begin(window, None, None)
         bench.app.processEvents()
         bench.say(f"A usable window {lived():.2f} s after the start of Python.")
-        bench.until(lambda: session.expectation, 120)
+        bench.until(lambda: session.plan.expectation, 120)
         bench.clear()
         session.connect_bench("sim")
         bench.until(lambda: session.state is State.READY, 120)
@@ -220,7 +220,9 @@ def main(seconds: float) -> None:
         source.holds.append(Hold(0.0, 1e9, "emulated"))
         window.centre.stack.show_source(source)
         window.centre.view.set_follow(True)
-        emulated(session.inbox.put, seconds + 0.5)
+        session.run.source = source
+        heard = session.link._inbox.put
+        emulated(lambda told: heard((session.run.take, told)), seconds + 0.5)
         bench.until(lambda: source.reach > 0.2, 5)
         bench.measure("4 x 7.8125 MS/s emulated", seconds)
         session.source = source = LiveSource(None, 0.2)

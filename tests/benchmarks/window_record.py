@@ -21,9 +21,9 @@ from window_frames import Bench, memory
 
 from gui.app import begin
 from gui.lanes.stored import RunSource
-from gui.session.request import Request
 from gui.state import State
 from tactile_lab.engine.execution import Execution
+from tactile_lab.engine.request import Request
 
 PULSE = 4.5
 """One pulse of the scene with its ramps and its rest, s."""
@@ -123,7 +123,9 @@ def main() -> None:
         bench = Bench(Path(out))
         session = bench.session
         begin(bench.window, None, "sim")
-        bench.until(lambda: session.state is State.READY and session.expectation, 120)
+        bench.until(
+            lambda: session.state is State.READY and session.plan.expectation, 120
+        )
         bench.measure("idle", 3.0)
         source = opened(bench, folder, what)
         zoomed(bench, source, options.pictures)

@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QApplication
 
 from gui.app import application, begin
 from gui.look.theme import Theme
-from gui.session.request import Request
 from gui.session.session import Session
 from gui.state import State
 from gui.window import Window
+from tactile_lab.engine.request import Request
 
 LONGEST = 90.0
 """Seconds a condition is waited for: a busy machine is slow, not wrong."""
@@ -62,17 +62,17 @@ class Lab:
     def until(self, done: Callable[[], object], longest: float = LONGEST) -> None:
         end = time.monotonic() + longest
         while not done():
-            assert time.monotonic() < end, [line.text for line in self.session.lines][
-                -6:
-            ]
+            assert time.monotonic() < end, [
+                line.text for line in self.session.log.lines
+            ][-6:]
             self.app.processEvents()
             time.sleep(0.002)
 
     def ready(self) -> None:
         """Bench connected, plan there, nothing running, left-overs gone."""
         session, window = self.session, self.window
-        while session.queue:
-            session.unqueue(0)
+        while session.queue.items:
+            session.queue.remove(session.queue.items[0])
         window.closing.hide()
         window.activateWindow()  # another test may have had a window of its own
         self.until(window.isActiveWindow)
@@ -80,7 +80,7 @@ class Lab:
             session.stop("test is over")
         session.watch(False)
         self.until(lambda: not session.busy and not session.monitor.alive)
-        self.until(session.inbox.empty)
+        self.until(lambda: session.link.idle)
         session.acknowledge()
         if session.state is State.DISCONNECTED:
             session.connect_bench("sim")
@@ -88,10 +88,10 @@ class Lab:
         window.opening.close_run()
         wanted = str(self.folder / "short.toml")
         texts = window.setup.form.texts()
-        if session.expectation is None or texts != self.texts:
+        if session.plan.expectation is None or texts != self.texts:
             window.opening.open_scene(wanted)
-            session.expectation = None
-            self.until(lambda: session.expectation is not None)
+            session.plan.expectation = None
+            self.until(lambda: session.plan.expectation is not None)
             self.texts = window.setup.form.texts()
         window.setup.plan_now()
 
@@ -105,15 +105,15 @@ class Lab:
     def complete_run(self) -> Path:
         """The form's run from start to end; its folder."""
         session = self.session
-        before = session.folder
+        before = session.run.folder
         self.window.setup.run.click()
         assert session.state is State.RUNNING
         self.until(lambda: session.state in (State.READY, State.FAULT))
-        assert session.state is State.READY, session.fault
+        assert session.state is State.READY, session.status.fault
         self.until(lambda: not session.busy)
-        assert session.folder is not None and session.folder != before
-        self.complete.append(session.folder)
-        return session.folder
+        assert session.run.folder is not None and session.run.folder != before
+        self.complete.append(session.run.folder)
+        return session.run.folder
 
     def runs(self, count: int) -> list[Path]:
         """Folders of that many complete runs; only missing ones are run."""
@@ -138,7 +138,7 @@ def opened(
     theme = Theme("light")
     theme.apply()
     session = Session(folder / "runs", separate=False, realtime=False)
-    session.reports = False
+    session.run.reports = False
     window = Window(session, theme)
     window.show()
     begin(window, str(folder / "short.toml"), "sim")
@@ -147,8 +147,8 @@ def opened(
     if session.busy:
         session.stop("tests are over")
         session.wait_for_end(LONGEST)
-    lab.until(session.inbox.empty)
-    session.fault = None
+    lab.until(lambda: session.link.idle)
+    session.status.fault = None
     window.close()
     session.close()
     window.deleteLater()

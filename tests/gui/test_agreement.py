@@ -21,31 +21,33 @@ def test_spikes_are_expected_before_a_run_and_the_residual_is_told_after(lab) ->
     window.render_state()
     assert "spikes expected" in model_chip(lab).value.text()
     lab.complete_run()
-    lab.until(lambda: session.agreement is not None and session.agreement.in_step)
+    lab.until(
+        lambda: session.run.agreement is not None and session.run.agreement.in_step
+    )
     window.render_state()
-    chip, text = model_chip(lab), session.agreement.text
+    chip, text = model_chip(lab), session.run.agreement.text
     assert chip.value.text() == f"NRMSE {text}"
     assert f"V_C1 {text}" in window.review.results.bars.accessibleName(), "one number"
     assert "in step" in chip.accessibleName()
     assert chip.lamp is Lamp.GOOD
     window.opening.close_run()
-    assert session.agreement is None
+    assert session.run.agreement is None
 
 
 def test_a_model_beside_the_run_is_told_by_shape_and_word(lab) -> None:
-    lab.session.agreement = Agreement(error=0.083, rms=0.09)
+    lab.session.run.agreement = Agreement(error=0.083, rms=0.09)
     lab.window.render_state()
     chip = model_chip(lab)
     assert chip.lamp is Lamp.WARNING
     assert "beside the run" in chip.accessibleName()
     assert chip.value.text() == "NRMSE 8.3 %"
-    lab.session.agreement = None
+    lab.session.run.agreement = None
 
 
 def test_a_run_is_compared_between_two_steps_too(lab) -> None:
     """The run of an hour has one step, which does not end."""
     lab.run()
-    lab.until(lambda: lab.session.agreement is not None)
+    lab.until(lambda: lab.session.run.agreement is not None)
     assert lab.window.opening.gathering.findings == []
 
 

@@ -22,11 +22,13 @@ from gui.dialogs.bench_text import (
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import Instruments
 from gui.review.conclusion import conclusion_of
-from gui.session.link import RunAfar
-from gui.session.messages import Errand
-from gui.session.request import Request
 from gui.state import Fault, State
 from sim_backend.serve import ServedBench
+from tactile_lab.acquisition.ending import Ending
+from tactile_lab.engine.commands import Answer
+from tactile_lab.engine.events import Ended, PersonAsked
+from tactile_lab.engine.link import RemoteTask
+from tactile_lab.engine.request import Request
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
@@ -152,11 +154,11 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     assert not dialog.wiring.check.isEnabled()
     lab.until(lambda: asked)
     assert asked[0].path == "wiring_check" and asked[0].bench == "sim"
-    session.trial = (0, "rest")
-    session._enter(State.RUNNING)
+    session.run.trial = (0, "rest")
+    session.status.enter(State.RUNNING)
     assert dialog.wiring.progress.text().startswith("Step 1: rest")
-    session.fault = Fault("The coil source is gone.", "Coil off.")
-    session._enter(State.FAULT)
+    session.status.fault = Fault("The coil source is gone.", "Coil off.")
+    session.status.enter(State.FAULT)
     assert dialog.wiring.progress.text() == "The coil source is gone."
     session.acknowledge()
     assert dialog.wiring.check.isEnabled()
@@ -166,7 +168,7 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
         lab.folder / "checked", "wiring_check", conclusion={"channels": said},
         statements=["V_C1: as wired, 4.35 V at rest.", "V_C1: 3 mV of 50 Hz hum."],
     )  # fmt: skip
-    session.reported.emit(made)
+    session.run.reported.emit(made)
     assert dialog.wiring.verdicts == [
         "V_C1 as wired: 4.35 V at rest",
         "V_C2 WRONG: 0 V at rest: open probe",
@@ -179,29 +181,27 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
 
 def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     window, session = lab.window, lab.session
-    done: list[str] = []
-    run = RunAfar(session.link, 0, session.inbox)
-    run.errand_done = done.append
-    session._run = run
-    session._enter(State.RUNNING)
-    session.inbox.put(Errand("Put the probes on 0 V."))
-    lab.until(window.errand.isVisible)
-    assert "0 V" in window.errand.text.text()
-    assert window.errand.entry.isHidden(), "there is nothing to type"
-    window.errand.done.click()
-    assert done == [""] and not window.errand.isVisible()
-    session.inbox.put(Errand("Put them on V_S."))
-    lab.until(window.errand.isVisible)
-    session._run = None
-    session._enter(State.READY)
-    assert not window.errand.isVisible(), "a run that ended waits for nobody"
+    done: list[object] = []
+    session.run.task = RemoteTask(0, done.append)
+    session.status.enter(State.RUNNING)
+    session.run.take(PersonAsked("Put the probes on 0 V."))
+    lab.until(window.question.isVisible)
+    assert "0 V" in window.question.text.text()
+    assert window.question.entry.isHidden(), "there is nothing to type"
+    window.question.done.click()
+    assert done == [Answer("")] and not window.question.isVisible()
+    session.run.take(PersonAsked("Put them on V_S."))
+    lab.until(window.question.isVisible)
+    session.run.take(Ended(Ending.refused("stopped at the bench")))
+    session.acknowledge()
+    assert not window.question.isVisible(), "a run that ended waits for nobody"
 
 
 def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:
     window, session = lab.window, lab.session
     window.actions_.connect_dialog()
     dialog = window.findChild(Connect)
-    session.reported.emit(
+    session.run.reported.emit(
         concluded(lab.folder / "none", "calibrate_field", statements=["No."])
     )
     assert dialog.calibration.use.isHidden(), "without a file there is nothing to use"
@@ -209,11 +209,11 @@ def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:
     (made / "calibration.csv").write_text(
         "current_A,field_T\n-1,-0.009\n0,0\n1,0.009\n"
     )
-    session.reported.emit(made)
+    session.run.reported.emit(made)
     assert not dialog.calibration.use.isHidden()
     assert dialog.use_calibration(made / "calibration.csv", lab.folder / "own.toml")
     lab.until(lambda: session.state is State.READY)
-    magnet = session.spec.magnet
+    magnet = session.bench.spec.magnet
     assert magnet.calibration is not None and abs(magnet.calibration.most - 1) < 1e-9
     assert "own-field.csv" in dialog.calibration.named.text()
     dialog.hide()
@@ -262,7 +262,7 @@ def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     dialog.instruments.coil_port.setCurrentText("/dev/not-there")
     assert dialog.save_to(lab.folder / "absent.toml")
     lab.until(lambda: session.state is State.FAULT)
-    assert "not-there" in session.fault.consequence
+    assert "not-there" in session.status.fault.consequence
     window.banner.acknowledge.click()
     assert session.state is State.DISCONNECTED
     assert window.centre.empty.isVisible()
@@ -275,17 +275,20 @@ def calibrating(lab) -> Iterator:
     short = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
     request = Request("calibrate_field", short, str(lab.folder / "by-hand.toml"))
     lab.session.start(request, "Calibration")
-    lab.until(lambda: lab.window.errand.isVisible() or lab.session.fault)
+    lab.until(lambda: lab.window.question.isVisible() or lab.session.status.fault)
     yield lab
-    lab.session.source, lab.session.expectation = None, None  # the plan is shown again
+    lab.session.source, lab.session.plan.expectation = (
+        None,
+        None,
+    )  # the plan is shown again
 
 
 def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
     lab = calibrating
-    session, card = lab.session, lab.window.errand
+    session, card = lab.session, lab.window.question
     asked: list[float] = []
     while session.state is State.RUNNING:
-        errand = session.errand
+        errand = session.run.asked
         assert not card.doubt.text() or card.doubt.isHidden()
         asked.append(errand.current)
         held = card.coil.text().replace("\u00a0", " ")
@@ -294,11 +297,11 @@ def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
         assert not card.done.isEnabled(), "nothing is typed yet"
         QTest.keyClicks(card.entry, f"{10.8 * errand.current:.2f}")
         QTest.keyClick(card.entry, Qt.Key.Key_Return)
-        lab.until(lambda: session.errand or session.state is not State.RUNNING)
+        lab.until(lambda: session.run.asked or session.state is not State.RUNNING)
     lab.until(lambda: not session.busy)
-    assert session.fault is None
+    assert session.status.fault is None
     assert asked[:5] == pytest.approx([1.0, 0.5, 0.0, -0.5, -1.0])
-    with Run.load(session.folder) as run:
+    with Run.load(session.run.folder) as run:
         assert run.field["field"] == pytest.approx([10.8e-3 * i for i in asked])
     assert card.isHidden() and session.coil_view().verified_off
 
@@ -307,15 +310,15 @@ def test_what_is_no_field_is_not_sent_and_what_is_doubted_asked_again(
     calibrating,
 ) -> None:
     lab = calibrating
-    session, card = lab.session, lab.window.errand
+    session, card = lab.session, lab.window.question
     card.entry.setText("10.8 A")
     assert not card.done.isEnabled() and "A" in card.understood.text()
     QTest.keyClick(card.entry, Qt.Key.Key_Return)
-    assert session.errand is not None
+    assert session.run.asked is not None
     card.entry.setText("−8000 µT")
     assert card.understood.text() == "= −8 mT" and card.done.isEnabled()
     card.done.click()
-    lab.until(lambda: session.errand is not None)
+    lab.until(lambda: session.run.asked is not None)
     assert "check sign" in card.doubt.text() and card.doubt.isVisible()
     assert "−8 mT at 1 A" in card.before.text()
     assert card.entry.text() == "", "a second Enter alone confirms nothing"

@@ -14,21 +14,16 @@ import pytest
 from benches import SERVED
 from PySide6.QtWidgets import QApplication
 
-from gui.session.commands import (
-    ReadField,
-    RenewLease,
-    SetCoil,
-    StartRun,
-    StopRun,
-    TakeCoil,
-)
-from gui.session.engine import Engine
-from gui.session.messages import CoilByHand, FieldByHand, HandOff, Samples
-from gui.session.request import Request
 from gui.session.session import Session
-from gui.session.threads import start
 from gui.state import State, Truth, truth
 from sim_backend.serve import ServedBench
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.engine.commands import BeginManual, BeginRun, Hold, Renew, Stop
+from tactile_lab.engine.engine import Engine, Reply
+from tactile_lab.engine.events import Ended, Samples
+from tactile_lab.engine.jobs import ReadField
+from tactile_lab.engine.request import Request
+from tactile_lab.engine.threads import start
 
 LONGEST = 90.0
 SCENE = """
@@ -60,7 +55,7 @@ def test_window_that_has_gone_leaves_coil_off_and_record_complete(
 ) -> None:
     ours, theirs = Pipe()
     serving = start(Engine(theirs, realtime=False).serve, "engine")
-    ours.send(StartRun(1, request_, tmp_path / "runs", report=False))
+    ours.send((1, BeginRun(request_, tmp_path / "runs")))
     live = False
     while not live:
         assert ours.poll(LONGEST), "the engine tells nothing"
@@ -85,7 +80,7 @@ def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
     def until(done: Callable[[], object]) -> None:
         end = time.monotonic() + LONGEST
         while not done():
-            assert time.monotonic() < end, [line.text for line in session.lines]
+            assert time.monotonic() < end, [line.text for line in session.log.lines]
             session.poll()
             time.sleep(0.005)
 
@@ -116,7 +111,7 @@ class Source:
     """A current source at a port of its own: it outlives window and engine."""
 
     def __init__(self, folder: Path) -> None:
-        self.log = folder / "changes.jsonl"
+        self.log = folder / "deeds.jsonl"
         self.served = ServedBench(coil="pty", log=self.log)
         self.served.start()
         row = resources.files("tactile_lab.instruments").joinpath(
@@ -134,8 +129,8 @@ class Source:
         """Whether the output is on, from what the source was told."""
         told = self.log.read_text()
         whole = told[: told.rfind("\n") + 1]
-        changes = [json.loads(line) for line in whole.splitlines()]
-        return bool([d["value"] for d in changes if d["what"] == "output"][-1])
+        deeds = [json.loads(line) for line in whole.splitlines()]
+        return bool([d["value"] for d in deeds if d["what"] == "output"][-1])
 
 
 @pytest.fixture
@@ -165,12 +160,12 @@ def hears(
         number, told = pipe.recv()
         if wanted(told):
             return told
-        if lives and isinstance(told, CoilByHand):
-            pipe.send(RenewLease(number))
+        if lives and isinstance(told, Samples):
+            pipe.send((number, Renew()))
 
 
 def flows(told: object) -> bool:
-    return isinstance(told, CoilByHand) and abs((told.coil.measured or 0) - 0.1) < 2e-3
+    return isinstance(told, Samples) and abs((told.coil.measured or 0) - 0.1) < 2e-3
 
 
 @pytest.fixture
@@ -187,31 +182,33 @@ def pipe() -> Iterator[Connection]:
 def test_window_that_hangs_loses_the_coil_by_hand(
     pipe: Connection, source: Source
 ) -> None:
-    pipe.send(TakeCoil(1, source.request))
-    pipe.send(SetCoil(1, 0.1))
-    off = hears(pipe, lambda told: isinstance(told, HandOff), lives=False)
-    assert off.off.verified and "sign of life" in off.problem
+    pipe.send((1, BeginManual(source.request)))
+    pipe.send((1, Hold(0.1)))
+    ended = hears(pipe, lambda told: isinstance(told, Ended), lives=False).ending
+    assert ended.state is RunState.FAULTED
+    assert ended.off.verified and "sign of life" in ended.reason
     assert not source.output
 
 
 def test_stop_by_hand_is_verified_and_field_is_read(pipe: Connection) -> None:
     request = Request("demo", ('record.signals=["force", "field"]',), "sim")
-    pipe.send(TakeCoil(1, request))
-    pipe.send(SetCoil(1, 0.1))
+    pipe.send((1, BeginManual(request)))
+    pipe.send((1, Hold(0.1)))
     hears(pipe, flows)
-    pipe.send(StopRun(1, "enough"))
-    off = hears(pipe, lambda told: isinstance(told, HandOff))
-    assert off.off.verified and off.problem == ""
-    pipe.send(ReadField(0, request))
-    read = hears(pipe, lambda told: isinstance(told, FieldByHand))
+    pipe.send((1, Stop("enough")))
+    ended = hears(pipe, lambda told: isinstance(told, Ended)).ending
+    assert ended.state is RunState.ABORTED and ended.reason == "enough"
+    assert ended.off.verified
+    pipe.send((2, ReadField(request)))
+    read = hears(pipe, lambda told: isinstance(told, Reply)).value
     assert abs(read.mean) < 1e-4
 
 
 def test_window_that_has_gone_leaves_the_coil_by_hand_off(source: Source) -> None:
     ours, theirs = Pipe()
     serving = start(Engine(theirs).serve, "engine")
-    ours.send(TakeCoil(1, source.request))
-    ours.send(SetCoil(1, 0.1))
+    ours.send((1, BeginManual(source.request)))
+    ours.send((1, Hold(0.1)))
     hears(ours, flows)
     assert source.output
     ours.close()
@@ -233,7 +230,7 @@ def test_engine_that_dies_by_hand_is_switched_off_by_its_guard(
     assert source.output and truth(session.state, session.coil_view()) is Truth.LIVE
     os.kill(session.link.pid, signal.SIGKILL)
     wait_for(lambda: session.state is State.FAULT, session.poll)
-    assert session.manual is None and not session.busy
+    assert not session.manual.alive and not session.busy
     assert truth(session.state, session.coil_view()) is Truth.UNKNOWN
     wait_for(lambda: not source.output, session.poll)
     session.close()

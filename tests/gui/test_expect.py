@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gui.session.expect import expect
+from gui.session.expectation import expect
 from tactile_lab.quantity import parse
 from tactile_lab.scene.load import load
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 from gui.look.theme import Theme
 from gui.record.log import LogView
 from gui.record.log_table import MESSAGE, ROW
-from gui.session.messages import Level, Line
+from gui.session.log import Level, Line
 
 LONG = "The coil source does not answer within 0.3 s. " * 9
 

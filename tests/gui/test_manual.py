@@ -2,10 +2,13 @@
 
 from PySide6.QtTest import QTest
 
-from gui.session.link import HandAfar
-from gui.session.messages import CoilByHand, HandOff
 from gui.state import State, Truth, truth
-from tactile_lab.acquisition.ending import CoilState
+from tactile_lab.acquisition.ending import CoilState, Ending
+from tactile_lab.acquisition.events import CoilCurrent, RunState
+from tactile_lab.bench import OffReport
+from tactile_lab.engine.commands import Renew
+from tactile_lab.engine.events import Ended, Samples
+from tactile_lab.engine.link import RemoteTask
 
 
 def test_inputs_are_set_for_all_that_follows(lab) -> None:
@@ -17,19 +20,19 @@ def test_inputs_are_set_for_all_that_follows(lab) -> None:
     card.coupling.setCurrentText("AC")
     inputs.use.click()
     assert inputs.problem == ""
-    channel = next(c for c in session.spec.scope.channels if c.signal == "V_C1")
+    channel = next(c for c in session.bench.spec.scope.channels if c.signal == "V_C1")
     assert (channel.range, channel.offset, channel.coupling) == (5.0, 0.0, "AC")
     scene = window.setup.request().load()
     planned = next(c for c in scene.bench.scope.channels if c.signal == "V_C1")
     assert planned == channel, "the next run has them, and so has its command line"
     session.connect_bench("sim")
     lab.until(lambda: session.state is State.READY)
-    assert session.bench_overrides == (), "another bench has its own"
+    assert session.bench.overrides == (), "another bench has its own"
 
 
 def test_unusable_inputs_change_nothing_and_say_why(lab) -> None:
     window, session = lab.window, lab.session
-    inputs, before = window.review.manual.inputs, session.spec
+    inputs, before = window.review.manual.inputs, session.bench.spec
     inputs.cards[0].offset.setText("some volts")
     inputs.use.click()
     assert "some volts" in inputs.problem
@@ -38,26 +41,26 @@ def test_unusable_inputs_change_nothing_and_say_why(lab) -> None:
     inputs.cards[0].range.setCurrentIndex(inputs.cards[0].range.findData(3.0))
     inputs.use.click()
     assert "3 V" in inputs.problem and "none of the scope's" in inputs.problem
-    assert session.spec is before and session.bench_overrides == ()
+    assert session.bench.spec is before and session.bench.overrides == ()
 
 
 def test_inputs_are_locked_while_running(lab) -> None:
     window, session = lab.window, lab.session
-    session._enter(State.RUNNING)
+    session.status.enter(State.RUNNING)
     inputs = window.review.manual.inputs
     assert not inputs.use.isEnabled() and not inputs.cards[0].isEnabled()
     assert session.set_inputs("[]") != ""
-    session._enter(State.READY)
+    session.status.enter(State.READY)
     assert inputs.use.isEnabled()
 
 
 def test_field_is_read_on_request(lab) -> None:
     window, session = lab.window, lab.session
-    session.readings.clear()
+    session.bench.field = None
     window.review.manual.read.click()
     assert not window.review.manual.read.isEnabled(), "one reading at a time"
-    lab.until(lambda: not session.reading_field)
-    assert "field" in session.readings
+    lab.until(lambda: not session.bench.reading)
+    assert session.bench.field is not None
     assert window.review.manual.read.isEnabled()
 
 
@@ -71,7 +74,7 @@ def test_a_current_that_is_set_while_the_source_opens_is_not_lost(lab) -> None:
     lab.window.render_state()
     assert "read back" in lab.window.review.manual.doing
     session.stop("test is over")
-    lab.until(lambda: session.manual is None)
+    lab.until(lambda: not session.manual.alive)
     assert session.state is State.READY and session.coil_view().verified_off
 
 
@@ -80,7 +83,7 @@ def test_stop_counts_while_the_source_opens(lab) -> None:
     session.begin_manual()
     session.stop("at once")
     session.manual.hold(0.1)
-    lab.until(lambda: session.manual is None)
+    lab.until(lambda: not session.manual.alive)
     view = session.coil_view()
     assert session.state is State.READY
     assert view.output is False and view.verified_off and abs(view.current) < 2e-3
@@ -88,20 +91,22 @@ def test_stop_counts_while_the_source_opens(lab) -> None:
 
 def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
     session = lab.session
-    renewed: list[bool] = []
-    hand = HandAfar(session.link, 0, session.inbox)
-    hand.renew = lambda: renewed.append(True)
-    session.manual = hand
+    said: list[object] = []
+    session.manual.task = RemoteTask(0, said.append)
     state = CoilState(live=True, setpoint=0.1, measured=0.1, off=None)
-    for _ in range(3):
-        hand.hear(CoilByHand(state, opened=True, acted=True, read_back=True))
-    lab.until(lambda: len(renewed) == 3)
+    for time in range(3):
+        session.manual.take(CoilCurrent(float(time), 0.1, 0.1))
+        session.manual.take(Samples({}, state))
+    assert said == [Renew()] * 3
     assert session.coil_view().current == 0.1
-    hand.hear(HandOff(None, "The coil's thread ended without a word."))
-    lab.until(lambda: session.manual is None)
+    off = OffReport(False, None, "nobody knows")
+    why = "The coil's thread ended without a word."
+    session.manual.take(Ended(Ending(RunState.FAULTED, off, why)))
+    assert not session.manual.alive
     assert truth(session.state, session.coil_view()) is Truth.UNKNOWN
     assert (
-        session.state is State.FAULT and "without a word" in session.fault.consequence
+        session.state is State.FAULT
+        and "without a word" in session.status.fault.consequence
     )
     session.acknowledge()
     session.connect_bench("sim")
@@ -126,19 +131,19 @@ def test_the_entry_follows_the_coil_unless_somebody_types(lab) -> None:
     lab.window.render_state()
     assert panel.current.text() == "400 mA", "chosen, not yet set"
     session.stop("test is over")
-    lab.until(lambda: session.manual is None)
+    lab.until(lambda: not session.manual.alive)
     lab.window.render_state()
     assert panel.current.text() == "0 mA", "nothing is asked of a coil that is off"
 
 
 def test_a_field_is_read_while_the_coil_is_held(lab) -> None:
     session = lab.session
-    session.readings.clear()
+    session.bench.field = None
     session.begin_manual()
     session.manual.hold(0.5)
     lab.until(lambda: abs((session.coil_view().current or 0.0) - 0.5) < 2e-3)
     session.read_field()
-    lab.until(lambda: not session.reading_field)
-    assert abs(session.readings["field"] - 5.5e-3) < 1e-4, "11 mT/A, of that coil"
+    lab.until(lambda: not session.bench.reading)
+    assert abs(session.bench.field - 5.5e-3) < 1e-4, "11 mT/A, of that coil"
     session.stop("test is over")
-    lab.until(lambda: session.manual is None)
+    lab.until(lambda: not session.manual.alive)

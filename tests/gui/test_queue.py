@@ -5,38 +5,38 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
 from gui.parts import IconButton
-from gui.session.request import Request
-from gui.session.session import Queued
+from gui.session.queue import Queued
 from gui.state import State
+from tactile_lab.engine.request import Request
 from tactile_lab.scene.load import load
 
 
 def busy(lab) -> None:
     """As while a run is in progress, without one."""
-    lab.session.running_request = lab.window.setup.request()
-    lab.session._enter(State.RUNNING)
+    lab.session.run.request = lab.window.setup.request()
+    lab.session.status.enter(State.RUNNING)
 
 
 def idle(lab) -> None:
-    lab.session.queue.clear()
-    lab.session.queue_held = False
-    lab.session.queue_changed.emit()
-    lab.session._enter(State.READY)
+    lab.session.queue.items.clear()
+    lab.session.queue.held = False
+    lab.session.queue.changed.emit()
+    lab.session.status.enter(State.READY)
 
 
 def test_dropped_scene_and_run_wait_with_their_cost(lab) -> None:
     window, session = lab.window, lab.session
     busy(lab)
     window.opening.open_path(lab.folder / "short.toml")
-    assert [item.title for item in session.queue] == ["short"]
-    lab.until(lambda: session.queue[0].expectation is not None)
+    assert [item.title for item in session.queue.items] == ["short"]
+    lab.until(lambda: session.queue.items[0].expectation is not None)
     name = window.setup.queue.cards[0].accessibleName()
     assert name.startswith("1: short") and "samples" in name and "heat" in name
     broken = lab.folder / "2026-11-21_100000_broken"
     broken.mkdir(exist_ok=True)
     (broken / "scene.toml").write_text('[protocol]\nname = "no such"\n')
     window.opening.open_path(broken)
-    assert len(session.queue) == 1 and window.centre.notice.isVisible()
+    assert len(session.queue.items) == 1 and window.centre.notice.isVisible()
     idle(lab)
 
 
@@ -46,8 +46,8 @@ def test_run_that_cannot_be_planned_leaves_the_queue(lab) -> None:
     strong = lab.folder / "strong.toml"
     strong.write_text('[protocol]\nname = "pulses"\nlevels = ["5 N"]\n')
     assert session.enqueue_scene(str(strong), "strong") == ""
-    lab.until(lambda: session.queue == [])
-    assert "taken out of the queue" in session.lines[-1].text
+    lab.until(lambda: session.queue.items == [])
+    assert "taken out of the queue" in session.log.lines[-1].text
     idle(lab)
 
 
@@ -59,13 +59,17 @@ def test_stop_holds_the_queue_until_it_is_resumed(lab, monkeypatch) -> None:
     )
     busy(lab)
     for title in ("one", "two"):
-        session.enqueue(Queued(title, window.setup.request(), session.expectation))
+        session.queue.add(
+            Queued(title, window.setup.request(), session.plan.expectation)
+        )
     session.stop("STOP")
-    session._enter(State.READY)
-    session._next_in_queue()
+    session.status.enter(State.READY)
+    session.queue.next()
     assert started == [] and window.setup.queue.resume.isVisible()
     window.setup.queue.resume.click()
-    assert started == ["one"] and [item.title for item in session.queue] == ["two"]
+    assert started == ["one"] and [item.title for item in session.queue.items] == [
+        "two"
+    ]
     idle(lab)
 
 
@@ -73,17 +77,19 @@ def test_rows_are_moved_and_taken_out_by_their_buttons(lab) -> None:
     window, session = lab.window, lab.session
     busy(lab)
     for title in ("one", "two", "three"):
-        session.enqueue(Queued(title, window.setup.request(), session.expectation))
+        session.queue.add(
+            Queued(title, window.setup.request(), session.plan.expectation)
+        )
 
     def press(words: str) -> None:
         buttons = window.setup.queue.findChildren(IconButton)
         next(b for b in buttons if b.accessibleName() == words).click()
 
     press("Move one down")
-    assert [item.title for item in session.queue] == ["two", "one", "three"]
+    assert [item.title for item in session.queue.items] == ["two", "one", "three"]
     press("Move three up")
     press("Take two out of the queue")
-    assert [item.title for item in session.queue] == ["three", "one"]
+    assert [item.title for item in session.queue.items] == ["three", "one"]
     idle(lab)
 
 
@@ -93,8 +99,8 @@ def three_waiting(lab) -> None:
     busy(lab)
     for number, title in enumerate(("one", "two", "three"), start=1):
         hold = (*asked.overrides, f'protocol.hold="{number} s"')
-        session.enqueue(Queued(title, Request(asked.path, hold, asked.bench)))
-    lab.until(lambda: all(item.expectation for item in session.queue))
+        session.queue.add(Queued(title, Request(asked.path, hold, asked.bench)))
+    lab.until(lambda: all(item.expectation for item in session.queue.items))
 
 
 def type_into(field, text: str) -> None:
@@ -109,7 +115,7 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
     lab.run()
     lab.until(lambda: session.state is State.RUNNING)
     three_waiting(lab)
-    shorter = session.queue[1].expectation.estimate.duration
+    shorter = session.queue.items[1].expectation.estimate.duration
     QTest.mouseClick(setup.queue.cards[1], Qt.MouseButton.LeftButton)
     assert setup.form.field("hold").text == "2 s"
     assert "two, 2 of 3" in setup.strip.words
@@ -117,8 +123,8 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
     type_into(setup.form.field("hold"), "7 s")
     setup.buttons.save.click()
     lab.until(lambda: setup.subject.edited is None)
-    item = session.queue[1]
-    assert [i.title for i in session.queue] == ["one", "two", "three"]
+    item = session.queue.items[1]
+    assert [i.title for i in session.queue.items] == ["one", "two", "three"]
     assert item.request.load().protocol.hold == 7.0
     assert item.expectation.estimate.duration > shorter + 9, (
         "two holds, 5 s longer each"
@@ -130,7 +136,7 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
 
 
 def idle_after_run(lab) -> None:
-    lab.session.queue.clear()
+    lab.session.queue.items.clear()
     lab.session.stop("test is over")
     lab.until(lambda: lab.session.state is State.READY)
     idle(lab)
@@ -141,17 +147,17 @@ def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
     setup.form.propose({"hold": "800 ms"})
     before = setup.form.texts()
     three_waiting(lab)
-    asked = [item.request for item in session.queue]
+    asked = [item.request for item in session.queue.items]
     setup.queue.cards[2].setFocus()
     QTest.keyClick(setup.queue.cards[2], Qt.Key.Key_Return)
     assert setup.form.field("hold").text == "3 s"
     type_into(setup.form.field("hold"), "9 s")
-    setup.edit(session.queue[0])
+    setup.edit(session.queue.items[0])
     assert "First save or cancel" in setup.strip.words
     assert setup.form.field("hold").text == "9 s", "nothing typed is lost by a click"
     setup.buttons.cancel.click()
     assert setup.form.texts() == before
-    assert [item.request for item in session.queue] == asked
+    assert [item.request for item in session.queue.items] == asked
     idle(lab)
     setup.form.undo.undo()
 
@@ -165,18 +171,18 @@ def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
         session, "start", lambda request, title, plan: started.append(title)
     )
     three_waiting(lab)
-    setup.edit(session.queue[0])
+    setup.edit(session.queue.items[0])
     type_into(setup.form.field("hold"), "8 s")
-    session._enter(State.READY)
-    session._next_in_queue()
+    session.status.enter(State.READY)
+    session.queue.next()
     assert started == ["one"]
     assert "one has started with the parameters it had" in setup.strip.words
     assert "Your changes stay" in setup.strip.words
     assert setup.form.field("hold").text == "8 s" and setup.buttons.run.isVisible()
     busy(lab)
-    setup.edit(session.queue[0])
+    setup.edit(session.queue.items[0])
     assert setup.form.field("hold").text == "2 s"
-    session.unqueue(0)
+    session.queue.remove(session.queue.items[0])
     assert "two was taken out" in setup.strip.words
     assert setup.form.field("hold").text == "8 s", "nothing was changed: back again"
     idle(lab)
@@ -185,18 +191,18 @@ def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
 def test_edit_that_cannot_run_is_not_saved(lab) -> None:
     session, setup = lab.session, lab.window.setup
     three_waiting(lab)
-    setup.edit(session.queue[0])
+    setup.edit(session.queue.items[0])
     type_into(setup.form.field("hold"), "0 s")
     save = setup.buttons.save
     assert not save.isEnabled() and "above" in save.toolTip()
     type_into(setup.form.field("hold"), "1 s")
     type_into(setup.form.field("levels"), "5 N")
-    lab.until(lambda: "reach" in session.plan_problem)
+    lab.until(lambda: "reach" in session.plan.problem)
     assert "reachable" in save.toolTip()
     setup.save()
-    assert setup.subject.edited is session.queue[0]
+    assert setup.subject.edited is session.queue.items[0]
     setup.start()
-    assert session.state is State.RUNNING and len(session.queue) == 3
+    assert session.state is State.RUNNING and len(session.queue.items) == 3
     setup.buttons.cancel.click()
     idle(lab)
 
@@ -208,11 +214,11 @@ def test_moved_run_keeps_the_keyboard(lab) -> None:
     window.setup.queue.cards[0].parts["down"].setFocus()
     lab.until(lambda: window.setup.queue.cards[0].parts["down"].hasFocus())
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Space)
-    assert [item.title for item in session.queue] == ["two", "one", "three"]
+    assert [item.title for item in session.queue.items] == ["two", "one", "three"]
     assert lab.app.focusWidget() is window.setup.queue.cards[1].parts["down"]
     window.setup.queue.cards[1].setFocus()
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Delete)
-    assert [item.title for item in session.queue] == ["two", "three"]
+    assert [item.title for item in session.queue.items] == ["two", "three"]
     idle(lab)
 
 
@@ -220,28 +226,28 @@ def test_edited_run_is_executed_as_it_was_saved(lab) -> None:
     session, setup = lab.session, lab.window.setup
     lab.run()
     setup.enqueue()
-    lab.until(lambda: len(session.queue) == 1)
-    setup.edit(session.queue[0])
+    lab.until(lambda: len(session.queue.items) == 1)
+    setup.edit(session.queue.items[0])
     type_into(setup.form.field("hold"), "250 ms")
     setup.enqueue()  # Ctrl+Return saves while a run is edited, once it is planned
     lab.until(lambda: setup.subject.edited is None)
-    assert len(session.queue) == 1
-    first = session.folder
+    assert len(session.queue.items) == 1
+    first = session.run.folder
     session.stop("the next one follows when asked for")
     lab.until(lambda: session.state is State.READY)
     setup.queue.resume.click()
-    lab.until(lambda: session.folder != first and session.state is State.READY)
-    assert load(session.folder / "scene.toml").protocol.hold == 0.25
+    lab.until(lambda: session.run.folder != first and session.state is State.READY)
+    assert load(session.run.folder / "scene.toml").protocol.hold == 0.25
 
 
 def test_scene_opened_during_an_edit_leaves_the_queued_run_alone(lab) -> None:
     session, setup = lab.session, lab.window.setup
     three_waiting(lab)
-    asked = session.queue[0].request
-    setup.edit(session.queue[0])
+    asked = session.queue.items[0].request
+    setup.edit(session.queue.items[0])
     type_into(setup.form.field("hold"), "9 s")
     setup.open_scene(str(lab.folder / "short.toml"))
-    assert setup.subject.edited is None and session.queue[0].request == asked
+    assert setup.subject.edited is None and session.queue.items[0].request == asked
     assert "one waits unchanged" in setup.strip.words
     idle(lab)
 

@@ -8,7 +8,7 @@ from gui.lanes.expected import Hold, Preview
 from gui.lanes.phase import phase
 from gui.lanes.rate import begins, rate_of
 from gui.lanes.source import LiveSource
-from gui.lanes.twin import TwinSlice
+from tactile_lab.engine.events import ModelPart
 from tactile_lab.trace import Trace
 from tactile_lab.waveform import Waveform
 
@@ -58,7 +58,7 @@ def live(planned: np.ndarray, twin: np.ndarray, end: float) -> LiveSource:
     source = LiveSource(preview, 1.0)
     value = np.zeros(2, np.float32)
     bins = Trace.bins(np.array([end - 2e-3, end - 1e-3]), value, value, value, 1e-3)
-    source.model.add(TwinSlice({"V_C2": bins}, twin, end))
+    source.model.add(ModelPart({"V_C2": bins}, twin, end))
     return source
 
 

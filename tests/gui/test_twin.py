@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gui.lanes.twin import CLOSE, Twin, TwinSlice
-from gui.session.twin import LiveTwin
-from gui.session.whole_twin import binned
+from gui.lanes.twin import CLOSE, Twin
+from tactile_lab.engine.events import ModelPart
+from tactile_lab.engine.model_parts import LiveParts, binned
 from tactile_lab.model.simulate import simulate
 from tactile_lab.scene.load import load
 from tactile_lab.trace import Trace
@@ -18,8 +18,8 @@ SCENE = load("demo")
 POINTS = [(0.1, 0.0), (0.2, 0.3), (0.3, 0.6), (0.9, 0.2), (1.2, 0.0)]
 
 
-def in_one_piece() -> TwinSlice:
-    twin = LiveTwin(SCENE)
+def in_one_piece() -> ModelPart:
+    twin = LiveParts(SCENE)
     for point in POINTS:
         twin.add(*point)
     part = twin.until(1.5)
@@ -31,7 +31,7 @@ def in_one_piece() -> TwinSlice:
 @given(st.lists(st.floats(0.01, 1.45), max_size=6))
 def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
     whole = in_one_piece()
-    twin, tracks = LiveTwin(SCENE), Twin()
+    twin, tracks = LiveParts(SCENE), Twin()
     fed = 0
     for end in [*sorted(cuts), 1.5]:
         while fed < len(POINTS) and POINTS[fed][0] <= end:
@@ -61,7 +61,7 @@ def test_set_points_hold_until_the_next() -> None:
 
 
 def test_late_set_point_moves_to_where_the_twin_is() -> None:
-    twin = LiveTwin(SCENE)
+    twin = LiveParts(SCENE)
     assert twin.until(0.5) is not None
     twin.add(0.4, 0.8)
     part = twin.until(1.0)
@@ -106,10 +106,10 @@ def parts(
 ) -> tuple[Twin, Callable[[], None]]:
     """A twin, and what answers its newest look."""
 
-    def slice_(start: float, end: float, count: int) -> TwinSlice:
+    def slice_(start: float, end: float, count: int) -> ModelPart:
         spikes = np.empty(0)
         bins = {"V_C1": binned(RESULT, "V_C1", spikes, start, end, count)}
-        return TwinSlice(bins, spikes, end)
+        return ModelPart(bins, spikes, end)
 
     twin = Twin(lambda *part: asked.append(part))
     twin.add(slice_(0.0, 1.5, 1500))

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPushButton, QToolButt
 
 from gui.dialogs.saving import table
 from gui.lanes.source import PlanSource
-from gui.session.session import Queued
+from gui.session.queue import Queued
 from gui.state import State, Truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
@@ -88,11 +88,11 @@ def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
 
 def test_stop_is_enabled_in_every_state(lab) -> None:
     for state in State:
-        lab.session.state = state
+        lab.session.status.state = state
         lab.window.render_state()
         assert lab.window.header.stop.isEnabled()
         assert lab.window.header.stop.isVisible()
-    lab.session.state = State.READY
+    lab.session.status.state = State.READY
     lab.window.render_state()
 
 
@@ -133,20 +133,22 @@ def test_queue_can_be_edited_while_running(lab) -> None:
     window, session = lab.window, lab.session
     lab.run()
     for name in ("one", "two", "three"):
-        session.enqueue(Queued(name, window.setup.request()))
-    session.move_queued(2, -1)
-    session.unqueue(0)
-    assert [item.title for item in session.queue] == ["three", "two"]
+        session.queue.add(Queued(name, window.setup.request()))
+    session.queue.move(session.queue.items[2], -1)
+    session.queue.remove(session.queue.items[0])
+    assert [item.title for item in session.queue.items] == ["three", "two"]
     assert window.setup.queue.isVisible()
-    session.unqueue(1)
-    first = session.folder
+    session.queue.remove(session.queue.items[1])
+    first = session.run.folder
     assert session.state is State.RUNNING, "a queued run waits"
     session.stop("the next one shall not follow")
     lab.until(lambda: session.state is State.READY)
-    assert [item.title for item in session.queue] == ["three"] and not session.busy
-    session.enqueue(Queued("four", window.setup.request()))
-    lab.until(lambda: session.queue == [] and session.state is State.READY)
-    assert session.folder != first
+    assert [item.title for item in session.queue.items] == [
+        "three"
+    ] and not session.busy
+    session.queue.add(Queued("four", window.setup.request()))
+    lab.until(lambda: session.queue.items == [] and session.state is State.READY)
+    assert session.run.folder != first
 
 
 def test_invalid_value_forbids_run_and_says_why(lab) -> None:
@@ -161,8 +163,8 @@ def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
     window, session = lab.window, lab.session
     window.setup.form.field("levels").set_text("900 mN")
     window.setup.plan_now()
-    lab.until(lambda: session.plan_problem)
-    assert "reachable" in session.plan_problem
+    lab.until(lambda: session.plan.problem)
+    assert "reachable" in session.plan.problem
     assert not window.setup.run.isEnabled()
     window.setup.form.reset()
 
@@ -179,13 +181,13 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
     lab.until(lambda: abs((session.coil_view().current or 0) - 0.1) < 2e-3)
     lab.until(lambda: window.header.stop.truth is Truth.LIVE)
     assert not window.setup.run.isEnabled()
-    session.expected = 10.0  # of the run before
+    session.run.expected = 10.0  # of the run before
     assert not window.close(), "the coil is live: closing asks"
     assert "100 mA" in window.closing.now.text()
     assert "remaining" not in window.closing.now.text(), "that was the run's"
     window.closing.keep.click()
     window.header.stop.click()
-    lab.until(lambda: session.manual is None)
+    lab.until(lambda: not session.manual.alive)
     assert session.coil_view().verified_off
 
 
@@ -214,7 +216,7 @@ def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
     folder = lab.complete_run()
     lab.until(lambda: opening.run is not None)
     assert opening.run.path == folder
-    assert window.session.run_name == folder.name
+    assert window.session.run.name == folder.name
     assert window.centre.stack.source is opening.run
     assert opening.run.model is not None, "the model does not blink"
     live = window.session.source
@@ -227,7 +229,7 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     window = lab.window
     folder = lab.runs(1)[0]
     window.opening.open_run(folder)
-    lab.until(lambda: window.session.run_name == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.run.name == f"Looking at {folder.name}")
     run, stack, view = window.opening.run, window.centre.stack, window.centre.view
     begin, _ = run.holds[-1].held
     run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])
@@ -434,7 +436,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert not window.centre.compare_bar.isVisible()
     assert stack.source is session.source, "back to the last run"
     lab.until(lambda: stack.source is window.opening.run, 30.0)
-    assert window.opening.run.path == session.folder, "and then to its record"
+    assert window.opening.run.path == session.run.folder, "and then to its record"
     lab.until(lambda: "●" not in stack.row("V_C1").card.text)
 
 
@@ -460,10 +462,10 @@ def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
 def test_record_keeps_what_the_monitor_saw(lab) -> None:
     window, session = lab.window, lab.session
     session.watch(True)
-    lab.until(lambda: session.monitor.standing.held > 0.3)
+    lab.until(lambda: session.monitor.sensor.held > 0.3)
     window.centre.watch_bar.record.click()
     kept = []
-    session.recorded.connect(kept.append)
+    session.monitor.recorded.connect(kept.append)
     lab.until(lambda: kept)
     assert session.monitor.alive, "watching goes on"
     run = Run.load(kept[0])

@@ -88,7 +88,7 @@ class Stage:
         end = time.monotonic() + longest
         while not done():
             if time.monotonic() > end:
-                raise SystemExit("\n".join(x.text for x in self.session.lines[-8:]))
+                raise SystemExit("\n".join(x.text for x in self.session.log.lines[-8:]))
             self.app.processEvents()
             time.sleep(0.004)
 
@@ -109,9 +109,9 @@ class Stage:
     def planned(self) -> None:
         """Wait for bench and plan."""
         session = self.session
-        session.expectation = None
+        session.plan.expectation = None
         self.window.setup.plan_now()
-        self.until(lambda: session.expectation and session.state is State.READY)
+        self.until(lambda: session.plan.expectation and session.state is State.READY)
         self.live(0.4)
 
     def run(self) -> None:
@@ -127,7 +127,7 @@ class Stage:
         self.until(lambda: not self.session.busy)
         self.live(0.5)
         if not self.window.opening.ending.startswith("complete"):
-            raise SystemExit(f"The run was not completed: {self.session.fault}")
+            raise SystemExit(f"The run was not completed: {self.session.status.fault}")
 
     def close_overlays(self) -> None:
         """Close every card above the window."""

@@ -45,7 +45,7 @@ def main(folder: Path) -> None:
     # the log names the runs folder: a relative one says nothing of this computer
     with tempfile.TemporaryDirectory() as home, contextlib.chdir(home):
         stage = Stage(folder, None)
-        stage.until(lambda: stage.session.expectation is not None)
+        stage.until(lambda: stage.session.plan.expectation is not None)
         stage.shoot("window_first_start")
         stage.session.connect_bench("sim")
         stage.planned()
@@ -79,7 +79,7 @@ def _run(stage: Stage) -> None:
     stage.until(lambda: session.source is not None and session.source.reach > 15.4)
     stage.shoot("window_running_dark", "dark")
     stage.theme.choose("light")
-    session.unqueue(0)
+    session.queue.remove(session.queue.items[0])
     stage.ended()
 
 
@@ -109,17 +109,17 @@ def _manual(stage: Stage) -> None:
     panel = window.review.manual
     window.review.show_tab(2)
     panel.begin.click()
-    stage.until(lambda: session.manual is not None and session.manual.coil is not None)
+    stage.until(lambda: session.manual.alive and session.manual.coil is not None)
     panel.current.selectAll()
     QTest.keyClicks(panel.current, "250 mA")
     panel.set.click()
     stage.until(lambda: panel.now == "250 mA")
     panel.read.click()
-    stage.until(lambda: not session.reading_field)
+    stage.until(lambda: not session.bench.reading)
     stage.live(0.5)
     stage.shoot("window_manual")
     window.header.stop.click()
-    stage.until(lambda: session.manual is None)
+    stage.until(lambda: not session.manual.alive)
 
 
 def _dialogs(stage: Stage) -> None:
@@ -234,7 +234,7 @@ def _read_by_a_person(folder: Path) -> None:
     """The run asks for the field; as fast as it computes, for it takes a minute."""
     Path("bench.toml").write_text(READ_BY_A_PERSON)
     stage = Stage(folder, "bench.toml", "calibrate_field", realtime=False)
-    session, card = stage.session, stage.window.errand
+    session, card = stage.session, stage.window.question
     stage.until(lambda: session.state is State.READY)
     stage.planned()
     stage.window.setup.start()
@@ -243,7 +243,7 @@ def _read_by_a_person(folder: Path) -> None:
         QTest.keyClicks(card.entry, field)
         if field != "8.66":
             QTest.keyClick(card.entry, Qt.Key.Key_Return)
-            stage.until(lambda: session.errand is not None)
+            stage.until(lambda: session.run.asked is not None)
     stage.shoot("window_field")
     card.stop.click()
     stage.until(lambda: not session.busy)

@@ -1,0 +1,167 @@
+"""The centre: tools, lanes, navigator; below them progress and log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QSplitter,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gui.comparing import CompareBar
+from gui.lanes.stack import LaneStack
+from gui.lanes.tools import Tools
+from gui.lanes.view import TimeView
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import column, label, line, panel, push
+from gui.record.log import LogView
+from gui.record.progress import Progress
+from gui.record.watching import WatchBar
+
+
+class EmptyCard(QFrame):
+    """What to do where there is no bench: simulated, connect, open, recent."""
+
+    simulated_asked = Signal()
+    connect_asked = Signal()
+    open_asked = Signal()
+    recent_asked = Signal(object)
+
+    def __init__(self, parent: QWidget, theme: Theme) -> None:
+        super().__init__(parent)
+        self.setProperty("role", "dialog")
+        self.setAccessibleName("No bench connected")
+        self._theme = theme
+        self._picture = QLabel()
+        self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        title = label("No bench connected", "big")
+        title.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        text = label(
+            "Explore with the simulated bench: same drivers, same protocols, same "
+            "files, no hardware. Or connect your own coil source, oscilloscope "
+            "and teslameter.",
+            wrap=True,
+        )
+        text.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.simulated = push("Use simulated bench", "primary")
+        connect = push("Connect instruments …")
+        scene = push("Open scene …")
+        buttons = QHBoxLayout()
+        buttons.setSpacing(8)
+        buttons.addStretch(1)
+        for button in (self.simulated, connect, scene):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        self._recent = QVBoxLayout()
+        self._recent.setSpacing(2)
+        hint = label("or drop a scene or a run anywhere", "small")
+        hint.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        whole = column(self, margin=26, spacing=12)
+        for widget in (self._picture, title, text):
+            whole.addWidget(widget)
+        whole.addLayout(buttons)
+        whole.addLayout(self._recent)
+        whole.addWidget(hint)
+        self.simulated.clicked.connect(self.simulated_asked)
+        connect.clicked.connect(self.connect_asked)
+        scene.clicked.connect(self.open_asked)
+        theme.changed.connect(self._tint)
+        self._tint()
+
+    def show_recent(self, folders: list[tuple[str, Path]]) -> None:
+        """Offer recent runs as (title, folder)."""
+        while (item := self._recent.takeAt(0)) is not None:
+            widget = item.widget()
+            if widget is not None:
+                widget.deleteLater()
+        if folders:
+            self._recent.addWidget(label("RECENT RUNS", "section"))
+        for title, folder in folders[:4]:
+            button = push(title)
+            button.setStyleSheet("text-align: left; border: 0;")
+            button.clicked.connect(
+                lambda _=False, folder=folder: self.recent_asked.emit(folder)
+            )
+            self._recent.addWidget(button)
+
+    def _tint(self) -> None:
+        self._picture.setPixmap(pixmap("bench", self._theme.tokens.accent, 44))
+
+
+class Centre(QWidget):
+    """Lanes above, record below, a movable border between."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.view = TimeView()
+        self.stack = LaneStack(self.view, theme)
+        self.tools = Tools(self.stack, self.view, theme)
+        self.progress = Progress(theme)
+        self.log = LogView(theme)
+        upper = panel()
+        above = QVBoxLayout(upper)
+        above.setContentsMargins(1, 1, 1, 1)
+        above.setSpacing(0)
+        self.notice = label("", "muted")
+        self.notice.setContentsMargins(14, 6, 14, 6)
+        self.notice.hide()
+        above.addWidget(self.tools)
+        above.addWidget(line())
+        above.addWidget(self.notice)
+        self.compare_bar = CompareBar(theme)
+        above.addWidget(self.compare_bar)
+        self.watch_bar = WatchBar()
+        above.addWidget(self.watch_bar)
+        above.addWidget(self.stack, 1)
+        lower = panel()
+        below = column(lower, spacing=7)
+        below.setContentsMargins(12, 10, 12, 10)
+        below.addWidget(self.progress)
+        below.addWidget(self.log, 1)
+        self.splitter = QSplitter(Qt.Orientation.Vertical)
+        self.splitter.addWidget(upper)
+        self.splitter.addWidget(lower)
+        self.splitter.setStretchFactor(0, 4)
+        self.splitter.setStretchFactor(1, 1)
+        self.splitter.setHandleWidth(8)
+        self.splitter.setSizes([780, 200])
+        self.splitter.setChildrenCollapsible(False)
+        upper.setMinimumHeight(320)
+        lower.setMinimumHeight(151)
+        column(self).addWidget(self.splitter)
+        self.empty = EmptyCard(self.stack, theme)
+
+    def show_empty(self, wanted: bool) -> None:
+        """Show or hide the card of the empty state."""
+        self.empty.setVisible(wanted)
+        if wanted:
+            self._place()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep the card in the middle."""
+        super().resizeEvent(event)
+        self.tools.set_width(self.width())
+        self._place()
+
+    def _place(self) -> None:
+        if not self.empty.isVisible():
+            return
+        width = min(520, self.stack.width() - 40)
+        self.empty.setFixedWidth(width)
+        self.empty.adjustSize()
+        height = min(self.empty.sizeHint().height() + 12, self.stack.height() - 16)
+        self.empty.setGeometry(
+            (self.stack.width() - width) // 2,
+            max((self.stack.height() - height) // 2, 8),
+            width,
+            height,
+        )
+        self.empty.raise_()

@@ -1,0 +1,162 @@
+"""Comparing two or three runs: loading them, and the bar that arranges them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QFont, QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
+
+from gui.lanes.compare import MARKS, Comparison, Layout
+from gui.lanes.source import Member
+from gui.look.fonts import sized
+from gui.look.theme import Theme
+from gui.parts import IconButton, Segments, empty, label
+from gui.review.entries import Entry
+from tactile_lab.engine.threads import start
+from tactile_lab.errors import TactileLabError
+
+ALIGNED = ("start", "step", "cursor")
+LAYOUTS = (Layout.STACK, Layout.OVERLAY, Layout.DIFFERENCE)
+
+
+class CompareBar(QFrame):
+    """The runs with colour and marker, how they are aligned and laid out."""
+
+    changed = Signal()
+    closed = Signal()
+    agreed = Signal(float)
+    """Where the runs were aligned at the cursor, s."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.comparison: Comparison | None = None
+        self.at = 0.0
+        self._cursor: float | None = None
+        self.align = Segments(["Start", "Step", "Cursor"], "Align")
+        for number, words in enumerate(
+            (
+                "Let the runs begin together",
+                "Align the step in the middle of the view",
+                "Align the spikes nearest to cursor A, or the steps",
+            )
+        ):
+            self.align.group.button(number).setToolTip(words)
+        self.layout_ = Segments(["Stack", "Overlay", "Difference"], "Layout")
+        for number, layout in enumerate(LAYOUTS):
+            words = layout.value[0].upper() + layout.value[1:]
+            self.layout_.group.button(number).setToolTip(words)
+        self._names = QHBoxLayout()
+        self._names.setSpacing(14)
+        self._words = [label("COMPARE", "section"), label("Align", "muted"),
+                       label("Layout", "muted")]  # fmt: skip
+        close = IconButton(theme, "close", "End the comparison")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 4, 8, 4)
+        row.setSpacing(10)
+        row.addWidget(self._words[0])
+        row.addLayout(self._names)
+        row.addStretch(1)
+        row.addWidget(self._words[1])
+        row.addWidget(self.align)
+        row.addWidget(self._words[2])
+        row.addWidget(self.layout_)
+        row.addWidget(close)
+        self._buttons = (self.align, self.layout_, close)
+        close.clicked.connect(self.closed)
+        self.align.group.idClicked.connect(self._align)
+        self.layout_.group.idClicked.connect(self._lay_out)
+        theme.changed.connect(self._show_names)
+        self.look_at(0.0, None)
+        self.hide()
+
+    def show_comparison(self, comparison: Comparison | None) -> None:
+        """Show the bar for a comparison, or hide it."""
+        self.comparison = comparison
+        self.setVisible(comparison is not None)
+        if comparison is not None:
+            self.align.choose(0)
+            self.layout_.choose(0)
+            self._show_names()
+
+    def look_at(self, time: float, cursor: float | None) -> None:
+        """The step at `time` and what is nearest to cursor A can be aligned, s."""
+        self.at, self._cursor = time, cursor
+        self.align.group.button(ALIGNED.index("cursor")).setEnabled(cursor is not None)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave words out where there is no room for them."""
+        super().resizeEvent(event)
+        self._show_names()
+
+    def _show_names(self) -> None:
+        """Names in full and all words, or what of them there is room for."""
+        members = [] if self.comparison is None else self.comparison.members
+        full = [
+            self._name(number, member.name) for number, member in enumerate(members)
+        ]
+        short = [self._name(k, m.name.split()[0]) for k, m in enumerate(members)]
+        names = full if self._fits(*full, *self._words) else short
+        for word in self._words:
+            word.setVisible(self._fits(*names, *self._words))
+        empty(self._names)
+        for name, member in zip(names, members, strict=True):
+            name.setToolTip(f"{member.name}\n{member.source.path}")
+            self._names.addWidget(name)
+
+    def _fits(self, *parts: QWidget) -> bool:
+        """Whether there is room for these beside the buttons."""
+        parts = (*parts, *self._buttons)
+        return sum(part.sizeHint().width() + 14 for part in parts) < self.width() - 6
+
+    def _name(self, number: int, said: str) -> QLabel:
+        colour = self._theme.tokens.runs[number]
+        made = QLabel(f"{MARKS[number]} {said}")
+        made.setFont(sized(13, QFont.Weight.DemiBold))
+        made.setStyleSheet(f"color: {colour}; font-weight: 600;")
+        made.ensurePolished()
+        return made
+
+    def _align(self, number: int) -> None:
+        if self.comparison is None:
+            return
+        how = ALIGNED[number]
+        if how == "cursor" and self._cursor is not None:
+            self.agreed.emit(self.comparison.align(how, self._cursor))
+        else:
+            self.comparison.align(how, self.at)
+        self.changed.emit()
+
+    def _lay_out(self, number: int) -> None:
+        if self.comparison is not None:
+            self.comparison.layout = LAYOUTS[number]
+            self.changed.emit()
+
+
+def load_comparison(
+    chosen: list[Entry],
+    loaded: Callable[[Comparison], None],
+    failed: Callable[[str], None],
+) -> None:
+    """Load two or three runs in a background thread, which calls one of the two."""
+
+    def work() -> None:
+        from gui.lanes.stored import RunSource
+
+        members: list[Member] = []
+        try:
+            for entry in chosen[:3]:
+                source = RunSource(entry.folder)
+                clock = entry.folder.name[11:17]
+                name = ":".join(clock[k : k + 2] for k in (0, 2, 4))
+                members.append(Member(f"{name} {entry.scene}".strip(), source))
+        except (TactileLabError, OSError) as error:
+            for member in members:
+                member.source.close()
+            failed(str(error))
+            return
+        loaded(Comparison(members))
+
+    start(work, "compare")

@@ -1,0 +1,133 @@
+"""What the run waits for a person to do at the bench: move probes, read the field."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
+
+from gui.dialogs.overlay import Overlay
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import label, push, set_role
+from gui.session.session import Session
+from tactile_lab.acquisition.asked_field import read_off
+from tactile_lab.engine.events import PersonAsked
+from tactile_lab.errors import QuantityError
+from tactile_lab.quantity import show
+
+
+class QuestionCard(Overlay):
+    """Shown from the question until it is done or the run is stopped."""
+
+    def __init__(self, window: QWidget, session: Session, theme: Theme) -> None:
+        super().__init__(window, 490)
+        self._session, self._theme = session, theme
+        self._shown: PersonAsked | None = None
+        self._last = ""
+        self._sign = QLabel()
+        self.text = label("", "big", wrap=True)
+        self.doubt = label("", "error", wrap=True)
+        self.entry = QLineEdit()
+        self.entry.setAccessibleName("Field that the teslameter shows")
+        self.entry.setPlaceholderText("such as 5.4 mT")
+        self.entry.setFixedWidth(150)
+        self.understood = label("", "muted", wrap=True)
+        self.before = label("", "muted", wrap=True)
+        self.coil = label("", "muted", wrap=True)
+        self.done = push("Done", "primary")
+        self.stop = push("Stop the run", "danger")
+        self._lay_out()
+        self.entry.textChanged.connect(self._judge)
+        self.entry.returnPressed.connect(self._done)
+        self.done.clicked.connect(self._done)
+        self.stop.clicked.connect(lambda: session.stop("stopped at the bench"))
+        session.status.changed.connect(self._follow)
+
+    def _follow(self) -> None:
+        asked = self._session.run.asked
+        if asked is self._shown:
+            return
+        self._shown = asked
+        if asked is None:
+            self.hide()
+            return
+        self._sign.setPixmap(pixmap("plug", self._theme.tokens.accent, 28))
+        self.text.setText(
+            asked.text
+            if asked.current is None
+            else f"Type the field that is shown at {_amperes(asked.current)}."
+        )
+        self.doubt.setText(asked.doubt)
+        self.doubt.setVisible(bool(asked.doubt))
+        reads = asked.current is not None
+        self.entry.setVisible(reads)
+        self.understood.setVisible(reads)
+        self.before.setVisible(reads and bool(self._last))
+        self.before.setText(f"Entered last: {self._last}.")
+        self.coil.setText(self._coil_words(asked.current))
+        self.entry.clear()
+        self._judge()
+        self.open()
+        (self.entry if reads else self.done).setFocus()
+
+    def _coil_words(self, current: float | None) -> str:
+        """What is true of the coil while the run waits."""
+        if current is None:
+            return "The coil stays at 0 mA. The run goes on when you say so."
+        words = f"The coil holds {_amperes(current)} until you are done."
+        limits = self._session.status.coil.limits
+        if limits is not None and abs(current) > limits.continuous:
+            words += (
+                f" That is more than the {_amperes(limits.continuous)} it bears "
+                "continuously: once its heat budget is used up, the run ends and the "
+                "coil is switched off."
+            )
+        return words
+
+    def _judge(self) -> None:
+        """Say how the entry is understood, or why it cannot be."""
+        if self._shown is None or self._shown.current is None:
+            self.done.setEnabled(True)
+            return
+        typed, problem = self.entry.text().strip(), ""
+        try:
+            understood = f"= {show(read_off(typed), 'T', 5)}"
+        except QuantityError as error:
+            problem, understood = str(error), ""
+        if not typed:
+            problem, understood = (
+                "",
+                "What the teslameter shows, in mT or with its unit.",
+            )
+            self.done.setToolTip("Type what the teslameter shows.")
+        else:
+            self.done.setToolTip(problem)
+        self.understood.setText(problem or understood)
+        set_role(self.understood, "error" if problem else "muted")
+        self.done.setEnabled(bool(typed) and not problem)
+        if self.isVisible():
+            self.open()
+
+    def _done(self) -> None:
+        if self._shown is None or not self.done.isEnabled():
+            return
+        answer = self.entry.text().strip()
+        if self._shown.current is not None:
+            at = show(self._shown.current, "A")
+            self._last = f"{show(read_off(answer), 'T', 5)} at {at}"
+        self._session.run.answer(answer)
+
+    def _lay_out(self) -> None:
+        typed = QHBoxLayout()
+        typed.setSpacing(10)
+        typed.addWidget(self.entry)
+        typed.addWidget(self.understood, 1)
+        self.ask_with(
+            self._sign,
+            [self.text, self.doubt, typed, self.before, self.coil],
+            [self.stop, self.done],
+        )
+
+
+def _amperes(current: float) -> str:
+    """A current with its unit on the same line."""
+    return show(current, "A").replace(" ", "\u00a0")

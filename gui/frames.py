@@ -1,0 +1,108 @@
+"""The frame loop: polls the session, repaints what moved, keeps to its budget."""
+
+from __future__ import annotations
+
+import time
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from gui.opening import Opening
+from gui.panels import Panels
+from gui.state import State
+
+FAST, SLOW = 33, 100
+"""Milliseconds between frames."""
+
+NUMBERS = 0.1
+"""Seconds between updates of the numbers: faster cannot be read."""
+
+BUDGET = 0.6
+"""Share of the interval a frame may cost before the interval is doubled."""
+
+
+class Frames(QObject):
+    """Moves what is on screen; `costs` holds the newest frame costs, s."""
+
+    told = Signal(object)
+    """The newest snapshot, as often as numbers can be read."""
+
+    def __init__(self, panels: Panels, opening: Opening) -> None:
+        super().__init__(panels.centre)
+        self._panels, self._opening = panels, opening
+        self.frozen = False
+        self.costs: list[float] = []
+        self.paints: list[float] = []
+        self._numbers = 0.0
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start(FAST)
+
+    @property
+    def interval(self) -> int:
+        """Milliseconds between frames now."""
+        return self._timer.interval()
+
+    def stop(self) -> None:
+        """End the loop."""
+        self._timer.stop()
+
+    def tick(self) -> None:
+        """One frame."""
+        begun = time.perf_counter()
+        panels, session = self._panels, self._panels.session
+        moved = session.poll()
+        now = time.monotonic()
+        live = session.source is not None and self._opening.run is None
+        if live and not self.frozen and not panels.centre.window().isMinimized():
+            source = session.source
+            assert source is not None
+            view = panels.centre.view
+            if source.running or moved:
+                view.set_now(source.reach, source.length)
+                panels.centre.stack.refresh()
+        self._opening.take_fetched()
+        if now - self._numbers >= NUMBERS:
+            self._numbers = now
+            self._show_numbers(live)
+        self._keep_budget(time.perf_counter() - begun)
+
+    def _show_numbers(self, live: bool) -> None:
+        panels, session = self._panels, self._panels.session
+        snapshot = session.snapshot()
+        self.told.emit(snapshot)
+        self._show_monitor()
+        source = session.source
+        if source is not None and live:
+            if not self.frozen:
+                panels.centre.stack.show_values()
+            planned = source.preview.holds if source.preview else []
+            holds = planned if source.running and planned else source.holds
+            panels.centre.progress.show_run(
+                snapshot, holds, source.length, source.reach, session.run.trial,
+                "Monitor: only Record keeps what is seen" if session.monitor.alive
+                else self._opening.ending,
+            )  # fmt: skip
+            running = session.state in (State.RUNNING, State.ABORTING)
+            panels.setup.show_head(source.reach if running else None)
+
+    def _show_monitor(self) -> None:
+        panels, monitor = self._panels, self._panels.session.monitor
+        bar = panels.centre.watch_bar
+        if monitor.alive:
+            bar.show_sensor(monitor.sensor, recording=monitor.recording)
+        elif bar.isVisible():
+            bar.hide()
+        panels.centre.tools.show_monitor(on=monitor.alive)
+
+    def _keep_budget(self, cost: float) -> None:
+        self.costs.append(cost)
+        del self.costs[:-600]
+        recent = self.costs[-20:]
+        mean = sum(recent) / len(recent)
+        interval = self._timer.interval()
+        if mean > BUDGET * interval / 1e3 and interval < SLOW:
+            self._timer.setInterval(min(2 * interval, SLOW))
+            self.costs.clear()
+        elif mean < 0.2 * BUDGET * interval / 1e3 and interval > FAST:
+            self._timer.setInterval(FAST)

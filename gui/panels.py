@@ -1,0 +1,24 @@
+"""What the window is made of, for the parts that work on all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gui.centre import Centre
+from gui.header.header import Header
+from gui.look.theme import Theme
+from gui.review.panel import ReviewPanel
+from gui.session.session import Session
+from gui.setup.panel import SetupPanel
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """The session and the panels that show it."""
+
+    session: Session
+    theme: Theme
+    header: Header
+    setup: SetupPanel
+    centre: Centre
+    review: ReviewPanel

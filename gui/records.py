@@ -1,0 +1,111 @@
+"""Runs read from disk with the model beside them, away from the window's thread."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Signal
+
+from gui.session.session import Session
+from tactile_lab.engine.engine import Reply
+from tactile_lab.engine.events import ModelPart
+from tactile_lab.engine.jobs import ModelOfRun
+from tactile_lab.engine.threads import start
+from tactile_lab.errors import TactileLabError
+
+if TYPE_CHECKING:
+    from gui.lanes.stored import RunSource
+
+
+class Records(QObject):
+    """Reads runs, and has the engine solve and sample the model beside them.
+
+    Attributes:
+        loaded: a run was read; its model follows.
+        exchanged: the run that has ended was read, and its model has come too.
+        failed: why a run was not read, or has no model.
+        shown: the run on screen, if it is from disk; set by whoever shows it.
+    """
+
+    loaded = Signal(object)
+    exchanged = Signal(object)
+    failed = Signal(str)
+    _read = Signal(object, bool)
+
+    def __init__(self, session: Session, parent: QObject) -> None:
+        super().__init__(parent)
+        self._session = session
+        self.shown: RunSource | None = None
+        self._ended: RunSource | None = None
+        self._awaited: Path | None = None
+        self._read.connect(self._arrived)
+
+    def open(self, folder: Path) -> None:
+        """Read a run, to be shown as soon as possible."""
+        self._load(folder, ended=False)
+
+    def exchange(self, folder: Path) -> None:
+        """Read the run that has ended, to be shown in place of what was seen live."""
+        self.forget()
+        self._awaited = folder
+        self._load(folder, ended=True)
+
+    def forget(self) -> None:
+        """Nobody waits for the run that has ended any more."""
+        self._awaited = None
+        if self._ended is not None:
+            self._ended.close()
+            self._ended = None
+
+    def _load(self, folder: Path, *, ended: bool) -> None:
+        def work() -> None:
+            from gui.lanes.stored import RunSource
+
+            try:
+                source = RunSource(folder)
+            except (TactileLabError, OSError) as error:
+                self.failed.emit(str(error))
+                return
+            self._read.emit(source, ended)
+
+        start(work, "open run")
+
+    def _arrived(self, source: RunSource, ended: bool) -> None:
+        if not ended:
+            self.loaded.emit(source)
+        elif source.path == self._awaited:
+            self._ended = source
+        else:
+            source.close()
+            return
+        folder = source.path
+        desk = self._session.desk
+        desk.ask(ModelOfRun(folder), lambda reply: self._modelled(folder, reply))
+
+    def _modelled(self, folder: Path, reply: Reply[ModelPart]) -> None:
+        ended = self._ended
+        if ended is not None and ended.path == folder:
+            self._ended = self._awaited = None
+            self._add(ended, reply)
+            self.exchanged.emit(ended)
+        elif self.shown is not None and self.shown.path == folder:
+            self._add(self.shown, reply)
+
+    def _add(self, source: RunSource, reply: Reply[ModelPart]) -> None:
+        if reply.value is None:
+            name = source.path.name
+            self.failed.emit(f"No model beside {name}: {reply.problem}")
+        else:
+            source.add_twin(reply.value, partial(self._look, source.path))
+
+    def _look(self, folder: Path, start: float, end: float, count: int) -> None:
+        """Have a part of the model sampled closely."""
+
+        def seen(reply: Reply[ModelPart]) -> None:
+            shown = self.shown
+            if shown is not None and shown.path == folder and reply.value is not None:
+                shown.add_twin_part(reply.value)
+
+        self._session.desk.ask(ModelOfRun(folder, start, end, count), seen)

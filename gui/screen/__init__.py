@@ -1,1 +1,0 @@
-"""What is on screen: the plan, a run in progress, runs from disk."""

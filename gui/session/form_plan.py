@@ -1,0 +1,55 @@
+"""The plan of what the form asks for; the newest counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Signal
+
+from tactile_lab.engine.engine import Reply
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+
+if TYPE_CHECKING:
+    from gui.session.expectation import Expectation
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A request was planned: what it will do, or why it cannot be run."""
+
+    request: Request
+    expectation: Expectation | None
+    problem: str
+
+
+class FormPlan(QObject):
+    """Has the engine plan what the form asks for.
+
+    Attributes:
+        expectation: None until it is computed.
+        problem: why the form cannot be run, "" if it can.
+    """
+
+    arrived = Signal(object)
+    """The newest request was `Planned`."""
+
+    def __init__(self, link: Link) -> None:
+        super().__init__()
+        self._link = link
+        self._newest: Request | None = None
+        self.expectation: Expectation | None = None
+        self.problem = ""
+
+    def make(self, request: Request) -> None:
+        """Have a request planned; `arrived` tells the result."""
+        from gui.session.expectation import PlanRequest
+
+        self._newest = request
+        self._link.ask(PlanRequest(request), lambda reply: self._take(request, reply))
+
+    def _take(self, request: Request, reply: Reply[Expectation]) -> None:
+        if request is self._newest:
+            self.expectation, self.problem = reply.value, reply.problem
+            self.arrived.emit(Planned(request, reply.value, reply.problem))

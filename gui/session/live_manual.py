@@ -1,0 +1,67 @@
+"""Manual control between runs: the coil held at a current."""
+
+from __future__ import annotations
+
+from gui.session.live_task import LiveTask
+from gui.session.log import Level, Log
+from gui.session.status import Status
+from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.events import CoilCurrent, RunState, StateChanged
+from tactile_lab.engine.commands import BeginManual, Hold, Renew
+from tactile_lab.engine.events import Samples, TaskEvent
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+
+
+class LiveManual(LiveTask):
+    """The coil of one bench, driven by hand.
+
+    Attributes:
+        current: that it was asked to hold last, A.
+        opened: the source has answered.
+    """
+
+    def __init__(self, link: Link, status: Status, log: Log) -> None:
+        super().__init__(link, status, log)
+        self.current = 0.0
+        self.opened = False
+
+    def start(self, request: Request) -> None:
+        """Open the coil source of a request's bench; the output stays off."""
+        self.current, self.opened = 0.0, False
+        self._begin(BeginManual(request))
+        self._log.add(Level.WARNING, "coil", "Manual control on", safety=True)
+
+    def hold(self, current: float) -> None:
+        """Go to `current`, A, as fast as the slew limit lets it, and stay."""
+        if self.task is not None:
+            self.current = current
+            self.send(Hold(current))
+
+    def hear(self, event: TaskEvent) -> None:
+        """Note what the coil does; each word is answered by renewing the lease."""
+        if isinstance(event, StateChanged):
+            self.opened = self.opened or event.state is RunState.READY
+        elif isinstance(event, CoilCurrent):
+            read = event.measured is not None
+            self._status.coil.sign_of_life(read_back=read)
+        elif isinstance(event, Samples):
+            self.send(Renew())
+
+    def has_ended(self, ending: Ending) -> None:
+        """Tell how the coil was left."""
+        status, off, reason = self._status, ending.off, ending.reason or ""
+        self.current = 0.0
+        if ending.state is RunState.REFUSED:
+            status.set_fault("The coil cannot be driven by hand.", reason)
+            return
+        if ending.state is RunState.LOST:
+            status.lose_engine()
+            return
+        status.coil.left(off)
+        if not off.verified:
+            status.set_fault("The coil's state is unknown.", reason or off.text)
+        elif ending.state is RunState.FAULTED:
+            status.set_fault("Manual control ended.", reason)
+        self._log.add(Level.GOOD, "safety", "Manual control off", safety=True)
+        status.changed.emit()

@@ -1,0 +1,256 @@
+"""The run in progress, or the last one: what the window knows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Signal
+
+from gui.lanes.expected import Hold
+from gui.lanes.source import LiveSource
+from gui.session.agreement import Agreement
+from gui.session.live_task import LiveTask
+from gui.session.log import Level, Log
+from gui.session.status import Status
+from gui.state import State, milliamperes
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.ending import Ending, Executed
+from tactile_lab.engine.commands import Answer, BeginRun, Note
+from tactile_lab.engine.engine import Reply
+from tactile_lab.engine.events import (
+    Begun,
+    ModelPart,
+    PersonAsked,
+    Samples,
+    TaskEvent,
+)
+from tactile_lab.engine.jobs import WriteReport
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+from tactile_lab.quantity import show
+
+if TYPE_CHECKING:
+    from gui.session.expectation import Expectation
+
+LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
+
+
+class LiveRun(LiveTask):
+    """One run at a time.
+
+    Args:
+        out: folder for run folders.
+        field_read: told the field, T, as it is read.
+
+    Attributes:
+        source: what is seen of it; None before its first word.
+        request, title, expectation: what it was asked to do, its name and its plan.
+        name: for people: the title, then the folder.
+        folder: of the last run; None before any.
+        trial: number and label of the step in progress.
+        probes: what the probes touch in this trial: the circuit, or something else.
+        asked: what it waits for a person to do; None while nobody is asked.
+        elapsed, expected: run time, s.
+        agreement: how well the model follows the run on screen; None if nobody knows.
+        notes: kept with each run.
+        reports: whether the report is written at its end.
+    """
+
+    begun = Signal(object)
+    trial_ended = Signal(object)
+    ended = Signal(object)
+    completed = Signal()
+    reported = Signal(object)
+
+    def __init__(
+        self,
+        link: Link,
+        status: Status,
+        log: Log,
+        out: Path,
+        field_read: Callable[[float], None],
+    ) -> None:
+        super().__init__(link, status, log)
+        self._out, self._field_read = out, field_read
+        self.source: LiveSource | None = None
+        self.request: Request | None = None
+        self.title = self.name = ""
+        self.expectation: Expectation | None = None
+        self.folder: Path | None = None
+        self.trial: tuple[int, str] | None = None
+        self.probes = "circuit"
+        self.asked: PersonAsked | None = None
+        self.elapsed = 0.0
+        self.expected: float | None = None
+        self.agreement: Agreement | None = None
+        self.notes: dict[str, str] = {}
+        self.reports = True
+
+    def start(
+        self, request: Request, title: str, expectation: Expectation | None
+    ) -> None:
+        """Begin a run.
+
+        Args:
+            request: what to run.
+            title: for people.
+            expectation: its plan; None if nobody planned it.
+        """
+        self.source, self.trial, self.agreement = None, None, None
+        self.elapsed, self.expected, self.asked = 0.0, None, None
+        self.request, self.expectation = request, expectation
+        self.title = self.name = title
+        self._begin(BeginRun(request, self._out, dict(self.notes)))
+
+    def note(self, text: str) -> None:
+        """Put a note into the run's log, stamped with its time."""
+        self.send(Note(text, self.elapsed))
+
+    def stop(self, reason: str) -> None:
+        """Switch the coil off and end; nobody is asked any more."""
+        self.asked = None
+        super().stop(reason)
+
+    def answer(self, text: str = "") -> None:
+        """The person has done what the run waits for, and typed `text`."""
+        if self.asked is None:
+            return
+        said = f"Done: {self.asked.text}"
+        if self.asked.current is not None:
+            at = show(self.asked.current, "A")
+            said = f"Typed {text.replace('-', '−')} at {at}"
+        self._log.add(Level.INFO, "runner", said)
+        self.asked = None
+        self.send(Answer(text))
+        self._status.changed.emit()
+
+    def hear(self, event: TaskEvent) -> None:
+        """Note what the run tells."""
+        source, coil = self.source, self._status.coil
+        match event:
+            case Begun():
+                self._has_begun(event)
+            case PersonAsked():
+                self.asked = event
+                words = f"{event.doubt} {event.text}".strip()
+                self._log.add(Level.WARNING, "runner", words)
+                self._status.changed.emit()
+            case events.StateChanged():
+                self._run_state(event)
+            case events.Message(level=level, text=text):
+                self._log.add(LEVELS.get(level, Level.INFO), "runner", text)
+            case events.Progress(elapsed=elapsed, expected=expected):
+                self.elapsed, self.expected = elapsed, expected
+            case events.TrialEnded(outcome=outcome):
+                self.trial_ended.emit(outcome)
+            case _ if source is None:
+                return  # nothing is measured before it has begun
+            case Samples(bins=bins):
+                source.add_bins(bins)
+            case ModelPart():
+                source.model.add(event)
+            case events.SpikesSeen(times=times):
+                source.add_spikes(times)
+            case events.CoilCurrent(time=at, setpoint=sent, measured=read):
+                coil.sign_of_life(read_back=read is not None)
+                source.add_current(at, sent if read is None else read)
+            case events.FieldRead(time=at, field=field):
+                self._field_read(field)
+                source.add_field(at, field)
+            case events.TrialStarted():
+                self._trial_started(source, event)
+
+    def has_ended(self, ending: Ending) -> None:
+        """Tell how the coil was left and what was kept; the state follows."""
+        status, off = self._status, ending.off
+        self.asked = None
+        if self.source is not None:
+            self.source.running = False
+        if ending.state is events.RunState.REFUSED:
+            self.name = ""
+            words = ("The run was refused.", ending.reason or "")
+            self._log.add(Level.ERROR, "bench", " ".join(words))
+            status.set_fault(*words)
+        elif ending.state is events.RunState.LOST:
+            status.lose_engine(kept=True)
+        elif isinstance(ending, Executed):
+            status.coil.left(off)
+            self._keep(ending)
+        else:
+            status.coil.left(off)
+            status.set_fault("The run broke.", f"{ending.reason} {off.text}")
+
+    def _keep(self, done: Executed) -> None:
+        status, off, folder = self._status, done.off, done.folder
+        self.elapsed = done.duration
+        level = Level.GOOD if off.verified else Level.ERROR
+        self._log.add(level, "safety", f"Coil: {off.text}", safety=True)
+        words = f"{folder.name} {done.state}: {done.spikes} spikes"
+        lost = done.loss.get("samples")
+        if lost is not None:
+            words += f", {lost} samples lost"
+        self._log.add(Level.INFO, "store", words)
+        if self.reports:
+            self._link.ask(
+                WriteReport(folder), lambda reply: self._report(folder, reply)
+            )
+        self.ended.emit(done)
+        if not off.verified:
+            status.set_fault("The coil's state is unknown after the run.", off.text)
+        elif done.state is events.RunState.FAULTED:
+            kept = f"{done.duration:.1f} s of data kept in {folder.name}. "
+            left = f"Coil off, {milliamperes(off.current)} read back."
+            status.set_fault(done.reason or "The run faulted.", kept + left)
+        else:
+            status.enter(State.READY)
+            if done.state is events.RunState.COMPLETE:
+                self.completed.emit()
+
+    def _has_begun(self, event: Begun) -> None:
+        plan, coil = self.expectation, self._status.coil
+        if event.folder is not None:
+            self.folder, self.name = event.folder, event.folder.name
+            self._log.add(Level.INFO, "store", f"Recording to {event.folder}")
+        self.expected = plan.estimate.duration if plan else None
+        coil.limits = event.limits or coil.limits
+        coil.sign_of_life(read_back=True)
+        preview = plan.preview if plan else None
+        self.source = LiveSource(preview, event.newtons_per_ampere)
+        for warning in plan.warnings if plan else ():
+            self._log.add(Level.WARNING, "plan", warning)
+        self.begun.emit(self.source)
+        self._status.changed.emit()
+
+    def _trial_started(self, source: LiveSource, event: events.TrialStarted) -> None:
+        trial, start = event.trial, event.start
+        self.trial, self.probes = (event.index, trial.label), trial.probes
+        held = None
+        if trial.hold is not None:
+            held = start + trial.hold[0], start + trial.hold[1]
+        end = start + trial.length
+        source.begin_trial(
+            event.index, Hold(start, end, trial.label, trial.pause, held)
+        )
+        what = "recovery" if trial.pause else trial.label
+        words = f"Step {event.index + 1} · {what} started"
+        self._log.add(Level.INFO, "runner", words)
+        self._status.changed.emit()
+
+    def _run_state(self, event: events.StateChanged) -> None:
+        running = self._status.state is State.RUNNING
+        if event.state is events.RunState.STOPPING:
+            self.asked = None
+            if running:
+                self._status.enter(State.ABORTING)
+        if event.state in (events.RunState.CONNECTING, events.RunState.RUNNING):
+            self._log.add(Level.INFO, "runner", event.text.capitalize())
+
+    def _report(self, folder: Path, reply: Reply[None]) -> None:
+        if reply.problem:
+            self._log.add(Level.WARNING, "report", reply.problem)
+        else:
+            words = f"Report in {folder / 'report.html'}"
+            self._log.add(Level.GOOD, "report", words)
+        self.reported.emit(folder)

@@ -1,0 +1,76 @@
+"""A run, the monitor or manual control in the engine, as the window follows it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from PySide6.QtCore import QObject
+
+from gui.session.log import Log
+from gui.session.status import Status
+from tactile_lab.acquisition.ending import CoilState, Ending
+from tactile_lab.engine.engine import Begin, Command
+from tactile_lab.engine.events import Ended, Samples, TaskEvent
+from tactile_lab.engine.link import Link, RemoteTask
+
+
+class LiveTask(QObject):
+    """One task at a time, from its beginning to its end; nothing here blocks.
+
+    Args:
+        link: to the engine.
+        status: of the window.
+        log: of the window.
+
+    Attributes:
+        task: in the engine; None between two.
+        coil: its state, as told last; None before the first word and after the end.
+    """
+
+    def __init__(self, link: Link, status: Status, log: Log) -> None:
+        super().__init__()
+        self._link, self._status, self._log = link, status, log
+        self.task: RemoteTask | None = None
+        self.coil: CoilState | None = None
+
+    @property
+    def alive(self) -> bool:
+        """Whether it may still hold instruments."""
+        return self.task is not None
+
+    def stop(self, reason: str) -> None:
+        """Switch the coil off and end; returns at once."""
+        if self.task is not None:
+            self.task.stop(reason)
+
+    def send(self, command: Command) -> None:
+        """Say something to the task, if there is one."""
+        if self.task is not None:
+            self.task.send(command)
+
+    def wait_for_end(self, timeout: float) -> None:
+        """Block until it has ended, at most `timeout` s."""
+        if self.task is not None:
+            self.task.join(timeout)
+
+    def take(self, event: TaskEvent) -> None:
+        """Take what the task told."""
+        if isinstance(event, Ended):
+            self.task = self.coil = None
+            self.has_ended(event.ending)
+            return
+        if isinstance(event, Samples):
+            self.coil = event.coil
+        self.hear(event)
+
+    def _begin(self, asked: Begin) -> None:
+        self.coil = None
+        self.task = self._link.begin(asked, self.take)
+
+    @abstractmethod
+    def hear(self, event: TaskEvent) -> None:
+        """The task told something; it goes on."""
+
+    @abstractmethod
+    def has_ended(self, ending: Ending) -> None:
+        """The task has ended."""

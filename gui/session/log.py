@@ -1,0 +1,60 @@
+"""The log of the window: what happened, when, and who says so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import Enum
+
+from PySide6.QtCore import QObject, Signal
+
+KEPT = 5000
+"""Newest lines that are kept."""
+
+
+class Level(Enum):
+    """How much a line of the log matters."""
+
+    INFO = "info"
+    GOOD = "check"
+    WARNING = "warning"
+    ERROR = "error"
+    NOTE = "note"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the log.
+
+    Attributes:
+        at: wall-clock time.
+        level: how much it matters.
+        source: who says so: runner, coil, scope, plan, store, note, ...
+        text: for a person.
+        safety: whether it is about the coil's safe state.
+    """
+
+    at: datetime
+    level: Level
+    source: str
+    text: str
+    safety: bool = False
+
+
+class Log(QObject):
+    """Lines, the oldest first."""
+
+    added = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[Line] = []
+
+    def add(
+        self, level: Level, source: str, text: str, *, safety: bool = False
+    ) -> None:
+        """Put a line into the log."""
+        line = Line(datetime.now(), level, source, text, safety)
+        self.lines.append(line)
+        del self.lines[:-KEPT]
+        self.added.emit(line)

@@ -1,0 +1,128 @@
+"""Runs that wait for the one in progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Signal
+
+from gui.session.log import Level, Log
+from tactile_lab.engine.engine import Reply
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+
+if TYPE_CHECKING:
+    from gui.session.expectation import Expectation
+
+
+@dataclass(eq=False)
+class Queued:
+    """A run that waits for the one before it.
+
+    Attributes:
+        title: for people.
+        request: what to run.
+        expectation: its plan; None until it is computed.
+        left: how it left the queue, in words; "" while it waits.
+    """
+
+    title: str
+    request: Request
+    expectation: Expectation | None = None
+    left: str = ""
+
+
+class Queue(QObject):
+    """Starts the first run as soon as the bench is free.
+
+    Args:
+        link: has runs planned.
+        log: says why one was taken out.
+        free: whether the bench is free.
+        start: starts a run.
+
+    Attributes:
+        items: the next one first.
+        held: whether it waits to be resumed, as it does after a STOP.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        link: Link,
+        log: Log,
+        free: Callable[[], bool],
+        start: Callable[[Queued], None],
+    ) -> None:
+        super().__init__()
+        self._link, self._log, self._free, self._start = link, log, free, start
+        self.items: list[Queued] = []
+        self.held = False
+
+    def add(self, item: Queued) -> None:
+        """Have a run follow those before it; it starts at once if none is running."""
+        from gui.session.expectation import PlanRequest
+
+        self.items.append(item)
+        if item.expectation is None:
+            asked = item.request
+            self._link.ask(
+                PlanRequest(asked), lambda reply: self._planned(item, asked, reply)
+            )
+        self.resume()
+
+    def resume(self) -> None:
+        """Go on after a STOP or a fault."""
+        self.held = False
+        self.changed.emit()
+        self.next()
+
+    def hold(self) -> None:
+        """Wait until somebody resumes."""
+        if self.items and not self.held:
+            self.held = True
+            self.changed.emit()
+
+    def remove(self, item: Queued) -> None:
+        """Take a waiting run out."""
+        self.items.remove(item)
+        item.left = "was taken out of the queue"
+        self.changed.emit()
+
+    def replace(self, item: Queued, request: Request, expectation: Expectation) -> None:
+        """Have a waiting run do something else, at its place."""
+        item.request, item.expectation = request, expectation
+        self.changed.emit()
+        self.next()
+
+    def move(self, item: Queued, by: int) -> None:
+        """Move a waiting run up (-1) or down (1)."""
+        number = self.items.index(item)
+        to = number + by
+        if 0 <= to < len(self.items):
+            self.items[number], self.items[to] = self.items[to], self.items[number]
+            self.changed.emit()
+
+    def next(self) -> None:
+        """Start the first run, if it is planned and the bench is free."""
+        planned = self.items and self.items[0].expectation is not None
+        if planned and not self.held and self._free():
+            item = self.items.pop(0)
+            item.left = "has started with the parameters it had"
+            self.changed.emit()
+            self._start(item)
+
+    def _planned(self, item: Queued, asked: Request, reply: Reply[Expectation]) -> None:
+        """The plan of a waiting run is there; one that cannot run is taken out."""
+        if item not in self.items or item.request != asked:
+            return  # it has left, or does something else by now
+        item.expectation = reply.value
+        if reply.value is None:
+            self.items.remove(item)
+            item.left = f"was taken out of the queue: {reply.problem}"
+            self._log.add(Level.ERROR, "queue", f"{item.title} {item.left}")
+        self.changed.emit()
+        self.next()

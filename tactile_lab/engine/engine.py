@@ -1,0 +1,348 @@
+"""The engine: a process that drives benches and solves models for whoever looks.
+
+A window, a script or a notebook asks through one pipe (`engine.link`). In a process of
+its own nothing the engine does takes time from a frame, and a window that dies takes
+no run with it: when the pipe's other end is gone, each task is stopped, its coil
+verified off and its record completed, before the process ends.
+
+A task is begun by a `Begin`, and spoken to by a `ToTask`; a `Job` is worked out beside
+and answered once. Commands are never waited on: a STOP is read at once and goes
+straight to the coil.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.events import CoilCurrent, Event, RunState
+from tactile_lab.bench import OffReport
+from tactile_lab.engine.events import Begun, Ended, PersonAsked, Samples, TaskEvent
+from tactile_lab.engine.request import Request
+from tactile_lab.engine.threads import start
+from tactile_lab.errors import RefusedError, TactileLabError
+
+if TYPE_CHECKING:
+    from tactile_lab.engine.model_parts import LiveParts
+    from tactile_lab.engine.task import Task
+
+T = TypeVar("T")
+
+LEAVE = 60.0
+"""Longest wait for tasks to end after the pipe's other end has gone, s."""
+
+EVERY, AT_LEAST = 0.02, 0.2
+"""Time between two looks at the newest samples and at the coil, and after which they
+are told although nothing changed, s."""
+
+SLICE, BEHIND = 0.3, 0.15
+"""Time between two slices of the model beside a run, and how far it stays behind the
+samples, s: the host hears of a set-point only after the samples that it moved."""
+
+
+class Command(ABC):
+    """One thing asked of the engine."""
+
+    @abstractmethod
+    def do(self, engine: Engine, number: int) -> None:
+        """Carry it out in the engine, at once; `number` tells which task or job."""
+
+
+@dataclass(frozen=True)
+class Begin(Command):
+    """Begin a task.
+
+    Attributes:
+        request: names the scene and its bench.
+    """
+
+    name: ClassVar[str]
+    request: Request
+
+    def do(self, engine: Engine, number: int) -> None:
+        """Begin it in a thread of its own."""
+        engine.begin(number, self)
+
+    @abstractmethod
+    def make(self, served: ServedTask) -> Task[Any]:
+        """The task; what it tells goes through `served`.
+
+        Raises:
+            TactileLabError, OSError: it is refused.
+        """
+
+
+class ToTask(Command, Generic[T]):
+    """Something said to a task: now, or as soon as it is made."""
+
+    def do(self, engine: Engine, number: int) -> None:
+        """Say it; one that has ended hears nothing."""
+        if number in engine.tasks:
+            engine.tasks[number].to_task(self.act)
+
+    @abstractmethod
+    def act(self, task: T) -> None:
+        """Do it to the task; returns at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reply(Generic[T]):
+    """The answer to a job.
+
+    Attributes:
+        value: what came of it; None where nothing did.
+        problem: why nothing came of it, "" if something did.
+        lost: the engine died over it.
+    """
+
+    value: T | None
+    problem: str = ""
+    lost: bool = False
+
+
+class Job(Command, Generic[T]):
+    """A question: worked on in a thread of its own, answered by one `Reply`."""
+
+    name: ClassVar[str]
+
+    def do(self, engine: Engine, number: int) -> None:
+        """Have it worked out beside everything else."""
+        start(lambda: engine.tell(number, self._reply(engine)), self.name)
+
+    @abstractmethod
+    def work(self, engine: Engine) -> T:
+        """What was asked for.
+
+        Raises:
+            TactileLabError, OSError: there is no answer; the words are the problem.
+        """
+
+    def _reply(self, engine: Engine) -> Reply[T]:
+        try:
+            return Reply(self.work(engine))
+        except (TactileLabError, OSError) as error:
+            return Reply(None, str(error))
+        except Exception as error:  # code of the user's own may raise anything
+            what = f"The {self.name} broke: {type(error).__name__}: {error}"
+            return Reply(None, what)
+
+
+class Engine:
+    """Serves one pipe.
+
+    Args:
+        pipe: to whoever looks.
+        realtime: pace a simulated bench by the wall clock.
+
+    Attributes:
+        tasks: by number; those that have ended go when another begins.
+        leaving: the other end has said that it goes.
+    """
+
+    def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
+        self._pipe, self.realtime = pipe, realtime
+        self._sending = threading.Lock()
+        self.tasks: dict[int, ServedTask] = {}
+        self.leaving = False
+
+    def serve(self) -> None:
+        """Do what is asked until the other end has gone; then leave every coil off."""
+        try:
+            while not self.leaving:
+                number, command = self._pipe.recv()
+                command.do(self, number)
+        except (EOFError, OSError):
+            pass
+        finally:
+            for task in self.tasks.values():
+                task.stop("The window has gone")
+            for task in self.tasks.values():
+                task.thread.join(LEAVE)
+            self._pipe.close()
+
+    def begin(self, number: int, asked: Begin) -> None:
+        """Begin a task; all it tells carries its number."""
+        self.tasks = {n: t for n, t in self.tasks.items() if t.thread.is_alive()}
+        self.tasks[number] = ServedTask(
+            asked, lambda told: self.tell(number, told), realtime=self.realtime
+        )
+
+    def tell(self, number: int, told: TaskEvent | Reply[Any]) -> None:
+        """Tell the other end; one that has gone hears nothing."""
+        with self._sending:
+            try:
+                self._pipe.send((number, told))
+            except OSError:
+                pass  # `serve` sees the end of the pipe and stops every task
+
+
+class ServedTask:
+    """A task in a thread of its own, told through the pipe from `Begun` to `Ended`.
+
+    Args:
+        asked: makes the task.
+        tell: tells the other end, from any thread.
+        realtime: pace a simulated bench by the wall clock.
+
+    Attributes:
+        task: None until it is made.
+        model: follows it; None where nothing is modelled.
+        answers: what a person typed.
+    """
+
+    def __init__(
+        self, asked: Begin, tell: Callable[[TaskEvent], None], *, realtime: bool
+    ) -> None:
+        self._asked, self._tell, self.realtime = asked, tell, realtime
+        self.task: Task[Any] | None = None
+        self.model: LiveParts | None = None
+        self.answers: SimpleQueue[str] = SimpleQueue()
+        self._said: list[Callable[[Any], None]] = []
+        self._lock = threading.Lock()
+        self.thread = start(self._main, asked.name)
+
+    def to_task(self, act: Callable[[Any], None]) -> None:
+        """Have something done to the task: now, or as soon as it is made."""
+        with self._lock:
+            if self.task is None:
+                self._said.append(act)
+            else:
+                act(self.task)
+
+    def stop(self, reason: str) -> None:
+        """Switch off and end it; returns at once."""
+        self.to_task(lambda task: task.stop(reason))
+
+    def emit(self, event: Event) -> None:
+        """The task tells something."""
+        if self.model is not None and isinstance(event, CoilCurrent):
+            read = event.measured
+            self.model.add(event.time, event.setpoint if read is None else read)
+        self._tell(event)
+
+    def ask(self, text: str) -> str:
+        """Have the other end ask a person to do something; what was typed.
+
+        Raises:
+            RefusedError: the run ended meanwhile.
+        """
+        return self._await(PersonAsked(text))
+
+    def ask_field(self, text: str) -> str:
+        """Have a person read the teslameter at the current that flows."""
+        doubt, _, question = text.rpartition("\n")
+        task = self.task
+        current = None if task is None else task.coil_state.setpoint
+        return self._await(PersonAsked(question, current or 0.0, doubt))
+
+    def _await(self, asked: PersonAsked) -> str:
+        self._tell(asked)
+        while self.thread.is_alive():
+            try:
+                return self.answers.get(timeout=0.2)
+            except Empty:
+                pass
+        raise RefusedError("The run has ended; nobody needs to answer.")
+
+    def _main(self) -> None:
+        ending = Ending(RunState.FAULTED, OffReport(False, None, "not verified"))
+        try:
+            ending = self._carry_out()
+        finally:
+            # an error may hold anything; its words are in the reason
+            self._tell(Ended(replace(ending, failure=None)))
+
+    def _carry_out(self) -> Ending:
+        try:
+            task = self._asked.make(self)
+        except (TactileLabError, OSError) as error:
+            return Ending.refused(str(error))
+        except Exception as error:  # a protocol of the user's own may raise anything
+            what = f"{type(error).__name__}: {error}"
+            return Ending.refused(f"It broke before it began. {what}")
+        with self._lock:
+            self.task = task
+            for act in self._said:
+                act(task)
+        folder = getattr(task, "folder", None)
+        magnet, coil = task.scene.bench.magnet, task.bench.coil
+        self._tell(
+            Begun(
+                folder=None if folder is None else folder.path,
+                limits=None if coil is None else coil.limits,
+                newtons_per_ampere=magnet.newtons_per_ampere,
+                critical_V_C1=task.scene.circuit.critical_V_C1,
+            )
+        )
+        return self._run(task)
+
+    def _run(self, task: Task[Any]) -> Ending:
+        over = threading.Event()
+        beside = [start(lambda: self._tell_samples(task, over), "samples")]
+        if self.model is not None:
+            follow = self.model
+            beside.append(start(lambda: self._tell_model(follow, task, over), "model"))
+        try:
+            ending: Ending = task.run()
+        except BaseException as error:
+            off = task.coil_state.off or OffReport(False, None, "not verified")
+            what = f"It broke. {type(error).__name__}: {error}"
+            ending = Ending(RunState.FAULTED, off, what)
+        over.set()
+        for thread in beside:
+            thread.join()
+        return ending
+
+    def _tell_samples(self, task: Task[Any], over: threading.Event) -> None:
+        """Tell samples and the coil's state as they come, to the very last."""
+        live, seen, last, said = task.live, 0, None, 0.0
+        ended = False
+        while not ended:
+            ended = over.wait(EVERY)
+            written, coil = live.written, task.coil_state
+            late = time.monotonic() - said > AT_LEAST
+            if written == seen and coil == last and not late:
+                continue
+            first = seen if written >= seen else 0
+            bins = {}
+            if written != seen:
+                bins = {name: live.since(first, name) for name in live.signals}
+            self._tell(Samples(bins, coil))
+            seen, last, said = written, coil, time.monotonic()
+
+    def _tell_model(
+        self, model: LiveParts, task: Task[Any], over: threading.Event
+    ) -> None:
+        """Advance the model behind the samples, slice by slice, and to their end."""
+        ended = False
+        while not ended:
+            ended = over.wait(SLICE)
+            part = model.until(task.live.reach - (0.0 if ended else BEHIND))
+            if part is not None:
+                self._tell(part)
+
+
+def main(pipe: Connection, realtime: bool = True) -> None:
+    """Serve in a process of its own.
+
+    Ctrl-C and a closed terminal reach the window too, which decides; SIGTERM ends as
+    the window's end does.
+    """
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave)
+    Engine(pipe, realtime=realtime).serve()
+
+
+def _leave(number: int, frame: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise EOFError

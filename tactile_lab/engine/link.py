@@ -1,0 +1,232 @@
+"""The pipe to the engine, from the side of a window, a script or a notebook.
+
+from tactile_lab.engine.commands import BeginRun
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+
+with Link() as link:
+    for event in link.begin(BeginRun(Request("demo"), Path("runs"))):
+        print(event)                     # Begun, Samples, ... to Ended
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.bench import OffReport
+from tactile_lab.engine.commands import Leave, Stop
+from tactile_lab.engine.engine import Begin, Command, Job, Reply
+from tactile_lab.engine.events import Ended, TaskEvent
+from tactile_lab.engine.threads import start
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
+
+T = TypeVar("T")
+Hear = Callable[[TaskEvent], None]
+
+
+class RemoteTask:
+    """A task in the engine. Iterating gives its events, up to `Ended`.
+
+    Args:
+        number: names it in the engine.
+        send: sends a command to it.
+        hear: takes its events when the link is polled; None: they are iterated over.
+    """
+
+    def __init__(
+        self, number: int, send: Callable[[Command], None], hear: Hear | None = None
+    ) -> None:
+        self.number, self.send, self.hear = number, send, hear
+        self._events: SimpleQueue[TaskEvent] = SimpleQueue()
+        self._ended = threading.Event()
+
+    def stop(self, reason: str) -> None:
+        """Switch the coil off and end; returns at once."""
+        self.send(Stop(reason))
+
+    @property
+    def alive(self) -> bool:
+        """Whether it may still hold instruments."""
+        return not self._ended.is_set()
+
+    def join(self, timeout: float) -> bool:
+        """Wait for the end, at most `timeout` s; whether it came."""
+        return self._ended.wait(timeout)
+
+    def take(self, event: TaskEvent) -> None:
+        """An event came; called by the thread that reads the pipe."""
+        if isinstance(event, Ended):
+            self._ended.set()
+        if self.hear is None:
+            self._events.put(event)
+
+    def __iter__(self) -> Iterator[TaskEvent]:
+        """Its events as they come."""
+        while True:
+            event = self._events.get()
+            yield event
+            if isinstance(event, Ended):
+                return
+
+
+class Link:
+    """Starts the engine when it is first needed, and again where it has died.
+
+    Args:
+        separate: in a process of its own; else in a thread, for tests that reach into
+            the simulated far ends.
+        realtime: pace a simulated bench by the wall clock.
+        lost: told why where the engine has died, when the link is polled.
+    """
+
+    def __init__(
+        self,
+        *,
+        separate: bool = True,
+        realtime: bool = True,
+        lost: Callable[[str], None] = lambda why: None,
+    ) -> None:
+        self._separate, self._realtime, self._lost = separate, realtime, lost
+        self._pipe: Connection | None = None
+        self._process: BaseProcess | threading.Thread | None = None
+        self._tasks: dict[int, RemoteTask] = {}
+        self._asked: dict[int, Callable[[Reply[Any]], None]] = {}
+        self._inbox: SimpleQueue[tuple[Callable[[Any], None], Any]] = SimpleQueue()
+        self._last = 0
+        self._lock = threading.Lock()
+        self._closing = False
+
+    def begin(self, asked: Begin, hear: Hear | None = None) -> RemoteTask:
+        """Begin a task.
+
+        Args:
+            asked: what.
+            hear: takes its events when the link is polled; None: they are iterated
+                over.
+        """
+        with self._lock:
+            number = self._number()
+            task = RemoteTask(number, lambda said: self._send(number, said), hear)
+            self._tasks[number] = task
+            self._write(number, asked)
+        return task
+
+    def ask(self, job: Job[T], then: Callable[[Reply[T]], None]) -> None:
+        """Have a job done; `then` takes the reply when the link is polled."""
+        with self._lock:
+            number = self._number()
+            self._asked[number] = then
+            self._write(number, job)
+
+    def poll(self) -> None:
+        """Hand over all that came since; in the calling thread."""
+        while True:
+            try:
+                take, told = self._inbox.get_nowait()
+            except Empty:
+                return
+            take(told)
+
+    @property
+    def idle(self) -> bool:
+        """Whether all that came was handed over."""
+        return self._inbox.empty()
+
+    @property
+    def pid(self) -> int | None:
+        """The engine's process id; None while it has no process."""
+        return getattr(self._process, "pid", None)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the engine works."""
+        return self._process is not None and self._process.is_alive()
+
+    def close(self, timeout: float = 10.0) -> None:
+        """Let the engine end and wait for that, at most `timeout` s."""
+        self._closing = True
+        self._send(0, Leave())
+        if self._process is not None:
+            self._process.join(timeout)
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _number(self) -> int:
+        """A number for what is asked next, and an engine to ask."""
+        if self._pipe is None:
+            self._open()
+        self._last += 1
+        return self._last
+
+    def _send(self, number: int, command: Command) -> None:
+        with self._lock:
+            self._write(number, command)
+
+    def _write(self, number: int, command: Command) -> None:
+        try:
+            if self._pipe is not None:
+                self._pipe.send((number, command))
+        except OSError:
+            pass  # the reading thread sees the end of the pipe too, and tells
+
+    def _open(self) -> None:
+        from tactile_lab.engine import engine
+
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        if self._separate:
+            self._process = context.Process(
+                target=engine.main, args=(theirs, self._realtime), daemon=True
+            )
+            # daemonic: a window that ends without `close` still sends it SIGTERM
+            self._process.start()
+            theirs.close()
+        else:
+            served = engine.Engine(theirs, realtime=self._realtime)
+            self._process = start(served.serve, "engine")
+        ours = self._pipe
+        start(lambda: self._read(ours), "link")
+
+    def _read(self, pipe: Connection) -> None:
+        why = "The pipe to it ended"
+        try:
+            while True:
+                self._take(*pipe.recv())
+        except (EOFError, OSError):
+            pass
+        except Exception as error:  # what a user's own protocol sends may not unpickle
+            why = f"{type(error).__name__}: {error}"
+        with self._lock:
+            pipe.close()
+            self._pipe = None
+            tasks, asked = list(self._tasks), list(self._asked)
+        if not self._closing:
+            self._inbox.put((self._lost, why))
+        off = OffReport(False, None, "not verified")
+        for number in tasks:
+            self._take(number, Ended(Ending(RunState.LOST, off, why)))
+        for number in asked:
+            self._take(number, Reply(None, f"The engine ended: {why}", lost=True))
+
+    def _take(self, number: int, told: Any) -> None:
+        if isinstance(told, Reply):
+            self._inbox.put((self._asked.pop(number), told))
+        elif (task := self._tasks.get(number)) is not None:
+            if isinstance(told, Ended):
+                del self._tasks[number]
+            if task.hear is not None:
+                self._inbox.put((task.hear, told))
+            task.take(told)

@@ -1,0 +1,114 @@
+"""A plain script at the pipe: no window, no Qt."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tactile_lab.acquisition.events import RunState, SpikesSeen
+from tactile_lab.engine.commands import BeginMonitor, BeginRun
+from tactile_lab.engine.engine import Job, Reply
+from tactile_lab.engine.events import Begun, Ended, Samples
+from tactile_lab.engine.jobs import CheckBench
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+from tactile_lab.store.run import Run
+
+SHORT = ('protocol.levels=["200 mN"]', "protocol.hold=0.8 s", "protocol.rest=0.3 s")
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from tactile_lab.engine.commands import BeginRun
+from tactile_lab.engine.events import Begun, Ended, Samples
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
+
+if __name__ == "__main__":
+    kinds, bins = set(), 0
+    with Link(realtime=False) as link:
+        run = link.begin(BeginRun(Request("demo", %r), Path(sys.argv[1])))
+        for event in run:
+            kinds.add(type(event).__name__)
+            if isinstance(event, Samples) and "V_C1" in event.bins:
+                bins += event.bins["V_C1"].time.size
+    ending = event.ending
+    assert {"Begun", "Samples", "TrialEnded", "SpikesSeen", "Ended"} <= kinds, kinds
+    assert not any(name.startswith("PySide6") for name in sys.modules)
+    print(ending.state, ending.off.verified, ending.spikes, bins)
+"""
+
+
+def test_a_script_drives_a_run_through_a_process_of_its_own(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT % (SHORT,))
+    asked = [sys.executable, str(script), str(tmp_path / "runs")]
+    done = subprocess.run(asked, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    state, verified, spikes, bins = done.stdout.split()
+    (folder,) = (tmp_path / "runs").iterdir()
+    with Run.load(folder) as run:
+        assert (state, verified) == ("complete", "True")
+        assert run.spikes.size == int(spikes) > 5
+        assert int(bins) > 1000 * run.duration - 5, "each millisecond was told once"
+
+
+def test_a_stop_said_before_anything_is_made_ends_the_run_with_the_coil_off(tmp_path):
+    with Link(separate=False, realtime=False) as link:
+        run = link.begin(BeginRun(Request("demo"), tmp_path))
+        run.stop("at once")
+        told = list(run)
+    ending = told[-1].ending
+    assert ending.state is RunState.ABORTED and ending.reason == "at once"
+    assert ending.off.verified and not run.alive
+
+
+def test_a_refused_task_only_ends_and_says_why(tmp_path):
+    with Link(separate=False, realtime=False) as link:
+        strong = Request("demo", ('protocol.levels=["900 mN"]',))
+        (told,) = link.begin(BeginRun(strong, tmp_path))
+        (other,) = link.begin(BeginMonitor(Request("demo")))
+    assert isinstance(told, Ended) and told.ending.state is RunState.REFUSED
+    assert "reachable" in told.ending.reason and told.ending.exit_code == 2
+    assert "asks for a force" in other.ending.reason
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_monitor_is_told_like_a_run(tmp_path):
+    scene = ("sensor.V_GS=1.65 V", "record.sample_rate=0.1 MS/s")
+    with Link(separate=False) as link:
+        monitor = link.begin(BeginMonitor(Request("monitor", scene)))
+        kinds = set()
+        for event in monitor:
+            kinds.add(type(event))
+            if SpikesSeen in kinds:
+                monitor.stop("seen enough")
+    assert {Begun, Samples, SpikesSeen, Ended} <= kinds
+    assert event.ending.state is RunState.ABORTED
+
+
+class Break(Job[None]):
+    """A job of somebody's own, with a mistake in it."""
+
+    name = "test"
+
+    def work(self, engine):
+        raise KeyError("nothing")
+
+
+def polled(link: Link, job: Job) -> Reply:
+    """The reply to a job."""
+    replies = []
+    link.ask(job, replies.append)
+    while not replies:
+        link.poll()
+    return replies[0]
+
+
+def test_a_job_is_answered_even_where_it_breaks(tmp_path):
+    with Link(separate=False, realtime=False) as link:
+        found = polled(link, CheckBench(Request("demo"))).value
+        assert [one.role for one in found.found if not one.problem] == ["coil", "scope"]
+        assert found.off.verified
+        assert "The test broke: KeyError" in polled(link, Break()).problem
+        gone = polled(link, CheckBench(Request(str(Path("gone.toml")))))
+        assert gone.value is None and "gone.toml" in gone.problem

@@ -1,0 +1,78 @@
+"""Tab goes through the window as one reads it, whatever was made when."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from gui.reading import in_reading_order
+
+
+def names(root: QWidget) -> list[str]:
+    return [one.accessibleName() for one in in_reading_order(root)]
+
+
+def press_tab(lab, *, back: bool = False) -> QWidget:
+    key = Qt.Key.Key_Backtab if back else Qt.Key.Key_Tab
+    QTest.keyClick(lab.app.focusWidget(), key)
+    return lab.app.focusWidget()
+
+
+def test_everything_that_takes_the_keyboard_has_a_name(lab) -> None:
+    lab.runs(1)
+    for tab in (0, 1, 2):
+        lab.window.review.show_tab(tab)
+        lab.app.processEvents()
+        assert all(names(lab.window.page)), tab
+    lab.window.review.show_tab(0)
+
+
+def test_form_is_read_from_its_head_to_its_buttons(lab) -> None:
+    setup = lab.window.setup
+    setup.form.show_protocol(setup.form.protocol, {})  # fields made last come first
+    lab.app.processEvents()
+    titles = [field.parameter.title for field in setup.form.fields]
+    read = names(setup)
+    at = read.index("Protocol")
+    assert read[at + 1 : at + 1 + len(titles)] == titles
+    assert read[at + 1 + len(titles) :] == ["Run", "Queue"]
+    setup.form.set_texts(lab.texts)
+
+
+def test_tab_walks_forth_and_back_and_skips_what_is_locked(lab) -> None:
+    window = lab.window
+    window.activateWindow()
+    lab.until(window.isActiveWindow)
+    window.setup.picker.setFocus()
+    assert press_tab(lab) is window.setup.form.fields[0].focusProxy()
+    assert press_tab(lab, back=True) is window.setup.picker
+    lab.run()
+    window.setup.buttons.queue.setFocus()
+    assert press_tab(lab, back=True) not in window.setup.form.findChildren(QWidget)
+
+
+def test_locking_what_has_the_keyboard_gives_it_to_no_button(lab) -> None:
+    window = lab.window
+    window.activateWindow()
+    lab.until(window.isActiveWindow)
+    window.setup.run.setFocus()
+    QTest.keyClick(window.setup.run, Qt.Key.Key_Space)
+    lab.until(lambda: not window.setup.run.isEnabled())
+    assert lab.app.focusWidget() is window.page
+    lab.until(lambda: window.setup.run.isEnabled())
+
+
+def test_tab_stays_in_an_open_card_and_the_header(lab) -> None:
+    window = lab.window
+    window.activateWindow()
+    lab.until(window.isActiveWindow)
+    window.actions_.show_help()
+    seen = []
+    for _ in range(12):
+        seen.append(press_tab(lab))
+    assert window.header.stop in seen, "STOP is always within reach"
+    covered = (window.setup, window.centre, window.review)
+    assert not any(part.isAncestorOf(one) for one in seen for part in covered)
+    from gui.dialogs.overlay import Overlay
+
+    for overlay in window.findChildren(Overlay):
+        overlay.hide()
