@@ -101,10 +101,6 @@ class Coil(Protocol):
         """Measured output current, A."""
         ...
 
-    def read_voltage(self) -> Reading:
-        """Measured output voltage, V."""
-        ...
-
     @property
     def resistance_ratio(self) -> float | None:
         """Resistance over that of the cold coil, a thermometer; None if not known."""

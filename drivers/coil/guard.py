@@ -26,7 +26,7 @@ READY = 10.0
 """Longest wait for the guard process to be ready, s."""
 
 
-class Watch(Protocol):
+class CoilGuard(Protocol):
     """A guard that switches the output off when the heartbeat stops."""
 
     @property

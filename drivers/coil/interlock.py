@@ -1,25 +1,75 @@
-"""The interlock of a coil source: everything that may trip it, and the latch."""
+"""What protects a coil in software: limits, heat, read-back, resistance, and the latch.
+
+Only hardware is a real interlock; these catch mistakes, not broken electronics.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 
-from drivers.coil.guard import Watch
-from drivers.coil.supervision import (
-    THERMOMETER_CURRENT,
-    HeatBudget,
-    ReadbackCheck,
-    Thermometer,
-)
-from tactile_lab.bench import CoilLimits
-from tactile_lab.errors import InterlockError
+from drivers.coil.guard import CoilGuard
+from tactile_lab.bench import COPPER, CoilLimits
+from tactile_lab.errors import InterlockError, LimitError
+from tactile_lab.instruments.serial_dialect import CoilDialect
+from tactile_lab.quantity import show
+
+DEVIATION = 0.010
+"""Smallest difference between set and measured current that counts, A."""
+
+DEVIATION_SHARE = 0.02
+"""The same as a share of the set-point."""
+
+DEVIATING_READINGS = 3
+"""Readings in a row that must deviate before it trips."""
+
+THERMOMETER_CURRENT = 0.2
+"""Smallest current at which voltage over current tells the temperature, A."""
+
+WARM, HOT, LOOSE, SHORTED = 1.15, 1.24, 2.0, 0.7
+"""Ratios to the cold resistance: warns, trips, open lead, shorted turns."""
+
+NO_RESISTANCE = 0.05
+"""Resistance below which there is no coil, Ohm."""
 
 STEADY = 0.1
 """Time after a change of the set-point from which read-back must agree, s."""
 
 THERMOMETER_EVERY = 1.0
 """Time between two looks at the coil's resistance, s."""
+
+
+def narrowed(limits: CoilLimits, row: CoilDialect) -> CoilLimits:
+    """The limits of coil and user, or the model's where those are narrower."""
+    return replace(
+        limits,
+        current=min(limits.current, row.current),
+        compliance=min(limits.compliance, row.voltage),
+    )
+
+
+def check_current(current: float, limits: CoilLimits, row: CoilDialect) -> None:
+    """Refuse a current (A) that may never be set.
+
+    Raises:
+        LimitError: not finite, beyond the limit, or of a sign the source cannot give.
+    """
+    if not math.isfinite(current):
+        raise LimitError(f"A coil current of {current} A cannot be set.")
+    if abs(current) > limits.current * (1 + 1e-9):
+        raise LimitError(
+            f"A coil current of {show(current, 'A')} exceeds the limit of "
+            f"{show(limits.current, 'A')}. Ask for less, or for a coil and "
+            "source that allow more."
+        )
+    if current < 0 and row.polarity == "positive":
+        raise LimitError(
+            f"{row.title} cannot reverse its current, so "
+            f"{show(current, 'A')} is refused. Ask for a force of the other sign, "
+            "or use a four-quadrant source."
+        )
 
 
 class Interlock:
@@ -36,7 +86,7 @@ class Interlock:
         self,
         limits: CoilLimits,
         time: float,
-        guard: Watch | None,
+        guard: CoilGuard | None,
         warn: Callable[[str], None],
     ) -> None:
         self.heat = HeatBudget(limits, time)
@@ -99,3 +149,128 @@ class Interlock:
         if self.thermometer.warning is not None:
             self._warn(self.thermometer.warning)
         return why
+
+
+class HeatBudget:
+    """Leaky integral of I² above the continuous current.
+
+    Above the continuous current it grows by I² - I_continuous² (A² s a second); below,
+    it falls with the recovery time constant.
+
+    Args:
+        limits: continuous current, budget and recovery.
+        time: clock time now, s.
+    """
+
+    def __init__(self, limits: CoilLimits, time: float) -> None:
+        self._limits = limits
+        self._time = time
+        self._current = 0.0
+        self._used = 0.0
+
+    def flow(self, time: float, current: float) -> None:
+        """From `time` (s) on `current` (A) flows."""
+        self._used = self.used(time)
+        self._time = max(time, self._time)
+        self._current = current
+
+    def used(self, time: float) -> float:
+        """Heat in the budget at `time`, A² s."""
+        passed = max(0.0, time - self._time)
+        excess = self._current**2 - self._limits.continuous**2
+        if excess > 0:
+            return self._used + excess * passed
+        return self._used * math.exp(-passed / self._limits.recovery)
+
+    def refuse_list(self, currents: Sequence[float], dwell: float, time: float) -> None:
+        """Refuse a list of currents (A, `dwell` s each) that would use too much.
+
+        Raises:
+            LimitError: it would.
+        """
+        foreseen = copy(self)
+        foreseen.spend_list(currents, dwell, time)
+        if (why := foreseen.complaint(time)) is not None:
+            raise LimitError(f"After this list: {why}")
+
+    def spend_list(self, currents: Sequence[float], dwell: float, time: float) -> None:
+        """Count a list of currents from `time` s on, all of it at once."""
+        for k, current in enumerate((*currents, 0.0)):
+            self.flow(time + k * dwell, current)
+
+    def complaint(self, time: float) -> str | None:
+        """Why the current must stop, or None."""
+        used = self.used(time)
+        if used <= self._limits.heat:
+            return None
+        return (
+            f"The coil has used {used:.1f} A² s of its heat budget of "
+            f"{self._limits.heat:g} A² s above {show(self._limits.continuous, 'A')}. "
+            "Let it cool, then acknowledge."
+        )
+
+
+@dataclass
+class ReadbackCheck:
+    """Trips when the measured current keeps differing from a steady set-point."""
+
+    deviating: int = 0
+
+    def complaint(
+        self, setpoint: float, measured: float, compliance: float
+    ) -> str | None:
+        """Why the current must stop, or None; A and V."""
+        allowed = max(DEVIATION_SHARE * abs(setpoint), DEVIATION)
+        if abs(measured - setpoint) <= allowed:
+            self.deviating = 0
+            return None
+        self.deviating += 1
+        if self.deviating < DEVIATING_READINGS:
+            return None
+        return (
+            f"The source is set to {show(setpoint, 'A')} but {show(measured, 'A')} "
+            f"flows, {self.deviating} readings in a row: the circuit is open, or the "
+            f"compliance of {show(compliance, 'V')} is too low. Check leads and limit."
+        )
+
+
+@dataclass
+class Thermometer:
+    """Temperature of the copper from its resistance, V/I at a steady current.
+
+    Attributes:
+        cold: resistance at 20 C, Ohm; the first reading where it was not given.
+        ratio: last resistance over `cold`; None before the first reading.
+        warning: told once, when the coil has become warm.
+    """
+
+    cold: float | None = None
+    ratio: float | None = None
+    warning: str | None = None
+
+    def complaint(self, voltage: float, current: float) -> str | None:
+        """Why the current must stop, or None; V and A."""
+        if abs(current) < THERMOMETER_CURRENT:
+            return None
+        resistance = abs(voltage / current)
+        if resistance < NO_RESISTANCE:
+            return (
+                f"{show(current, 'A')} flow without voltage: the coil is shorted, or "
+                "the source measures no voltage. Check leads and winding."
+            )
+        if self.cold is None:
+            self.cold = resistance
+        self.ratio = ratio = resistance / self.cold
+        told = f"{show(resistance, 'Ohm')}, {ratio:.2f} times its cold resistance"
+        if ratio > LOOSE:
+            return f"The coil has {told}: a lead is loose. Check the connections."
+        if ratio < SHORTED:
+            return f"The coil has {told}: turns are shorted. Check the winding."
+        warmer = (ratio - 1) / COPPER
+        if ratio > HOT:
+            return f"The coil has {told}: some {warmer:.0f} K warmer. Let it cool."
+        if ratio > WARM and self.warning is None:
+            self.warning = (
+                f"The coil has {told}: some {warmer:.0f} K warmer. It trips at {HOT}."
+            )
+        return None

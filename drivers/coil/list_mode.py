@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from drivers.coil.limits import check_current
+from drivers.coil.interlock import check_current
 from drivers.coil.wire import CoilWire
 from tactile_lab.bench import CoilLimits
 from tactile_lab.errors import LimitError
@@ -67,14 +67,14 @@ def upload(
     wire: CoilWire, mode: ListMode, currents: Sequence[float], dwell: float
 ) -> None:
     """Send a checked list, to be played once; each line is verified."""
-    digits = wire.row.digits
+    digits = wire.dialect.digits
     for line in mode.clear:
-        wire.talk.command(line)
+        wire.command(line)
     template = mode.points
     for first in range(0, len(currents), mode.points_per_line):
         part = currents[first : first + mode.points_per_line]
         values = ",".join(f"{round(i, digits) + 0.0:.{digits}f}" for i in part)
-        wire.talk.command(template.format(values=values))
+        wire.command(template.format(values=values))
         template = mode.append or mode.points
-    wire.talk.command(mode.dwell.format(t=dwell))
-    wire.talk.command(mode.count.format(n=1))
+    wire.command(mode.dwell.format(t=dwell))
+    wire.command(mode.count.format(n=1))

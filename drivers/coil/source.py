@@ -9,13 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from drivers.coil.guard import Guard, Watch, in_process
-from drivers.coil.interlock import Interlock
-from drivers.coil.limits import check_current, narrowed
+from drivers.coil.guard import CoilGuard, Guard, in_process
+from drivers.coil.interlock import Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, upload
-from drivers.coil.off import switch_off
 from drivers.coil.wire import CoilWire
-from drivers.serial_line.conversation import Conversation
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading
 from tactile_lab.clock import Clock
@@ -49,7 +46,7 @@ class CoilSource:
         clock: Clock,
         *,
         baud: int | None = None,
-        guard: Watch | None = None,
+        guard: CoilGuard | None = None,
         guarded: bool = True,
         spy: Spy | None = None,
     ) -> None:
@@ -72,7 +69,7 @@ class CoilSource:
         if guard is None and guarded and not in_process(port):
             guard = Guard(port, dialect, setup)
         self._guard = guard
-        self._wire = CoilWire(Conversation(link, dialect), dialect, clock)
+        self._wire = CoilWire(link, dialect)
         self._interval = dialect.promised_interval(baud)
         self._setpoint: float | None = None
         self._commanded = clock.now()
@@ -83,7 +80,7 @@ class CoilSource:
     @property
     def identity(self) -> str:
         """What the source answered when asked who it is."""
-        return self._wire.talk.link.identity or "not connected"
+        return self._wire.link.identity or "not connected"
 
     @property
     def limits(self) -> CoilLimits:
@@ -116,7 +113,7 @@ class CoilSource:
         Raises:
             SceneError: the file cannot be written.
         """
-        self._wire.talk.link.record(path)
+        self._wire.link.record(path)
 
     def open(self) -> None:
         """Connect, identify, make safe, measure the update interval.
@@ -127,12 +124,12 @@ class CoilSource:
             UnsafeError: the output could not be verified off.
         """
         wire = self._wire
-        wire.talk.link.open()
+        wire.link.open()
         try:
-            wire.talk.recognise()
+            wire.recognise()
             self._reached = True
-            wire.talk.clear_errors()
-            wire.talk.offer(self.dialect.optional)
+            wire.clear_errors()
+            wire.offer(self.dialect.optional)
             if wire.output_is_on():
                 self.warnings.append(
                     f"The output was already on at {show(wire.current(), 'A')} when "
@@ -144,12 +141,12 @@ class CoilSource:
             if not report.verified:
                 raise UnsafeError(report.text)
             for line in self.dialect.init:
-                wire.talk.command(line)
+                wire.command(line)
             self._interval = wire.measured_interval()
             if self._guard is not None:
                 self._guard.start()
         except BaseException:
-            wire.talk.link.close()
+            wire.link.close()
             raise
 
     def energise(self) -> None:
@@ -223,7 +220,7 @@ class CoilSource:
         self._interlock.heat.refuse_list(currents, dwell, self._clock.now())
         upload(self._wire, mode, currents, dwell)
         for line in mode.start:
-            self._wire.talk.command(line)
+            self._wire.command(line)
         self._setpoint = None
         self._interlock.flows(self._clock.now(), None, on=True)
         self._interlock.heat.spend_list(currents, dwell, self._clock.now())
@@ -232,7 +229,7 @@ class CoilSource:
     def end_list(self) -> None:
         """Go back to a set-point of 0 A, once the list has ended."""
         for line in self.dialect.stop_lines:
-            self._wire.talk.command(line)
+            self._wire.command(line)
         self._wire.set_zero()
         self._took(0.0)
 
@@ -251,11 +248,6 @@ class CoilSource:
         self._trip_on(self._interlock.after_reading(now, measured, self._wire.voltage))
         return Reading(now, measured)
 
-    def read_voltage(self) -> Reading:
-        """Measured output voltage, V."""
-        volts = self._wire.voltage()
-        return Reading(self._clock.now(), volts)
-
     @property
     def resistance_ratio(self) -> float | None:
         """Resistance over that of the cold coil; None until it was looked at."""
@@ -263,7 +255,7 @@ class CoilSource:
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
-        link = self._wire.talk.link
+        link = self._wire.link
         return {
             "identity": self.identity,
             "dialect": self.dialect.id,
@@ -297,9 +289,7 @@ class CoilSource:
                 "The source was never reached: this program switched nothing on, and "
                 "what its output does is unknown.",
             )
-        report = switch_off(
-            self._wire,
-            self._clock,
+        report = self._wire.switch_off(
             setpoint=self._setpoint,
             slew=self._limits.slew,
             exchange=self._interval / MARGIN,
@@ -321,15 +311,15 @@ class CoilSource:
         An output that cannot be verified off is told in `warnings`, and the guard
         takes the port over.
         """
-        talk = self._wire.talk
-        if talk.link.is_open:
+        wire = self._wire
+        if wire.link.is_open:
             report = self.safe_off()
             if report.verified:
-                talk.offer(self.dialect.release)
+                wire.offer(self.dialect.release)
             else:
                 self._warn(report.text)
-            talk.link.close()
-        talk.link.end_record()
+            wire.link.close()
+        wire.link.end_record()
         if self._guard is not None:
             self._guard.stop()
 

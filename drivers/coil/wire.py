@@ -1,36 +1,55 @@
-"""What can be said to a current source, each with its read-back, in any dialect."""
+"""All that is ever said to a current source, in any dialect, each with its read-back.
+
+The way out, `switch_off`, tries every step and raises nothing.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 
 from drivers.serial_line.conversation import Conversation
-from tactile_lab.clock import Clock
-from tactile_lab.errors import BadReplyError, RefusedError
+from tactile_lab.bench import OffReport
+from tactile_lab.errors import BadReplyError, RefusedError, TactileLabError
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
+from tactile_lab.quantity import show
 
 CONNECT_QUERIES = 20
 """Harmless queries that measure the update interval."""
 
+OFF_CURRENT = 0.005
+"""Largest current that counts as none, A."""
 
-class CoilWire:
-    """The verbs of a current source.
+LONGEST_RAMP = 0.5
+"""Longest time the steps of a ramp may add up to, s; a larger current ramps faster."""
 
-    Args:
-        talk: the conversation, in the row's dialect.
-        row: the dialect.
-        clock: time that exchanges are measured in.
-    """
+SHORTEST_REST, LONGEST_REST = 0.005, 0.2
+"""Time from an answer to the next step of a ramp, s; the guard wants a heartbeat."""
 
-    def __init__(self, talk: Conversation, row: CoilDialect, clock: Clock) -> None:
-        self.talk = talk
-        self.row = row
-        self._clock = clock
+VERIFICATIONS = 3
+"""Times the safe state is commanded and read back before giving up."""
+
+SETTLE = 0.02
+"""Time the current has to die away before it is read back, s."""
+
+RECONNECT = 1.0
+"""How long to try to open a lost port again before each attempt, s."""
+
+UNKNOWN = "OUTPUT STATE UNKNOWN: switch the coil source off at the instrument. "
+
+DOUBT = (
+    " It did not confirm every line, so its set-point may not be 0 A: look before you "
+    "switch it on by hand."
+)
+
+
+class CoilWire(Conversation[CoilDialect]):
+    """A conversation with a current source; see `Conversation`."""
 
     def set_current(self, current: float) -> None:
         """Command the set-point, A, and check that it was taken."""
-        self.talk.command(self.row.set_line(current))
+        self.command(self.dialect.set_line(current))
 
     def set_compliance(self, voltage: float) -> None:
         """Command the compliance, V, and check by read-back.
@@ -38,9 +57,9 @@ class CoilWire:
         Raises:
             RefusedError: another value is read back.
         """
-        self.talk.command(self.row.limit_line(voltage))
+        self.command(self.dialect.limit_line(voltage))
         self._confirm(
-            "compliance", self.row.limit_query, voltage, 0.01 * voltage + 0.01
+            "compliance", self.dialect.limit_query, voltage, 0.01 * voltage + 0.01
         )
 
     def set_zero(self) -> None:
@@ -50,7 +69,9 @@ class CoilWire:
             RefusedError: another value is read back.
         """
         self.set_current(0.0)
-        self._confirm("current", self.row.set_query, 0.0, 2 * 10.0**-self.row.digits)
+        self._confirm(
+            "current", self.dialect.set_query, 0.0, 2 * 10.0**-self.dialect.digits
+        )
 
     def switch_on(self) -> None:
         """Output on, checked by read-back.
@@ -58,8 +79,8 @@ class CoilWire:
         Raises:
             RefusedError: it stays off.
         """
-        for line in self.row.on:
-            self.talk.command(line)
+        for line in self.dialect.on:
+            self.command(line)
         if not self.output_is_on():
             raise RefusedError("The source did not switch its output on.")
 
@@ -71,31 +92,32 @@ class CoilWire:
         """
         answer = ""
         for _ in range(2):
-            answer = self.talk.query(self.row.on_query)
-            if re.search(self.row.on_match, answer):
+            answer = self.query(self.dialect.on_query)
+            if re.search(self.dialect.on_match, answer):
                 return True
-            if re.search(self.row.off_match, answer):
+            if re.search(self.dialect.off_match, answer):
                 return False
-            self.talk.link.resynchronise()
+            self.link.resynchronise()
         raise BadReplyError(
-            f"The answer {answer!r} to {self.row.on_query!r} says neither on nor off."
+            f"The answer {answer!r} to {self.dialect.on_query!r} says neither on nor "
+            "off."
         )
 
     def setpoint(self) -> float:
         """Set-point read back, A."""
-        return self.talk.number(self.row.set_query)
+        return self.number(self.dialect.set_query)
 
     def compliance(self) -> float:
         """Compliance read back, V."""
-        return self.talk.number(self.row.limit_query)
+        return self.number(self.dialect.limit_query)
 
     def current(self) -> float:
         """Measured current, A."""
-        return self.talk.number(self.row.measure_current, self.row.current_match)
+        return self.number(self.dialect.measure_current, self.dialect.current_match)
 
     def voltage(self) -> float:
         """Measured voltage, V."""
-        return self.talk.number(self.row.measure_voltage, self.row.voltage_match)
+        return self.number(self.dialect.measure_voltage, self.dialect.voltage_match)
 
     def current_when_off(self) -> float:
         """Current with the output off, A: measured where the model then measures.
@@ -103,21 +125,21 @@ class CoilWire:
         Raises:
             BadReplyError: no number.
         """
-        return self.current() if self.row.measures_when_off else self.setpoint()
+        return self.current() if self.dialect.measures_when_off else self.setpoint()
 
     def known_setpoint(self, read: float) -> float:
         """Set-point, A, given what `current_when_off` just read."""
-        return self.setpoint() if self.row.measures_when_off else read
+        return self.setpoint() if self.dialect.measures_when_off else read
 
     def measured_interval(self) -> float:
         """Time of a verified set-point with margin, s, from queries as long as one."""
-        row, wire = self.row, self.talk.link.wire
+        row, wire = self.dialect, self.link.wire
         lines = row.verified(row.set_query)
         times, characters = [], 0
         for _ in range(CONNECT_QUERIES):
-            begun = self._clock.now()
-            answers = [self.talk.ask(line) for line in lines]
-            times.append(self._clock.now() - begun)
+            begun = self.link.now
+            answers = [self.link.query(line) for line in lines]
+            times.append(self.link.now - begun)
             characters = sum(map(len, lines)) + sum(map(len, answers))
             if not all(answers):
                 raise BadReplyError(f"An answer to {row.set_query!r} was empty.")
@@ -126,8 +148,96 @@ class CoilWire:
         longer = max(0, wanted - characters) * wire.character_time
         return MARGIN * (statistics.median(times) + longer)
 
+    def switch_off(
+        self,
+        *,
+        setpoint: float | None,
+        slew: float,
+        exchange: float,
+        ramp: bool,
+    ) -> OffReport:
+        """Bring the source to 0 A and output off, and say whether that was verified.
+
+        Args:
+            setpoint: last known, A; None when unknown.
+            slew: of the ramp, A/s.
+            exchange: typical time of a verified set-point, s.
+            ramp: False goes to 0 A at once.
+        """
+        trouble: list[str] = []
+        if not self.reconnected(trouble, RECONNECT):
+            return OffReport(False, None, UNKNOWN + " | ".join(trouble))
+        if ramp and setpoint != 0.0:
+            self._ramp_down(setpoint, slew, exchange, trouble)
+        row = self.dialect
+        steps = (*row.stop_lines, row.set_line(0.0), *row.off)
+        current: float | None = None
+        for left in reversed(range(VERIFICATIONS)):
+            if not self.reconnected(trouble, RECONNECT):
+                break
+            taken = self.insist(steps, trouble)
+            self.link.pause(SETTLE)
+            try:
+                on = self.output_is_on()
+                current = self.current_when_off()
+                # a line may be refused for another reason than its set-point
+                taken = taken or abs(self.known_setpoint(current)) <= OFF_CURRENT
+            except TactileLabError as reason:
+                trouble.append(f"read-back: {reason}")
+                continue
+            if not on and abs(current) <= OFF_CURRENT:
+                if left and not taken:
+                    continue  # off, but the set-point may be another than 0 A
+                text = f"Output off, {show(current, 'A')} read back."
+                return OffReport(True, current, text + ("" if taken else DOUBT))
+            state = "on" if on else "off"
+            trouble.append(f"read-back: output {state}, {show(current, 'A')}")
+        return OffReport(False, current, UNKNOWN + " | ".join(dict.fromkeys(trouble)))
+
+    def _taken_over(self) -> float:
+        """Set-point to ramp down from, A, once a list that may be playing ended."""
+        if self.dialect.list is None:
+            return self.setpoint()
+        flowing = self.current()
+        self.set_current(flowing)
+        for line in self.dialect.stop_lines:
+            self.command(line)
+        return flowing
+
+    def _ramp_down(
+        self,
+        setpoint: float | None,
+        slew: float,
+        exchange: float,
+        trouble: list[str],
+    ) -> None:
+        """Steps until 0 A is one step away, at the slew limit; ended by a failure.
+
+        A step is as large as the time since the last one was answered allows. The
+        source took that one before it answered, so no delay on the way can bring two
+        steps closer together at the source than the limit allows. Resting for two
+        exchanges makes the whole ramp take one and a half times its nominal time.
+        """
+        try:
+            current = self._taken_over() if setpoint is None else setpoint
+            slew = max(slew, abs(current) / LONGEST_RAMP)
+            answered = self.link.now
+            while True:
+                rest = min(max(2 * exchange, SHORTEST_REST), LONGEST_REST)
+                self.link.sleep_until(answered + min(rest, abs(current) / slew))
+                sent = self.link.now
+                left = abs(current) - slew * (sent - answered)
+                if left < 10.0**-self.dialect.digits:
+                    return  # 0 A is what comes next anyway
+                current = math.copysign(left, current)
+                self.set_current(current)
+                answered = self.link.now
+                exchange = answered - sent
+        except TactileLabError as reason:
+            trouble.append(f"ramp: {reason}")
+
     def _confirm(self, what: str, query: str, wanted: float, within: float) -> None:
-        found = self.talk.number(query)
+        found = self.number(query)
         if abs(found - wanted) > within:
             raise RefusedError(
                 f"The source reports a {what} of {found:g} after being set to "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from typing import Generic, TypeVar
 
 from drivers.serial_line.link import SerialLink
 from tactile_lab.errors import (
@@ -14,7 +15,9 @@ from tactile_lab.errors import (
     NoReplyError,
     RefusedError,
 )
-from tactile_lab.instruments.serial_dialect import CoilDialect, MeterDialect
+from tactile_lab.instruments.serial_dialect import SerialDialect
+
+D = TypeVar("D", bound=SerialDialect)
 
 RETRY = 0.1
 """Time between two attempts to open a lost port again, s."""
@@ -23,7 +26,7 @@ MOST_ERRORS = 25
 """Answers of an error queue to read before giving up on emptying it."""
 
 
-class Conversation:
+class Conversation(Generic[D]):
     """Lines in one dialect over one link.
 
     A question whose answer failed is asked once more after the link has resynchronised
@@ -34,7 +37,7 @@ class Conversation:
         dialect: the row.
     """
 
-    def __init__(self, link: SerialLink, dialect: CoilDialect | MeterDialect) -> None:
+    def __init__(self, link: SerialLink, dialect: D) -> None:
         self.link = link
         self.dialect = dialect
 
@@ -52,18 +55,14 @@ class Conversation:
                 "or port in the bench file."
             )
 
-    def ask(self, line: str) -> str:
-        """The answer to `line`, asked once."""
-        return self.link.query(line)
-
     def query(self, line: str) -> str:
         """The answer to `line`, asked again once if it was lost or garbled."""
         try:
-            return self.ask(line)
+            return self.link.query(line)
         except (NoReplyError, BadReplyError):
             self.link.resynchronise()
             self.clear_errors()
-            return self.ask(line)
+            return self.link.query(line)
 
     def number(self, line: str, pattern: str | None = None) -> float:
         """The numeric answer to `line`: group 1 of `pattern`, or of the row's.
@@ -75,7 +74,7 @@ class Conversation:
         value = self.parsed(answer, pattern)
         if value is None:
             self.link.resynchronise()
-            answer = self.ask(line)
+            answer = self.link.query(line)
             value = self.parsed(answer, pattern)
         if value is None:
             raise BadReplyError(
@@ -90,16 +89,13 @@ class Conversation:
         Raises:
             RefusedError: the instrument reports an error.
         """
-        error = self.dialect.error
-        if error is None:
+        if self.dialect.error is None:
             self.link.write(line)
             return
-        join = self.dialect.join if isinstance(self.dialect, CoilDialect) else ""
-        if not join:
-            self.link.write(line)
-            answer = self.query(error)
-        else:
-            answer = self.query(line + join + error)
+        *first, last = self.dialect.verified(line)
+        for one in first:
+            self.link.write(one)
+        answer = self.query(last)
         if re.search(self.dialect.error_ok, answer) is None:
             raise RefusedError(f"The instrument refused {line!r}: {answer}.")
 
@@ -131,7 +127,7 @@ class Conversation:
         if self.dialect.error is None:
             return
         for _ in range(MOST_ERRORS):
-            if re.search(self.dialect.error_ok, self.ask(self.dialect.error)):
+            if re.search(self.dialect.error_ok, self.link.query(self.dialect.error)):
                 return
         raise RefusedError(
             f"The instrument at {self.link.port} has no end of errors; switch it off "

@@ -176,6 +176,10 @@ class SerialLink:
         """Clock time, s."""
         return self._clock.now()
 
+    def sleep_until(self, time: float) -> None:
+        """Let time pass until the clock says `time`, s."""
+        self._clock.sleep_until(time)
+
     def pause(self, seconds: float) -> None:
         """Let time pass, alive."""
         self._clock.sleep_until(self._clock.now() + seconds)

@@ -160,6 +160,10 @@ class SerialDialect(Dialect):
     error_ok: Pattern = r"^[+-]?0\b"
     number: Pattern = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[A-Za-z]*$"
 
+    def verified(self, line: str) -> tuple[str, ...]:
+        """`line` with the error query behind it."""
+        return (line,) if self.error is None else (line, self.error)
+
 
 class CoilDialect(SerialDialect):
     """How a current source speaks. Templates use `{i}` A and `{v}` V, fixed-point.
@@ -263,10 +267,8 @@ class CoilDialect(SerialDialect):
 
     def verified(self, line: str) -> tuple[str, ...]:
         """`line` with the error query behind it, as one line or two."""
-        if self.error is None:
-            return (line,)
-        if not self.join:
-            return (line, self.error)
+        if self.error is None or not self.join:
+            return super().verified(line)
         return (line + self.join + self.error,)
 
     def promised_interval(self, baud: int | None = None) -> float:

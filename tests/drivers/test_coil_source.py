@@ -41,7 +41,7 @@ def test_plays_a_current_and_reads_it_back(bench):
     assert far.setpoint == pytest.approx(0.5)
     clock.sleep_until(clock.now() + 0.2)
     assert coil.read_current().value == pytest.approx(0.5)
-    assert coil.read_voltage().value == pytest.approx(2.5)
+    assert coil._wire.voltage() == pytest.approx(2.5)
 
 
 def test_update_interval_is_wire_time_and_latency_with_margin(bench):

@@ -43,7 +43,7 @@ def test_each_row_drives_its_far_end(name, resistor):
         assert resistor.coil_current(clock.now()) == pytest.approx(0.4)
         clock.sleep_until(clock.now() + 0.2)
         assert coil.read_current().value == pytest.approx(0.4)
-        assert coil.read_voltage().value == pytest.approx(2.0)
+        assert coil._wire.voltage() == pytest.approx(2.0)
         assert coil.settings()["output"] == "on"
         assert coil.safe_off().verified
         assert not source.output_on

@@ -174,7 +174,7 @@ def test_ctrl_c_at_the_terminal_does_not_reach_the_guard(served, owner):
 def guarded(served, tmp_path, monkeypatch):
     """A source guarded in this very process, its output on."""
     monkeypatch.setattr("drivers.coil.guard.SILENCE", LONG_SILENCE)
-    monkeypatch.setattr("drivers.coil.off.VERIFICATIONS", 1)
+    monkeypatch.setattr("drivers.coil.wire.VERIFICATIONS", 1)
     _, server = served
     row = patient("kepco-bop", timeout=0.6)
     log = tmp_path / "tactile-lab" / "guard.log"

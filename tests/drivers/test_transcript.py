@@ -40,7 +40,7 @@ def converse(name, instrument, clock, spy=None):
             coil.set_current(0.25)
         clock.sleep_until(clock.now() + 0.2)
         reading = coil.read_current().value
-        coil.read_voltage()
+        coil._wire.voltage()
         coil.settings()
         coil.close()
         assert coil.warnings == []

@@ -170,7 +170,7 @@ def test_zero_then_on_then_a_small_current(coil: CoilSource) -> None:
     for current in (0.25, -0.25):
         drive(coil, current, 1.0)
         time.sleep(0.3)
-        measured, volts = coil.read_current().value, coil.read_voltage().value
+        measured, volts = coil.read_current().value, coil._wire.voltage()
         fact(f"at {current} A: measured A, V, Ohm", (measured, volts, volts / measured))
         assert measured == pytest.approx(current, rel=0.02, abs=0.005)
     report = coil.safe_off()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.coil.supervision import HeatBudget
+from drivers.coil.interlock import HeatBudget
 from tactile_lab.bench import CoilLimits
 from tactile_lab.planning.heat import heat_along
 from tactile_lab.waveform import Waveform

@@ -67,7 +67,7 @@ def test_a_source_made_from_its_row_plays_a_session(row):
         assert plant.amperes == pytest.approx(0.25)
         clock.sleep_until(clock.now() + 0.3)
         assert coil.read_current().value == pytest.approx(0.25, abs=1e-3)
-        assert coil.read_voltage().value == pytest.approx(1.25, abs=1e-3)
+        assert coil._wire.voltage() == pytest.approx(1.25, abs=1e-3)
         assert coil.safe_off().verified
         assert not source.output_on and source.setpoint == 0.0
         coil.close()

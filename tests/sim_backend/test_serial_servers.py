@@ -116,7 +116,7 @@ def test_one_bad_exchange_does_not_end_the_run(served, kind):
 @pytest.mark.parametrize("form", ["closed", "reset"])
 def test_unplugged_while_playing(served, form, monkeypatch):
     # long enough, and another test may be given the lost pseudo-terminal's name
-    monkeypatch.setattr("drivers.coil.off.RECONNECT", 0.0)
+    monkeypatch.setattr("drivers.coil.wire.RECONNECT", 0.0)
     clock, source, end, server, coil = served
     coil.open()
     coil.energise()
