@@ -83,17 +83,20 @@ class LazyVerbs(click.Group):
             formatter.write_dl(list(VERBS.items()))
 
 
+COMPLETION = """\b
+Verbs, scenes, runs and keys complete on Tab with this line in ~/.bashrc (zsh_source
+for zsh):  eval "$(_TACTILE_LAB_COMPLETE=bash_source tactile-lab)"
+"""
+
+
 @click.group(
     cls=LazyVerbs,
+    epilog=COMPLETION,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="tactile-lab")
 def cli() -> None:
-    """Instrument control for spiking, adapting piezoelectric tactile sensors.
-
-    The shell completes verbs, scenes, runs and keys of --set once its start-up file has
-    eval "$(_TACTILE_LAB_COMPLETE=bash_source tactile-lab)" (or zsh_source).
-    """
+    """Instrument control for spiking, adapting piezoelectric tactile sensors."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -138,7 +138,10 @@ class StatusLine:
         if part is None:
             row.add_row(line)
         else:
-            row.add_row(ProgressBar(total=1.0, completed=part, width=24), line)
+            bar = ProgressBar(
+                total=1.0, completed=part, width=24, complete_style="cyan"
+            )
+            row.add_row(bar, line)
         if not self._live.is_started:
             self._live.start()
         self._live.update(row, refresh=True)

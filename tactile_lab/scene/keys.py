@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from tactile_lab.complaint import written
+from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 
 
@@ -34,12 +36,22 @@ def keys(scene: Scene) -> list[Key]:
     return [
         Key(
             name,
-            written(values[name]) if name in values else "",
+            _shown(values[name]) if name in values else "",
             meanings.get(name, ""),
         )
         for name in names
         if name not in ("protocol.name", "protocol.source")
     ]
+
+
+def _shown(value: Any) -> str:
+    """As a file would have it, quantities with a prefix."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_shown, value))}]"
+    match value.split(" ", 1) if isinstance(value, str) else ():
+        case number, unit if re.fullmatch(r"[-+.e0-9]+", number):
+            return f'"{show(float(number), unit, 6)}"'
+    return written(value)
 
 
 def _flat(table: dict[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:

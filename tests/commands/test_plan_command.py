@@ -72,12 +72,12 @@ def test_warnings_go_to_stderr(tactile_lab):
 
 def test_the_keys_of_a_scene_are_listed_with_their_meaning(tactile_lab):
     said = tactile_lab("plan", "hold_10s", "--keys").out
-    assert '= "0.15 N"  # Force held' in said
+    assert '= "150 mN"  # Force held' in said
     assert said.startswith("protocol.level ")
     assert "record.sample_rate" in said
     for key in tactile_lab("plan", "--keys", "--json").json["keys"]:
         if key["name"] == "protocol.hold":
-            assert key["value"] == '"2.0 s"'
+            assert key["value"] == '"2 s"'
 
 
 def test_no_heading_stands_empty(tactile_lab):

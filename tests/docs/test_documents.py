@@ -99,6 +99,13 @@ def test_each_example_of_the_scripting_how_to_stands_alone(tmp_path, number):
         assert tau == pytest.approx(8.69, rel=0.1)
 
 
+def test_the_python_of_the_readme_runs(tmp_path):
+    (source,) = blocks("../README.md", "python")
+    script = tmp_path / "script.py"
+    script.write_text("import matplotlib\n\nmatplotlib.use('Agg')\n" + source)
+    assert "<Run of hold_10s: complete" in python(script, folder=tmp_path)
+
+
 def test_the_how_to_analyse_a_run_is_true(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     volts = np.linspace(0, 2.75, 56)
