@@ -14,6 +14,9 @@ from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.layout import BIN
 from tactile_lab.trace import Trace
 
+PIECE = 1 << 20
+"""Samples read at a time."""
+
 FloatArray = NDArray[np.float64]
 
 
@@ -149,41 +152,41 @@ class StoredSignal:
         if start >= stop:
             return Trace.nothing(self.name, self.unit)
         per = max(1, -(-(stop - start) // max(cells, 1)))
-        size = BIN
-        if per < size:
+        if per < BIN:
             codes = self.codes[start:stop]
-            return self._cells(start, per, 1, stop, (codes, codes, codes))
-        per = -(-per // size)
-        first, last = start // size, -(-stop // size)
-        bins = self._bins_between(first, last)
+            every = np.arange(start, stop)
+            return self._cells(every, stop, per, (codes, codes, codes))
+        first, last = start // BIN, -(-stop // BIN)
+        starts, bins = self._whole_in_time(first, self._bins_between(first, last))
         columns = (bins["low"], bins["high"], bins["sum"])
-        return self._cells(first, per, size, self._length, columns)
+        end = min(last * BIN, self._length)
+        return self._cells(starts, end, -(-per // BIN) * BIN, columns)
 
     def _cells(
-        self, first: int, per: int, size: int, end: int, columns: tuple[Any, Any, Any]
+        self,
+        starts: NDArray[np.int64],
+        end: int,
+        per: int,
+        columns: tuple[Any, Any, Any],
     ) -> Trace:
-        """Join `per` entries of `size` samples each, the first of them number `first`.
-
-        After a gap as long as a cell a new one begins.
+        """Join what lies in `per` samples; after a gap as long a new cell begins.
 
         Args:
-            first: number of the first entry.
-            per: entries in a cell.
-            size: samples in an entry.
-            end: samples up to which entries are full.
+            starts: first sample of each entry, ascending.
+            end: one past the last sample of the last entry.
+            per: samples in a cell.
             columns: smallest, largest and sum of each entry.
         """
         low, high, total = columns
-        width = per * size * self.interval
+        width = per * self.interval
         late = self.axis.after_gaps(width - self.interval / 2)
-        late = -(-late // size) - first
-        late = late[(late > 0) & (late < low.size)]
-        edges = np.arange(0, low.size, per)
+        late = np.searchsorted(starts, late[(late > starts[0]) & (late < end)])
+        edges = np.searchsorted(starts, np.arange(starts[0], end, per))
         if late.size:
             edges = np.union1d(edges, late)
-        starts = (first + edges) * size
-        stops = np.minimum((first + np.append(edges[1:], low.size)) * size, end)
-        mean = np.add.reduceat(total, edges, dtype=np.int64) / (stops - starts)
+        starts = starts[edges]
+        count = np.diff(starts, append=end)
+        mean = np.add.reduceat(total, edges, dtype=np.int64) / count
         one = np.minimum.reduceat(low, edges).astype(np.float64)
         other = np.maximum.reduceat(high, edges).astype(np.float64)
         one, other, mean = (v * self.gain + self.offset for v in (one, other, mean))
@@ -193,6 +196,53 @@ class StoredSignal:
         gap[0] = True
         time = self.axis.time_of(starts)
         return Trace(time, least, most, mean, gap, width, self.name, self.unit)
+
+    def _whole_in_time(
+        self, first: int, bins: NDArray[Any]
+    ) -> tuple[NDArray[np.int64], NDArray[Any]]:
+        """Bins from number `first` on, those that reach across a gap cut there.
+
+        Returns:
+            First sample of each, and the bins.
+        """
+        number = first + np.arange(len(bins))
+        cuts = self.axis.first[self.axis.first % BIN > 0]
+        cuts = cuts[(cuts > first * BIN) & (cuts < self._length)]
+        cuts = np.unique(cuts[cuts < (first + len(bins)) * BIN])
+        if cuts.size == 0:
+            return number * BIN, bins
+        torn = np.unique(cuts // BIN)
+        starts = np.union1d(torn * BIN, cuts)
+        stops = np.minimum(
+            np.append(starts[1:], self._length), (starts // BIN + 1) * BIN
+        )
+        parts = self._parts(starts, stops, bins.dtype)
+        kept = ~np.isin(number, torn)
+        starts = np.concatenate([number[kept] * BIN, starts])
+        order = np.argsort(starts)
+        return starts[order], np.concatenate([bins[kept], parts])[order]
+
+    def _parts(
+        self, starts: NDArray[np.int64], stops: NDArray[np.int64], kind: np.dtype[Any]
+    ) -> NDArray[Any]:
+        """Smallest, largest and sum of samples starts to stops, at most `BIN` each."""
+        pieces: list[NDArray[Any]] = []
+        while len(pieces) < starts.size:
+            # many small reads would each decompress their chunk anew
+            row = len(pieces)
+            last = int(np.searchsorted(starts, starts[row] + PIECE))
+            begin = int(starts[row])
+            codes = self.codes[begin : int(stops[last - 1])]
+            pieces += [
+                codes[starts[k] - begin : stops[k] - begin] for k in range(row, last)
+            ]
+        codes, counts = np.concatenate(pieces), stops - starts
+        edges = np.cumsum(counts) - counts
+        parts = np.empty(starts.size, kind)
+        parts["low"] = np.minimum.reduceat(codes, edges)
+        parts["high"] = np.maximum.reduceat(codes, edges)
+        parts["sum"] = np.add.reduceat(codes, edges, dtype=np.int64)
+        return parts
 
     def _bins_between(self, first: int, last: int) -> NDArray[Any]:
         """Entries of the pyramid. A small part is read, the whole is read and kept."""
