@@ -1,9 +1,8 @@
-"""Growing datasets: samples in whole chunks, records in batches."""
+"""Growing datasets: rows as they come, samples in whole chunks."""
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
 from typing import Any
 
 import h5py
@@ -12,8 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError
 from tactile_lab.store.layout import BIN, CHECK, pyramid_record
-
-Wrote = Callable[[h5py.Dataset, int, int, int], None]
+from tactile_lab.store.ledger import CHUNK, Ledger
 
 BINS_HELD = 2048
 """Entries of the pyramid that are written at once."""
@@ -45,58 +43,20 @@ class Column:
         self._id.write(memory, place, np.ascontiguousarray(values), self._type)
 
 
-class Records:
-    """One dataset of fixed records; buffered until `flush`."""
-
-    def __init__(self, record: np.dtype[Any]) -> None:
-        self._column: Column | None = None
-        self._record = record
-        self._waiting: list[Any] = []
-        self._written = 0
-
-    @property
-    def count(self) -> int:
-        """Records appended so far."""
-        return self._written + len(self._waiting)
-
-    def attach(self, dataset: h5py.Dataset) -> None:
-        """Give records that came before the file a place."""
-        self._column = Column(dataset)
-
-    def append(self, *values: Any) -> None:
-        """Add one record, fields in order."""
-        self._waiting.append(values)
-
-    def replace_last(self, *values: Any) -> None:
-        """Overwrite the newest record."""
-        if self._waiting:
-            self._waiting[-1] = values
-        elif self._column is not None:
-            self._column.put(self._written - 1, np.array([values], self._record))
-
-    def flush(self) -> None:
-        """Write what waits."""
-        if self._column is None or not self._waiting:
-            return
-        self._column.put(self._written, np.array(self._waiting, self._record))
-        self._written += len(self._waiting)
-        self._waiting = []
-
-
 class SampleColumn:
     """One channel's codes with their checksums and pyramid, a chunk at a time.
 
     Args:
         file: with the channel declared.
         signal: its name.
-        wrote: told each chunk's dataset, number, samples and CRC-32 once it is written.
+        ledger: where each chunk is noted.
     """
 
     def __init__(
-        self, file: h5py.File, signal: str, wrote: Wrote | None = None
+        self, file: h5py.File, signal: str, ledger: Ledger | None = None
     ) -> None:
         samples = file[f"samples/{signal}"]
-        self._dataset, self._wrote = samples, wrote
+        self._file, self._dataset, self._ledger = file, samples.id, ledger
         self._samples = Column(samples)
         self._pyramid = Column(file[f"pyramid/{signal}"])
         self._checks = Column(file[f"checks/{signal}"])
@@ -146,16 +106,33 @@ class SampleColumn:
         if self._first + self._held == self.written:
             return
         held, end = self._chunk[: self._held], self._first + self._held
+        offset = self._file.id.get_filesize()
         self._samples.put(self._first, held)
         number, crc = self._first // self._chunk.size, zlib.crc32(held.data)
         self._checks.put(number, np.array([(held.size, crc)], CHECK))
-        if self._wrote is not None:
-            self._wrote(self._dataset, number, held.size, crc)
+        if self._ledger is not None:
+            self._note(self._ledger, number, offset, held.size, crc)
         self._bins = self._bins[: self._first // BIN - self._pyramid.length]
         self._bins = np.concatenate([self._bins, pyramid_of(held)])
         self.written = end
         if self._bins.size >= BINS_HELD and self._held == self._chunk.size:
             self.write_pyramid()
+
+    def _note(
+        self, ledger: Ledger, number: int, offset: int, samples: int, crc: int
+    ) -> None:
+        """Note where a chunk was written: where the file ended, at `offset`.
+
+        HDF5 tells a chunk's place by going through all of them; for the first, before
+        which it writes the channel's index, that is quick.
+        """
+        if number == 0:
+            info = self._dataset.get_chunk_info_by_coord((0,))
+            offset, size = info.byte_offset, info.size
+        else:
+            size = len(self._dataset.read_direct_chunk((self._first,))[1])
+        entry = np.array([(offset, size, samples, crc)], CHUNK)
+        ledger.note(f"samples/{self.signal}", number, entry)
 
     def write_pyramid(self) -> None:
         """Write the bins held back; a crash may cost them, for samples give them."""

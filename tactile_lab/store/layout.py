@@ -140,15 +140,7 @@ def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
     """
     file.attrs.update(schema=SCHEMA, simulated=layout.simulated, **layout.attributes)
     for name, record in RECORDS.items():
-        dataset = file.create_dataset(
-            name,
-            (0,),
-            record,
-            maxshape=(None,),
-            chunks=(SLOW_CHUNK,),
-            fletcher32=True,
-        )
-        dataset.attrs["units"] = UNITS[name]
+        create_table(file, name, record).attrs["units"] = UNITS[name]
     spikes = file["spikes"].attrs
     if layout.detection is not None:
         spikes.update(asdict(layout.detection))
@@ -182,16 +174,25 @@ def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
         )
 
 
+def create_table(file: h5py.File, name: str, record: np.dtype[Any]) -> h5py.Dataset:
+    """Create an empty dataset of fixed records."""
+    return file.create_dataset(
+        name, (0,), record, maxshape=(None,), chunks=(SLOW_CHUNK,), fletcher32=True
+    )
+
+
 def create_channel(
     file: h5py.File, signal: str, code: np.dtype[Any], chunk: int
 ) -> h5py.Dataset:
     """Create one channel's samples (returned), checks and pyramid, all empty."""
+    # damaged bytes make the filter crash; their checksum is looked at before
     samples = file.create_dataset(
         f"samples/{signal}",
         (0,),
         code,
         maxshape=(None,),
         chunks=(chunk,),
+        fletcher32=True,
         **hdf5plugin.Bitshuffle(),
     )
     pyramid = file.create_dataset(
@@ -203,12 +204,5 @@ def create_channel(
         fletcher32=True,
     )
     pyramid.attrs["bin"] = BIN
-    file.create_dataset(
-        f"checks/{signal}",
-        (0,),
-        CHECK,
-        maxshape=(None,),
-        chunks=(SLOW_CHUNK,),
-        fletcher32=True,
-    )
+    create_table(file, f"checks/{signal}", CHECK)
     return samples

@@ -6,21 +6,18 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import partial
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
-from tactile_lab.store.columns import Records, SampleColumn
-from tactile_lab.store.durable import Durable
+from tactile_lab.store.columns import SampleColumn
+from tactile_lab.store.data_file import DataFile
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
-from tactile_lab.store.layout import RECORDS, Layout, declare
+from tactile_lab.store.layout import RECORDS, Layout
 from tactile_lab.store.pieces import Pieces
-from tactile_lab.store.places import PLACES, Places
 from tactile_lab.trial import Outcome
 
 CADENCE = 0.5
@@ -56,11 +53,9 @@ class Recorder:
         self.layout = layout
         self._reserve = reserve
         self._sync = not layout.simulated if sync is None else sync
-        self._durable: Durable | None = None
-        self._places: Places | None = None
-        self._records = {name: Records(kind) for name, kind in RECORDS.items()}
-        self._file: h5py.File | None = None
-        self._columns: tuple[SampleColumn, ...] = ()
+        self._waiting: dict[str, list[tuple[Any, ...]]] = {name: [] for name in RECORDS}
+        self._file: DataFile | None = None
+        self._spikes = 0
         self._rows: tuple[int, ...] = ()
         self._pieces = Pieces()
         self._flushed = time.monotonic()
@@ -68,33 +63,27 @@ class Recorder:
         if not layout.signals and layout.detection is None:
             self._guard(lambda: self._open(None))
 
-    @property
-    def spikes_stored(self) -> int:
-        """Spikes taken so far."""
-        return self._records["spikes"].count
-
     def segment(self, stream: Stream, start: float) -> None:
         """A stream starts; its first sample is at `start` s on the run's axis."""
         if self._file is None:
             self._guard(lambda: self._open(stream))
         self._rows = self.layout.rows(stream)
         self._pieces.stream(stream, start)
-        self._records["segments"].append(*self._pieces.segment)
+        self._waiting["segments"].append(self._pieces.segment)
 
     def append(self, block: Block) -> None:
         """Store a block; samples missing before it become a gap record."""
         gap = self._pieces.skip_to(block.first)
         if gap is not None:
-            self._records["gaps"].append(self._pieces.taken, *gap)
-            self._records["segments"].append(*self._pieces.segment)
+            self._waiting["gaps"].append((self._pieces.taken, *gap))
+            self._waiting["segments"].append(self._pieces.segment)
         self._guard(lambda: self._append(block))
 
     def gap(self, missing: int) -> None:
         """Store that the stream went on for so many samples that never came."""
         pieces = self._pieces
         ended = pieces.reached + missing * pieces.segment[2]
-        self._records["gaps"].append(pieces.taken, missing, ended)
-        self.tick()
+        self._row("gaps", pieces.taken, missing, ended)
 
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
         """Correct the running segment's place in time.
@@ -105,8 +94,7 @@ class Recorder:
             uncertainty: of the aligned times, s.
         """
         self._pieces.align(offset, drift, uncertainty)
-        row = self._pieces.segment
-        self._guard(lambda: self._records["segments"].replace_last(*row))
+        self._guard(self._replace_segment)
 
     def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
         """Store spikes detected on line.
@@ -117,10 +105,9 @@ class Recorder:
                 counted from the start of the stream.
         """
         samples = self._pieces.stored(found["sample"])
-        for sample, at, spike in zip(samples, times, found, strict=True):
-            self._records["spikes"].append(
-                sample, at, spike["amplitude"], spike["width"]
-            )
+        columns = (samples, times, found["amplitude"], found["width"])
+        self._waiting["spikes"] += zip(*columns, strict=True)
+        self._spikes += found.size
         self.tick()
 
     def current(
@@ -133,19 +120,16 @@ class Recorder:
         """Store a set-point and its read-back, A, and the resistance over cold."""
         read = math.nan if measured is None else measured
         warm = math.nan if ratio is None else ratio
-        self._records["current"].append(time, setpoint, read, warm)
-        self.tick()
+        self._row("current", time, setpoint, read, warm)
 
     def field(self, time: float, field: float) -> None:
         """Store a teslameter reading, T."""
-        self._records["field"].append(time, field)
-        self.tick()
+        self._row("field", time, field)
 
     def event(self, time: float, kind: str, text: str) -> None:
         """Store that something happened; the whole text goes to the log."""
         self.folder.log(kind, text, time=time)
-        self._records["events"].append(time, _fixed(kind, 16), _fixed(text, 160))
-        self.tick()
+        self._row("events", time, _fixed(kind, 16), _fixed(text, 160))
 
     def trial(
         self,
@@ -168,11 +152,10 @@ class Recorder:
         """
         held = hold or (math.nan, math.nan)
         force = math.nan if level is None else level
-        self._records["trials"].append(
-            index, start, end, force, *held, spikes, skipped, pause, _fixed(label, 48),
-            rest, math.nan if drift is None else drift,
+        self._row(
+            "trials", index, start, end, force, *held, spikes, skipped, pause,
+            _fixed(label, 48), rest, math.nan if drift is None else drift,
         )  # fmt: skip
-        self.tick()
 
     def outcome(self, outcome: Outcome) -> None:
         """Store that a trial ended, and what came of it in numbers."""
@@ -193,8 +176,7 @@ class Recorder:
 
     def pause(self, start: float, end: float) -> None:
         """Store a planned pause, s: nothing was streamed, and that is no gap."""
-        self._records["pauses"].append(start, end)
-        self.tick()
+        self._row("pauses", start, end)
 
     def tick(self) -> None:
         """Write what has waited for longer than `CADENCE`."""
@@ -214,7 +196,6 @@ class Recorder:
             produced: samples the scope delivered, per signal or for each of them.
             entries: more entries for `run.json`.
         """
-        spikes = self.spikes_stored
         try:
             self._guard(self._close)
         except RecordingError as failure:
@@ -232,37 +213,35 @@ class Recorder:
                 for column in self._columns
             }
             self.folder.finish(
-                status, samples=counters, spikes_online=spikes, **entries
+                status, samples=counters, spikes_online=self._spikes, **entries
             )
 
+    @property
+    def _columns(self) -> list[SampleColumn]:
+        return [] if self._file is None else self._file.samples
+
+    def _row(self, table: str, *values: Any) -> None:
+        self._waiting[table].append(values)
+        self.tick()
+
     def _open(self, stream: Stream | None) -> None:
-        path = self.folder.path / DATA
-        # no chunk cache: whole chunks are written once and never read back
-        file = h5py.File(path, "x", libver="latest", rdcc_nbytes=0)
-        declare(file, self.layout, stream)
-        self._file = file
-        if self._sync:
-            places = self.folder.path / PLACES
-            self._places = Places(places)
-            self._durable = Durable(path, places)
-        if stream is not None:
-            self._columns = tuple(self._column(file, n) for n in self.layout.signals)
-        for name, records in self._records.items():
-            records.attach(file[name])
-        file.swmr_mode = True
+        self._file = DataFile(self.folder.path, self.layout, stream, sync=self._sync)
         self._flush()
 
-    def _column(self, file: h5py.File, signal: str) -> SampleColumn:
-        if self._places is None:
-            return SampleColumn(file, signal)
-        return SampleColumn(file, signal, partial(self._places.note, signal))
+    def _replace_segment(self) -> None:
+        row = self._pieces.segment
+        if self._waiting["segments"]:
+            self._waiting["segments"][-1] = row
+        elif self._file is not None:
+            self._file.replace_last("segments", row)
 
     def _append(self, block: Block) -> None:
         over = sum(
             1 << bit for bit, row in enumerate(self._rows) if block.overrange[row]
         )
         if over:
-            self._records["overrange"].append(self._pieces.taken, block.samples, over)
+            row = (self._pieces.taken, block.samples, over)
+            self._waiting["overrange"].append(row)
         self._pieces.take(block.samples)
         wrote = [
             column.append(block.codes[row])
@@ -277,22 +256,24 @@ class Recorder:
         if self._file is None:
             return
         check_space(self.folder.path, self._reserve)
-        if self._durable is not None:
-            self._durable.raise_failure()
         if time.monotonic() - self._flushed > CADENCE:
             for column in self._columns:
                 column.write()
-        for records in self._records.values():
-            records.flush()
+        self._write_rows(self._file)
         self._file.flush()
         self._flushed = time.monotonic()
+
+    def _write_rows(self, file: DataFile) -> None:
+        for table, rows in self._waiting.items():
+            if rows:
+                file.append(table, rows)
+                self._waiting[table] = []
 
     def _close(self) -> None:
         if self._file is None and not self._failed:
             self._open(None)
         if self._file is None:
             return
-        file, self._file = self._file, None
         # after a failure, which has been told, as much as still goes
         failed = (OSError, RuntimeError, ValueError) if self._failed else ()
         try:
@@ -300,16 +281,9 @@ class Recorder:
                 for column in self._columns:
                     column.write()
                     column.write_pyramid()
-                for records in self._records.values():
-                    records.flush()
+                self._write_rows(self._file)
         finally:
-            file.close()
-            if self._places is not None and self._durable is not None:
-                self._places.close()
-                with suppress(*failed):
-                    self._durable.close()
-                if not self._failed:
-                    (self.folder.path / PLACES).unlink()
+            self._file.close(failed=self._failed)
 
     def _guard(self, write: Callable[[], None]) -> None:
         """Turn what a disk can do to us into a message that says what is kept."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError, RunFolderError
-from tactile_lab.store.certificate import certify, redetect, searched_is_stored
-from tactile_lab.store.columns import pyramid_of
+from tactile_lab.store.certificate import (
+    redetect,
+    searched_is_stored,
+    write_certificate,
+)
+from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.folder import (
     DATA,
     INFO,
@@ -23,15 +29,15 @@ from tactile_lab.store.folder import (
     read_info,
     write_json,
 )
-from tactile_lab.store.layout import CHECK, RECORDS, create_channel
-from tactile_lab.store.opening import missing_bytes
-from tactile_lab.store.places import PLACES
+from tactile_lab.store.layout import RECORDS, create_channel
+from tactile_lab.store.ledger import LEDGER, Written, read_ledger
 from tactile_lab.store.run import Run
-from tactile_lab.store.salvage import Salvage
-from tactile_lab.store.torn import rows_of
 
 KEPT = "data.killed.h5"
 """What the file is called that the crash left."""
+
+OF_SAMPLES = {"segments": "first", "gaps": "sample", "overrange": "sample"}
+"""Tables about samples, and the column that tells which; lost ones are dropped."""
 
 
 @dataclass(frozen=True)
@@ -61,130 +67,137 @@ def recover(path: Path) -> Recovery:
     """
     if is_live(path):
         raise RunFolderError(f"{path} is still being recorded; wait until it ends.")
-    if not (path / DATA).exists():
-        return _without_data(path)
+    info = read_info(path)
+    if info["status"] != "running":
+        raise RunFolderError(
+            f"{path} was not cut short (status {info['status']}); nothing to recover. "
+            "`tactile-lab verify` checks it."
+        )
+    if not (path / LEDGER).exists() and _can_be_opened(path):
+        raise RunFolderError(
+            f"{path} has no {LEDGER} that tells what was written. Put it back; after a "
+            f"run of an older version, read what {DATA} holds."
+        )
+    written = read_ledger(path / LEDGER)
+    if not written.declared:
+        return _without_samples(path, info)
+    check_space(path, (path / DATA).stat().st_size + RESERVE)
+    new = path / "data.recovering.h5"
     try:
-        loaded = Run.load(path)
-    except RunFolderError:
-        if missing_bytes(path / DATA) or read_info(path)["status"] != "running":
-            raise
-        # killed while the datasets were declared: there is no sample yet
-        (path / DATA).rename(path / KEPT)
-        return _without_data(path)
-    with loaded as run:
-        if run.status != "running":
-            raise RunFolderError(
-                f"{path} was not cut short (status {run.status}); nothing to recover. "
-                "`tactile-lab verify` checks it."
-            )
-        check_space(path, (path / DATA).stat().st_size + RESERVE)
-        new = path / "data.recovering.h5"
-        try:
-            with h5py.File(new, "w", libver="latest") as file:
-                samples, dropped = _copy(run, file)
-                file.flush()
-        except OSError as error:
-            new.unlink(missing_ok=True)
-            raise RecordingError(f"{new} cannot be written: {error}.") from error
+        new.write_bytes(written.declared)
+        with h5py.File(new, "r+", libver="latest") as file:
+            samples, dropped = _fill(file, written, path / DATA)
+    except OSError as error:
+        new.unlink(missing_ok=True)
+        raise RecordingError(f"{new} cannot be written: {error}.") from error
     (path / DATA).rename(path / KEPT)
     new.rename(path / DATA)
-    (path / PLACES).unlink(missing_ok=True)
+    (path / LEDGER).unlink()
     return _derive(path, samples, dropped)
 
 
-def _without_data(path: Path) -> Recovery:
+def _without_samples(path: Path, info: dict[str, Any]) -> Recovery:
     """A run that died before its first sample."""
-    info = read_info(path)
-    if info["status"] != "running":
-        raise RunFolderError(f"{path} was not cut short; nothing to recover.")
+    kept = None
+    if (path / DATA).exists():
+        kept = (path / DATA).rename(path / KEPT)
     write_json(path / INFO, {**info, "status": "recovered", "samples": {}})
-    kept = path / KEPT
-    return Recovery(0, 0, 0, kept if kept.exists() else None)
+    return Recovery(0, 0, 0, kept)
 
 
-def _copy(run: Run, file: h5py.File) -> tuple[int, int]:
-    """Copy what can be read; (samples per channel, samples dropped)."""
-    file.attrs.update(run.attributes)
-    for name, record in RECORDS.items():
-        rows = _readable_rows(run, name, record)
-        dataset = file.create_dataset(
-            name, data=rows, maxshape=(None,), chunks=True, fletcher32=True
-        )
-        dataset.attrs.update(run.table_attributes(name))
-    salvages = {name: Salvage(run, name) for name in run.signals}
-    longest = max(
-        (int(run.column(name)[0].shape[0]) for name in run.signals), default=0
-    )
-    samples = min((one.samples for one in salvages.values()), default=0)
-    for name, salvage in salvages.items():
-        _copy_channel(run, name, salvage, samples, file)
-    _cut(file, samples)
-    return samples, max(0, longest - samples)
-
-
-def _readable_rows(run: Run, name: str, record: np.dtype[Any]) -> NDArray[Any]:
-    """A table; empty where the crash left it unreadable."""
+def _can_be_opened(path: Path) -> bool:
     try:
-        return rows_of(run.table(name))
-    except (OSError, RuntimeError):
-        return np.empty(0, record)
+        Run.load(path).close()
+    except RunFolderError:
+        return False
+    return True
 
 
-def _copy_channel(
-    run: Run, name: str, salvage: Salvage, length: int, file: h5py.File
-) -> None:
-    """Copy the first `length` samples; rebuild what is derived from them."""
-    samples, _, _ = run.column(name)
-    new = create_channel(file, name, samples.dtype, salvage.size)
-    new.attrs.update(samples.attrs)
-    new.resize(length, axis=0)
-    checks, bins = [], [pyramid_of(np.empty(0, samples.dtype))]
-    for first in range(0, length, salvage.size):
-        codes = salvage.chunk(first // salvage.size)
-        assert codes is not None, "it was there when samples were counted"
-        codes = codes[: length - first]
-        new[first : first + codes.size] = codes
-        checks.append((codes.size, zlib.crc32(codes.data)))
-        bins.append(pyramid_of(codes))
-    for kind, rows in (
-        ("checks", np.array(checks, CHECK)),
-        ("pyramid", np.concatenate(bins)),
-    ):
-        file[f"{kind}/{name}"].resize(rows.size, axis=0)
-        file[f"{kind}/{name}"][:] = rows
+def _fill(file: h5py.File, written: Written, killed: Path) -> tuple[int, int]:
+    """Put what was written and can be read into `file`.
+
+    Args:
+        file: as it was declared.
+        written: what the ledger says.
+        killed: the file as the crash left it.
+
+    Returns:
+        Samples per channel, and samples dropped.
+    """
+    names = list(file.get("samples", ()))
+    channels = [_Chunks(file[f"samples/{name}"], written, killed) for name in names]
+    columns = [SampleColumn(file, name) for name in names]
+    for number in count() if names else ():
+        codes = [channel.read(number) for channel in channels]
+        samples = min(part.size for part in codes)
+        for column, part in zip(columns, codes, strict=True):
+            column.append(part[:samples])
+        if samples < channels[0].size:
+            break  # written when it was the last
+    for column in columns:
+        column.write()
+        column.write_pyramid()
+    kept = min((column.written for column in columns), default=0)
+    for name, record in RECORDS.items():
+        rows = np.array(written.rows[name], record)
+        if names and name in OF_SAMPLES:
+            rows = rows[rows[OF_SAMPLES[name]] < max(kept, 1)]
+        Column(file[name]).put(0, rows)
+    longest = max((channel.length for channel in channels), default=0)
+    return kept, longest - kept
 
 
-def _cut(file: h5py.File, samples: int) -> None:
-    """Drop records of samples that are not there any more."""
-    if "samples" not in file:
-        return
-    for name, column in (
-        ("segments", "first"),
-        ("gaps", "sample"),
-        ("overrange", "sample"),
-    ):
-        rows = file[name][()]
-        keep = rows[rows[column] < max(samples, 1)]
-        file[name].resize(keep.size, axis=0)
-        file[name][:] = keep
+class _Chunks:
+    """Chunks of one channel, from where the ledger says they were written.
+
+    Args:
+        like: the channel's dataset, for type, filters and scale.
+        written: what the ledger says.
+        killed: the file that holds the chunks.
+
+    Attributes:
+        size: samples in a full chunk.
+        length: samples that were written.
+    """
+
+    def __init__(self, like: h5py.Dataset, written: Written, killed: Path) -> None:
+        name = like.name.strip("/")
+        self.size = int(like.chunks[0])
+        self._killed, self._entries = killed, written.chunks[name]
+        ends = [n * self.size + new[-1][2] for n, new in self._entries.items()]
+        self.length = max(ends, default=0)
+        self._scale = int(like.attrs["code_scale"])
+        # HDF5 decompresses what it finds in a dataset of its own
+        memory = h5py.File(name, "w", driver="core", backing_store=False)
+        self._one = create_channel(memory, "one", like.dtype, self.size)
+        self._one.resize((self.size,))
+
+    def read(self, number: int) -> NDArray[np.int16]:
+        """Scope codes of a chunk as last written, or before; none where none hold."""
+        for offset, size, samples, crc in reversed(self._entries.get(number, [])):
+            with self._killed.open("rb") as file:
+                file.seek(offset)
+                self._one.id.write_direct_chunk((0,), file.read(size).ljust(size))
+            with suppress(OSError):
+                codes = self._one[:samples]
+                if zlib.crc32(codes.data) == crc:
+                    found: NDArray[np.int16] = codes.astype(np.int16) * self._scale
+                    return found
+        return np.empty(0, np.int16)
 
 
 def _derive(path: Path, samples: int, dropped: int) -> Recovery:
     """Find the spikes again, count, and patch `run.json`."""
     with Run.load(path) as run:
-        found = redetect(run) if searched_is_stored(run) else None
-        axis = run.axis
-    if found is not None:
-        times = axis.time_of(found["sample"]) if axis.first.size else found["sample"]
-        rows = np.empty(found.size, RECORDS["spikes"])
-        for column in ("sample", "amplitude", "width"):
-            rows[column] = found[column]
-        rows["time"] = times
-        with h5py.File(path / DATA, "r+", libver="latest") as file:
-            file["spikes"].resize(rows.size, axis=0)
-            file["spikes"][:] = rows
-    with Run.load(path) as run:
-        spikes = int(run.records("spikes").size)
+        if searched_is_stored(run):
+            found = redetect(run)
+            rows = np.empty(found.size, RECORDS["spikes"])
+            for column in ("sample", "amplitude", "width"):
+                rows[column] = found[column]
+            if found.size:
+                rows["time"] = run.axis.time_of(found["sample"])
+        else:
+            rows = run.records("spikes")
         counters = {
             name: {"produced": None, "written": run.stored(name)}
             for name in run.signals
@@ -193,12 +206,12 @@ def _derive(path: Path, samples: int, dropped: int) -> Recovery:
             **run.info,
             "status": "recovered",
             "samples": counters,
-            "spikes_online": spikes,
+            "spikes_online": rows.size,
             "dropped": dropped,
             "duration_s": run.duration,
         }
-        write_json(path / INFO, info)
-        run.info = info
-        certificate = certify(run)
-    write_json(path / INFO, {**info, "loss": certificate.to_json()})
-    return Recovery(samples, dropped, spikes, path / KEPT)
+    with h5py.File(path / DATA, "r+", libver="latest") as file:
+        Column(file["spikes"]).put(0, rows)
+    write_json(path / INFO, info)
+    write_certificate(path)
+    return Recovery(samples, dropped, rows.size, path / KEPT)

@@ -25,10 +25,10 @@ from tactile_lab.store.applied import (
     applied_current,
     held,
 )
+from tactile_lab.store.data_file import open_data
 from tactile_lab.store.derived import drain_current_of, table
 from tactile_lab.store.folder import DATA, is_live, read_info
 from tactile_lab.store.layout import BIN, RECORDS
-from tactile_lab.store.opening import open_data
 from tactile_lab.store.signal import Axis, StoredSignal
 from tactile_lab.waveform import Waveform
 

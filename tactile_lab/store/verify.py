@@ -23,7 +23,6 @@ from tactile_lab.store.certificate import (
 from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.folder import DATA, INFO, digest, is_live, read_info
 from tactile_lab.store.layout import BIN, RECORDS
-from tactile_lab.store.opening import missing_bytes
 from tactile_lab.store.run import Run
 
 
@@ -83,9 +82,6 @@ def verify(path: Path) -> Verdict:
             findings.append(Finding(DATA, "the file is missing"))
         notes.append("the run stored no samples")
         return Verdict(tuple(findings), None, tuple(notes))
-    lacking = missing_bytes(path / DATA)
-    if lacking:
-        findings.append(Finding(DATA, f"{lacking} bytes are missing at the end"))
     try:
         run = Run.load(path)
     except RunFolderError as error:
@@ -93,6 +89,7 @@ def verify(path: Path) -> Verdict:
     certificate = None
     with run:
         try:
+            findings += _length(run)
             findings += _tables(run)
             for name in run.signals:
                 findings += _channel(run, name)
@@ -119,6 +116,14 @@ def _files(path: Path, info: dict[str, Any]) -> Iterator[Finding]:
             continue
         if digest(data) != wanted:
             yield Finding(name, "was changed after the run (SHA-256 differs)")
+
+
+def _length(run: Run) -> Iterator[Finding]:
+    """Whether the file is as long as it was when it was closed."""
+    length = run.table("events").file.id.get_filesize()
+    missing = length - (run.path / DATA).stat().st_size
+    if missing > 0 and run.status != "running":
+        yield Finding(DATA, f"{missing} bytes are missing at the end")
 
 
 def _tables(run: Run) -> Iterator[Finding]:
@@ -177,18 +182,17 @@ def _channel(run: Run, name: str) -> Iterator[Finding]:
 def _chunk(samples: h5py.Dataset, first: int, count: int, crc: int) -> str | None:
     """What is wrong with one chunk; None if it is sound."""
     try:
+        codes = samples[first : first + count]
+        if zlib.crc32(codes.data) == crc:
+            return None
+        what = "the samples are not those that were written (CRC-32 differs)"
+    except (OSError, RuntimeError) as error:
+        what = f"the chunk cannot be decompressed ({_brief(error)})"
+    try:
         info = samples.id.get_chunk_info_by_coord((first,))
     except (OSError, RuntimeError, ValueError) as error:
         return f"the chunk's place is not known ({_brief(error)})"
-    if info.byte_offset is None:
-        return "the chunk is missing"
-    try:
-        codes = samples[first : first + count]
-    except (OSError, RuntimeError) as error:
-        return f"the chunk cannot be decompressed ({_brief(error)})"
-    if zlib.crc32(codes.data) != crc:
-        return "the samples are not those that were written (CRC-32 differs)"
-    return None
+    return "the chunk is missing" if info.byte_offset is None else what
 
 
 def _when(run: Run, sample: int) -> str:

@@ -64,6 +64,15 @@ def test_a_flipped_bit_is_located(complete, chunk, where):
     ]
 
 
+@pytest.mark.parametrize("byte", range(12))
+def test_a_flipped_bit_in_the_head_of_a_chunk_is_located(complete, byte):
+    """There the filter reads how much to decompress, and would run out of memory."""
+    offset, _ = place(complete, "samples/V_K", 2)
+    damage(complete, offset + byte, flip=0x01)
+    verdict = verify(complete)
+    assert [f.where for f in verdict.findings] == ["data.h5 /samples/V_K[2048:3072]"]
+
+
 @pytest.mark.parametrize("table", ["spikes", "current", "segments"])
 def test_a_flipped_bit_in_a_table_is_located(complete, table):
     offset, _ = place(complete, table, 0)

@@ -7,11 +7,11 @@ import shutil
 import numpy as np
 import pytest
 
-from tactile_lab.errors import RecordingError
+from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
-from tactile_lab.store.places import PLACES, read_places
+from tactile_lab.store.ledger import LEDGER, read_ledger
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
@@ -19,7 +19,7 @@ from tactile_lab.store.verify import verify
 
 PAGE, CHUNK = 4096, 1024
 SAMPLES, BLOCK, SYNC = 150_000, 500, 2000
-FILES = (DATA, PLACES)
+FILES = (DATA, LEDGER)
 
 
 @pytest.fixture(scope="module")
@@ -74,35 +74,67 @@ def test_what_was_synced_survives_whatever_else_arrived(cut_runs, tmp_path, seed
         assert run.current["time"].size * BLOCK >= written
 
 
-def test_a_run_that_ended_well_needs_no_noted_places(cut_runs, bench, folder):
+def test_a_run_that_ended_well_needs_no_ledger(cut_runs, bench, folder):
     layout = Layout(signals=bench.SIGNALS, detection=bench.DETECTION, simulated=False)
     recorder = Recorder(folder, layout, reserve=0)
     bench.play(recorder, bench.codes(4000), 500)
-    noted = read_places(folder.path / PLACES)
-    assert set(noted["signal"]) == {b"V_C1", b"V_K"}
-    assert noted["chunk"].max() == 2
+    noted = read_ledger(folder.path / LEDGER).chunks
+    assert set(noted) == {"samples/V_C1", "samples/V_K"}
+    assert max(noted["samples/V_K"]) == 2
     recorder.close("complete", 4000)
-    assert not (folder.path / PLACES).exists()
+    assert not (folder.path / LEDGER).exists()
 
 
-def test_samples_are_found_by_their_noted_places_alone(cut_runs, tmp_path):
-    """HDF5's index of one channel is gone; its chunks are not."""
-    left, made, synced = cut_runs
-    path = tmp_path / "run"
-    shutil.copytree(left, path)
-    written, files = synced[-1]
-    data = bytearray(files[0])
+def broken_index(data):
+    """HDF5's index of chunks is gone; the chunks are not."""
     at, blocks = data.find(b"EADB"), 0  # an extensible array's data blocks
     while at >= 0:
         data[at + 20] ^= 0xFF
         at, blocks = data.find(b"EADB", at + 1), blocks + 1
     assert blocks > 2
+
+
+def broken_head(data):
+    """Superblock, attributes and headers of the first datasets are gone."""
+    data[:PAGE] = bytes(PAGE)
+
+
+@pytest.mark.parametrize("broken", [broken_index, broken_head])
+def test_samples_are_found_by_the_ledger_alone(cut_runs, tmp_path, broken):
+    left, made, synced = cut_runs
+    path = tmp_path / "run"
+    shutil.copytree(left, path)
+    written, files = synced[-1]
+    data = bytearray(files[0])
+    broken(data)
     (path / DATA).write_bytes(data)
-    (path / PLACES).write_bytes(files[1])
+    (path / LEDGER).write_bytes(files[1])
     assert recover(path).samples >= written // CHUNK * CHUNK
     with Run.load(path) as run:
         found = run.signal("V_C1").scope_codes(0, run.samples)
         np.testing.assert_array_equal(found, made[0, : run.samples])
+
+
+def test_a_run_without_its_ledger_is_left_as_it_is(cut_runs, tmp_path):
+    left, _, _ = cut_runs
+    path = tmp_path / "run"
+    shutil.copytree(left, path)
+    (path / LEDGER).unlink()
+    with pytest.raises(RunFolderError, match="that tells what was written"):
+        recover(path)
+    with Run.load(path) as run:
+        assert (run.status, run.samples > 100_000) == ("running", True)
+
+
+def test_a_torn_entry_ends_the_ledger(cut_runs, tmp_path):
+    _, _, synced = cut_runs
+    whole = synced[-1][1][1]
+    (tmp_path / LEDGER).write_bytes(whole)
+    chunks = read_ledger(tmp_path / LEDGER).chunks["samples/V_K"]
+    (tmp_path / LEDGER).write_bytes(whole[: len(whole) // 2] + bytes(len(whole) // 2))
+    some = read_ledger(tmp_path / LEDGER).chunks["samples/V_K"]
+    assert 0 < len(some) < len(chunks)
+    assert all(chunks[number] == entries for number, entries in some.items())
 
 
 def test_a_measured_run_is_synced_again_and_again(bench, folder, monkeypatch):
@@ -137,7 +169,7 @@ def test_a_disk_that_refuses_a_sync_ends_the_run(bench, folder):
     recorder.segment(bench.stream(), 0.0)
     made = bench.codes(5000)
     recorder.append(bench.block(made, 0, 2048))
-    recorder._durable.failure = OSError(5, "Input/output error")
+    recorder._file._durable.failure = OSError(5, "Input/output error")
     with pytest.raises(RecordingError, match="Input/output error"):
         recorder.append(bench.block(made, 2048, 2048))
     recorder.close("faulted", 4096)
