@@ -10,10 +10,7 @@ from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import BadReplyError, LimitError
-from tactile_lab.instruments.serial_dialect import MeterDialect
-
-MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
-"""Meaning of the prefix letters some meters answer separately."""
+from tactile_lab.instruments.serial_dialect import MULTIPLIERS, MeterDialect
 
 
 class Teslameter:

@@ -27,8 +27,8 @@ SIMULATED_POLL = 0.05
 def serial_source(table: CoilSpec, world: World) -> CoilSource:
     """A serial current source that drives the plant's coil."""
     from drivers.coil.source import CoilSource
+    from sim_backend.coil.source import coil_far_end
     from sim_backend.serial_line.faults import SerialFault
-    from sim_backend.serial_line.from_row import coil_far_end
     from sim_backend.serial_line.wires import plug_in
 
     row = coil_dialect(table.dialect)
@@ -87,8 +87,8 @@ def usbtmc(table: ScopeSpec, world: World) -> UsbtmcScope:
 def serial_meter(table: FieldMeterSpec, world: World) -> Teslameter:
     """A serial teslameter in the plant's field."""
     from drivers.teslameter import Teslameter
-    from sim_backend.serial_line.from_row import meter_far_end
     from sim_backend.serial_line.wires import plug_in
+    from sim_backend.teslameter import meter_far_end
 
     row = meter_dialect(table.dialect)
     probe = meter_far_end(

@@ -8,12 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from sim_backend.coil.panel import Deed
+from sim_backend.coil.panel import PanelChange
+from sim_backend.coil.source import coil_far_end
 from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.plant.options import PlantOptions
-from sim_backend.serial_line.from_row import coil_far_end, meter_far_end
 from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
 from sim_backend.serial_line.wires import FarEnd, LineInstrument
+from sim_backend.teslameter import meter_far_end
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
 from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
@@ -89,7 +90,7 @@ class ServedBench:
                 source, wire = coil_far_end(plant, row, clock), row.serial
                 if log is not None:
                     self._log = log.open("a", encoding="utf-8")
-                    source.on_deed = _writer(self._log)
+                    source.on_change = _writer(self._log)
                 wire = wire.model_copy(update={"baud": baud or wire.baud})
                 self._add("coil", coil, source, wire, clock, paced)
             if teslameter is not None:
@@ -150,12 +151,12 @@ def _server(where: str, far_end: FarEnd, paced: bool) -> SerialServer:
         ) from reason
 
 
-def _writer(log: TextIO) -> Callable[[Deed], None]:
-    def write(deed: Deed) -> None:
+def _writer(log: TextIO) -> Callable[[PanelChange], None]:
+    def write(change: PanelChange) -> None:
         entry = {
             "monotonic_s": time.monotonic(),
-            "what": deed.what,
-            "value": deed.value,
+            "what": change.what,
+            "value": change.value,
         }
         log.write(json.dumps(entry) + "\n")
         log.flush()

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
+from sim_backend.serial_line.from_row import Answer, RowParser, invented
 from sim_backend.serial_line.scpi import Handler, ScpiError, ScpiParser, number
 from tactile_lab.clock import Clock
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.serial_dialect import MULTIPLIERS, MeterDialect
 
 
 class FieldPlant(Protocol):
@@ -198,3 +201,59 @@ MODELS: dict[str, tuple[bytes, bool, Callable[[SimTeslameter], dict[str, Handler
     "lakeshore-f41": (b"\n", True, _lakeshore_f41),
 }
 """Reply terminator, SCPI error queue, and commands of each model, by dialect row."""
+
+
+class RowMeter:
+    """A simulated teslameter made from its row; it has neither range nor noise.
+
+    Args:
+        plant: the physics at the probe.
+        row: the dialect.
+        clock: the bench's time.
+
+    Raises:
+        SceneError: no answer can be made from one of its patterns.
+    """
+
+    def __init__(self, plant: FieldPlant, row: MeterDialect, clock: Clock) -> None:
+        self.reply_end = row.serial.reply_end.encode("ascii")
+        self.clearing = row.serial.preamble.encode("ascii")
+        per_tesla = 1 / row.scale
+
+        def field() -> str:
+            value = plant.field(clock.now()) * per_tesla
+            return invented(row.number, f"{value:.7f}")
+
+        answers: dict[str, Answer] = dict.fromkeys(row.report.values(), lambda: "1")
+        if row.multiplier is not None:
+            per_tesla /= MULTIPLIERS["m"]
+            answers[row.multiplier] = lambda: "m"
+        answers[row.field] = field
+        self._talk = RowParser(row, answers, lambda text: False, deque())
+        field()
+
+    def line(self, line: bytes) -> bytes | None:
+        """Act on one line; the answer without terminator, or None."""
+        return self._talk.line(line)
+
+
+def meter_far_end(
+    plant: FieldPlant,
+    row: MeterDialect,
+    clock: Clock,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> SimTeslameter | RowMeter:
+    """The simulated teslameter that speaks `row`, as `coil_far_end`.
+
+    Args:
+        plant: the physics at the probe.
+        row: the dialect.
+        clock: the bench's time.
+        noise: standard deviation of a reading, T; not of one made from a row.
+        seed: of the noise.
+    """
+    if row.id in MODELS:
+        return SimTeslameter(plant, row.id, clock, noise=noise, seed=seed)
+    return RowMeter(plant, row, clock)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim_backend.coil.panel import CoilPanel, Personality, bare, numeric, one_of
+from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric, one_of
 from sim_backend.serial_line.scpi import Handler, ScpiError, boolean
 
 
@@ -86,13 +86,13 @@ def _commands(source: CoilPanel, model: str) -> dict[str, Handler]:
     }
 
 
-KEITHLEY_2400 = Personality(
+KEITHLEY_2400 = SourceModel(
     rating=(1.05, 21.0),
     commands=lambda source: _commands(source, "2400"),
     clearing=b"\x03\x18",
 )
 
-KEITHLEY_2420 = Personality(
+KEITHLEY_2420 = SourceModel(
     rating=(3.15, 20.0),
     commands=lambda source: _commands(source, "2420"),
     clearing=b"\x03\x18",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from sim_backend.coil.panel import CoilPanel, Personality, bare, numeric, one_of
+from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric, one_of
 from sim_backend.serial_line.scpi import Handler, boolean, number
 
 
@@ -80,7 +80,7 @@ def _plain(source: CoilPanel) -> dict[str, Handler]:
     return commands
 
 
-KEPCO = Personality(
+KEPCO = SourceModel(
     rating=(5.0, 20.0),
     commands=lambda source: _commands(source) | _list(source),
     reply_end=b"\r\n",
@@ -90,4 +90,4 @@ KEPCO = Personality(
     rewrite=_digits,
 )
 
-PLAIN = Personality(rating=(2.0, 20.0), commands=_plain)
+PLAIN = SourceModel(rating=(2.0, 20.0), commands=_plain)

@@ -34,7 +34,7 @@ class CoilPlant(Protocol):
 
 
 @dataclass(frozen=True)
-class Deed:
+class PanelChange:
     """One change of state, for tests: what (`set`, `limit`, `output`), when, value."""
 
     what: str
@@ -62,8 +62,8 @@ class CoilPanel:
         self._plant = plant
         self._clock = clock
         self.rating = rating
-        self.deeds: list[Deed] = []
-        self.on_deed: Callable[[Deed], None] = self.deeds.append
+        self.changes: list[PanelChange] = []
+        self.on_change: Callable[[PanelChange], None] = self.changes.append
         self.setpoint = 0.0
         self.compliance = 1.0
         self.output_on = False
@@ -124,11 +124,11 @@ class CoilPanel:
         return self._plant.coil_voltage(self._clock.now())
 
     def _note(self, what: str, value: float) -> None:
-        self.on_deed(Deed(what, self._clock.now(), value))
+        self.on_change(PanelChange(what, self._clock.now(), value))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Personality:
+class SourceModel:
     """How one model differs from the others.
 
     Attributes:

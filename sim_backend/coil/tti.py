@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim_backend.coil.panel import CoilPanel, Personality, bare, numeric
+from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric
 from sim_backend.serial_line.scpi import Handler, boolean
 
 
@@ -30,6 +30,6 @@ def _commands(source: CoilPanel) -> dict[str, Handler]:
     }
 
 
-AIM_TTI = Personality(
+AIM_TTI = SourceModel(
     rating=(3.0, 30.0), commands=_commands, reply_end=b"\r\n", standard=False
 )

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.plant.pieces import FloatArray, Pieces, join
+from sim_backend.plant.step_response import Core, Moment, StepResponse
 from sim_backend.plant.winding import Winding
-from sim_backend.serial_line.answer import Answer, Core, Moment
 
 
 @dataclass(frozen=True, eq=False)
 class _Command:
     begin: Moment
-    answer: Answer
+    answer: StepResponse
     rise: tuple[float, float]
 
 

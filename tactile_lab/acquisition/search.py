@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactile_lab.bench import Stream
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
-from tactile_lab.spikes.crossings import Codes
 from tactile_lab.spikes.detection import Detection
-from tactile_lab.spikes.detector import (
-    Detector,
-    ResetDetector,
-    detector_of,
-    estimate,
-)
+
+if TYPE_CHECKING:  # compiled code, which a run without spikes does not load
+    from tactile_lab.spikes.crossings import Codes
+    from tactile_lab.spikes.detector import Detector, ResetDetector
 
 RESET_EDGE = 0.5e-6
 """Longest a reset of V_C2 takes at the follower's output, s: 4 V at 13 V/us."""
@@ -60,6 +57,8 @@ class SpikeSearch:
         Raises:
             ParameterError: the noise leaves no room for a threshold in the range.
         """
+        from tactile_lab.spikes.detector import estimate
+
         self._learnt = estimate(codes, step=1 << stream.shift)
 
     def detection(self, stream: Stream) -> Detection:
@@ -99,6 +98,8 @@ class SpikeSearch:
 
     def detector(self, stream: Stream) -> Detector | ResetDetector:
         """A fresh detector for the stream."""
+        from tactile_lab.spikes.detector import detector_of
+
         return detector_of(self.detection(stream))
 
     def describe(self, stream: Stream) -> dict[str, Any]:

@@ -18,6 +18,9 @@ from tactile_lab.quantity import Current, Duration, Pause, Voltage, show
 MARGIN = 1.5
 """Factor by which the promised update interval exceeds the typical one."""
 
+MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
+"""Meaning of the prefix letters some meters answer separately."""
+
 
 def _pattern(text: str) -> str:
     try:

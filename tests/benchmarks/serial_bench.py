@@ -88,7 +88,7 @@ def times_to_off(kind: str, baud: int | None, how: int, times: int) -> list[floa
             while source.output_on and clock.now() < since + 10:
                 time.sleep(0.0005)
             assert not source.output_on, "the output stayed on"
-            off = [d for d in source.deeds if d.what == "output"][-1]
+            off = [d for d in source.changes if d.what == "output"][-1]
             found.append(off.time - since)
             logged(Path(state), len(found))
             owner.kill()

@@ -31,7 +31,7 @@ class Served:
 
     def __init__(self, folder: Path, where: str) -> None:
         self.folder = folder
-        self.log = folder / "deeds.jsonl"
+        self.log = folder / "changes.jsonl"
         self.process = subprocess.Popen(
             [
                 *(sys.executable, "-m", "tactile_lab", "serve-bench", "--json"),
@@ -79,9 +79,9 @@ class Served:
         """Wait for output off after `since`, on this machine's monotonic clock."""
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
-            for deed in self.told():
-                if deed["what"] == "output" and deed["monotonic_s"] > since:
-                    assert deed["value"] == 0
+            for change in self.told():
+                if change["what"] == "output" and change["monotonic_s"] > since:
+                    assert change["value"] == 0
                     return
             time.sleep(0.005)
         raise AssertionError("the output stayed on")

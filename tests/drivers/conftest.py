@@ -50,7 +50,7 @@ class SerialBench:
 
     @property
     def sets(self):
-        return [deed for deed in self.source.deeds if deed.what == "set"]
+        return [change for change in self.source.changes if change.what == "set"]
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ def bench(serial_bench):
 
 
 def steps(far):
-    return [deed for deed in far.deeds if deed.what == "set"]
+    return [change for change in far.changes if change.what == "set"]
 
 
 def test_plays_a_current_and_reads_it_back(bench):
@@ -57,11 +57,11 @@ def test_never_on_before_limit_and_zero(bench):
     _clock, _plant, far, coil = bench
     coil.open()
     coil.energise()
-    order = [deed.what for deed in far.deeds]
-    on = next(i for i, d in enumerate(far.deeds) if d.what == "output" and d.value)
+    order = [change.what for change in far.changes]
+    on = next(i for i, d in enumerate(far.changes) if d.what == "output" and d.value)
     assert "limit" in order[:on]
     assert far.compliance == 14.0
-    assert [d.value for d in far.deeds[:on] if d.what == "set"][-1] == 0.0
+    assert [d.value for d in far.changes[:on] if d.what == "set"][-1] == 0.0
 
 
 def test_steps_never_exceed_the_slew_limit(bench):
@@ -83,10 +83,10 @@ def test_refuses_what_may_never_be_set(bench, current):
     *_, far, coil = bench
     coil.open()
     coil.energise()
-    before = list(far.deeds)
+    before = list(far.changes)
     with pytest.raises(LimitError):
         coil.set_current(current)
-    assert far.deeds == before
+    assert far.changes == before
 
 
 def test_refuses_to_set_with_the_output_off(bench):
@@ -103,12 +103,12 @@ def test_safe_off_ramps_and_verifies_and_may_be_repeated(bench):
     for _ in range(20):
         clock.sleep_until(clock.now() + coil.update_interval)
         coil.set_current(1.0)
-    begun, seen = clock.now(), len(far.deeds)
+    begun, seen = clock.now(), len(far.changes)
     report = coil.safe_off()
     assert report.verified and report.current == 0.0
     assert not far.output_on and far.setpoint == 0.0
     assert clock.now() - begun < 0.6
-    assert len(far.deeds) - seen > 4
+    assert len(far.changes) - seen > 4
     assert coil.safe_off().verified
 
 

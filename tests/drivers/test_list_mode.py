@@ -30,7 +30,7 @@ def test_plays_in_its_own_time(bench):
     assert bench.coil.read_current().value == pytest.approx(0.3, abs=0.03)
     bench.clock.sleep_until(start + length + 0.1)
     played = bench.sets[before:]
-    assert [deed.value for deed in played] == pytest.approx(SINE, abs=1e-5)
+    assert [change.value for change in played] == pytest.approx(SINE, abs=1e-5)
     steps = [b.time - a.time for a, b in itertools.pairwise(played)]
     assert steps == pytest.approx([0.01] * 100)
     bench.coil.end_list()
@@ -79,10 +79,10 @@ def test_unplugged_during_a_list_it_still_ends_at_zero(bench):
     ],
 )
 def test_a_list_that_may_not_be_played(bench, currents, dwell, why):
-    before = list(bench.source.deeds)
+    before = list(bench.source.changes)
     with pytest.raises(LimitError, match=why):
         bench.coil.play_list(currents, dwell)
-    assert bench.source.deeds == before
+    assert bench.source.changes == before
     assert bench.source.list.points == []
 
 

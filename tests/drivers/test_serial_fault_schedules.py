@@ -89,14 +89,14 @@ def test_no_report_is_wrong_and_no_limit_broken(schedule):
             assert coil.safe_off().verified  # healed, it can always be made safe
             assert not source.output_on
     unplug(end)
-    deeds = source.deeds
-    for k, deed in enumerate(deeds):
-        if deed.what == "output" and deed.value:
-            before = deeds[:k]
+    changes = source.changes
+    for k, change in enumerate(changes):
+        if change.what == "output" and change.value:
+            before = changes[:k]
             assert any(d.what == "limit" and d.value == 14.0 for d in before)
             assert [d.value for d in before if d.what == "set"][-1] == 0.0
-    sets = [deed for deed in deeds if deed.what == "set"]
-    assert all(abs(deed.value) <= 2.0 for deed in sets)
+    sets = [change for change in changes if change.what == "set"]
+    assert all(abs(change.value) <= 2.0 for change in sets)
 
 
 def test_without_faults_the_same_session_keeps_the_slew_limit():
@@ -108,6 +108,6 @@ def test_without_faults_the_same_session_keeps_the_slew_limit():
         session(clock, coil)
         assert coil.setpoint == pytest.approx(0.6 * math.sin(39 / 5), abs=1e-5)
         coil.close()
-    sets = [deed for deed in source.deeds if deed.what == "set"]
+    sets = [change for change in source.changes if change.what == "set"]
     for a, b in itertools.pairwise(sets):
         assert abs(b.value - a.value) <= 5.0 * (b.time - a.time) + 6e-3

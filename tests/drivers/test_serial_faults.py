@@ -210,7 +210,7 @@ def test_no_compliance_no_output(serial_bench):
     with pytest.raises(RefusedError):
         it.coil.energise()
     assert not it.source.output_on
-    assert not any(d.what == "output" and d.value for d in it.source.deeds)
+    assert not any(d.what == "output" and d.value for d in it.source.changes)
 
 
 def test_output_that_cannot_be_switched_off_is_unsafe_at_connect(serial_bench):
@@ -247,7 +247,7 @@ def test_another_instrument_on_the_port_is_refused(serial_bench):
     coil = CoilSource(row, it.end.url, CoilLimits(), it.clock, baud=19200)
     with pytest.raises(BadReplyError, match="KEPCO"):
         coil.open()
-    assert it.source.deeds == []
+    assert it.source.changes == []
 
 
 @settings(

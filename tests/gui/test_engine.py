@@ -111,7 +111,7 @@ class Source:
     """A current source at a port of its own: it outlives window and engine."""
 
     def __init__(self, folder: Path) -> None:
-        self.log = folder / "deeds.jsonl"
+        self.log = folder / "changes.jsonl"
         self.served = ServedBench(coil="pty", log=self.log)
         self.served.start()
         row = resources.files("tactile_lab.instruments").joinpath(
@@ -129,8 +129,8 @@ class Source:
         """Whether the output is on, from what the source was told."""
         told = self.log.read_text()
         whole = told[: told.rfind("\n") + 1]
-        deeds = [json.loads(line) for line in whole.splitlines()]
-        return bool([d["value"] for d in deeds if d["what"] == "output"][-1])
+        changes = [json.loads(line) for line in whole.splitlines()]
+        return bool([d["value"] for d in changes if d["what"] == "output"][-1])
 
 
 @pytest.fixture

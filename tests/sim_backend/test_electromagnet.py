@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sim_backend.plant.electromagnet import Electromagnet
+from sim_backend.plant.step_response import ACCURACY
 from sim_backend.plant.winding import Winding
-from sim_backend.serial_line.answer import ACCURACY
 from tactile_lab.errors import ParameterError
 
 COIL, EDDY = 1.1e-3, 3e-3

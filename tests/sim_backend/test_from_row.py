@@ -8,15 +8,11 @@ from hypothesis import strategies as st
 
 from drivers.coil.source import CoilSource
 from drivers.teslameter import Teslameter
-from sim_backend.serial_line.from_row import (
-    RowCoil,
-    RowMeter,
-    coil_far_end,
-    meter_far_end,
-)
-from sim_backend.serial_line.invented import invented
+from sim_backend.coil.source import RowCoil, coil_far_end
+from sim_backend.serial_line.from_row import invented
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.serve import ServedBench
+from sim_backend.teslameter import RowMeter, meter_far_end
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import SceneError

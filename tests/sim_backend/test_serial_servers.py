@@ -75,9 +75,9 @@ def reach(clock, coil, current):
         drive(clock, coil, current, 1)
 
 
-def fastest(deeds, uncertain):
+def fastest(changes, uncertain):
     """Largest slew among the set-points as they arrived, A/s, but for rounding."""
-    sets = [deed for deed in deeds if deed.what == "set"]
+    sets = [change for change in changes if change.what == "set"]
     rounding = 2e-5
     return max(
         (abs(after.value - before.value) - rounding)
@@ -92,13 +92,13 @@ def test_plays_and_ends_safely(served):
     coil.energise()
     reach(clock, coil, 0.1)
     assert coil.read_current().value == pytest.approx(0.1)
-    played = len(source.deeds)
+    played = len(source.changes)
     assert coil.safe_off().verified
     assert not source.output_on
     slew = coil.limits.slew
     # a set-point is taken at some time within its exchange
-    assert fastest(source.deeds[:played], coil.update_interval) <= slew
-    assert fastest(source.deeds[played:], 0.0) <= slew
+    assert fastest(source.changes[:played], coil.update_interval) <= slew
+    assert fastest(source.changes[played:], 0.0) <= slew
 
 
 @pytest.mark.parametrize("kind", ["missing", "partial", "garbled", "noise", "late"])

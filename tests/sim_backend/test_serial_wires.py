@@ -38,7 +38,7 @@ def test_bytes_take_the_time_of_the_wire(wired):
         port.write(b"CURR 0.10000\n")
         taken = 13 * 10 / 9600 + WIRE.latency
         assert clock.now() - begun == pytest.approx(taken)
-        assert source.deeds[-1].time - begun == pytest.approx(taken)
+        assert source.changes[-1].time - begun == pytest.approx(taken)
         port.write(b"CURR?\n")
         asked = clock.now()
         assert port.read_until(b"\n") == b"0.10000\r\n"
@@ -72,7 +72,7 @@ def test_other_settings_are_not_heard(wired, settings):
     with opened(end, **settings) as port:
         port.write(b"CURR 0.1;CURR?\n")
         assert port.read_until(b"\n") == b""
-    assert source.deeds == []
+    assert source.changes == []
 
 
 def test_escape_clears_what_was_half_sent(wired):

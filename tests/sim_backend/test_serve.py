@@ -17,7 +17,7 @@ from tactile_lab.errors import InstrumentError, SceneError
 
 @pytest.mark.parametrize("where", ["pty", "tcp:0"])
 def test_both_instruments_look_at_one_coil(where, tmp_path):
-    log = tmp_path / "deeds.jsonl"
+    log = tmp_path / "changes.jsonl"
     bench = ServedBench(coil=where, teslameter=where, log=log)
     bench.start()
     clock = RealClock()

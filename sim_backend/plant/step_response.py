@@ -42,7 +42,7 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class StepResponse:
     """What follows a moment if no other command comes.
 
     Attributes:
@@ -82,7 +82,7 @@ class Core:
         """Play operators after the current went straight to `current` A."""
         return np.clip(plays, current - self._radius, current + self._radius)
 
-    def answer(self, begin: Moment) -> Answer:
+    def answer(self, begin: Moment) -> StepResponse:
         """Coil current and effective current from `begin` on."""
         jump = begin.target - begin.current
         current = begin.target - jump * _decay(self._current_knots, self._coil)
@@ -95,7 +95,7 @@ class Core:
             inside = moment.time + self._field_knots < end
             times.append(moment.time + self._field_knots[inside])
             values.append(value[inside])
-        return Answer(
+        return StepResponse(
             Pieces.through(begin.time + self._current_knots, current),
             Pieces.through(np.concatenate(times), np.concatenate(values)),
         )
