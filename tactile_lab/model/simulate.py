@@ -6,17 +6,18 @@ import math
 import time as wall
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.advance import rest
 from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit, FloatArray
 from tactile_lab.model.need import Need, checked_tolerance
-from tactile_lab.model.solution import Solution
-from tactile_lab.model.solver import solve
 from tactile_lab.model.state import Start, State
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.model.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,10 @@ def simulate(
         ParameterError: a bad option or waveform.
         SolverError: the model cannot answer to that tolerance.
     """
+    # compiled code, which only those who simulate load
+    from tactile_lab.model.advance import rest
+    from tactile_lab.model.solver import solve
+
     duration = force.end if until is None else until
     if not (math.isfinite(duration) and duration > 0):
         raise ParameterError(

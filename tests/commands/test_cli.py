@@ -1,6 +1,5 @@
 """The command line answers at once, imports what a verb needs, and knows its verbs."""
 
-import json
 import os
 import resource
 import subprocess
@@ -8,6 +7,7 @@ import sys
 
 import click
 import pytest
+from loaded import loaded_after
 
 from tactile_lab.cli import VERBS, cli, main
 
@@ -23,26 +23,6 @@ HEAVY = {
     "matplotlib",
     "pydantic",
 }
-
-
-def loaded_after(*arguments: str) -> set[str]:
-    """Top-level modules loaded by one command line, in a process of its own."""
-    code = (
-        "import contextlib, io, json, sys\n"
-        "from tactile_lab.cli import main\n"
-        "with contextlib.redirect_stdout(io.StringIO()):\n"
-        "    try: main(sys.argv[1:])\n"
-        "    except SystemExit as end: assert end.code == 0, end.code\n"
-        "print(json.dumps(sorted(sys.modules)))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return set(json.loads(done.stdout))
 
 
 def test_help_loads_nothing_heavy():

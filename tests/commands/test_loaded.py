@@ -1,0 +1,34 @@
+"""What a run does not need is not imported."""
+
+import os
+
+import pytest
+from loaded import force_only, simulated, spikes_only
+
+
+def rooms(names):
+    return {name.partition(".")[0] for name in names}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a pseudo-terminal")
+def test_a_run_of_force_alone_loads_a_source_and_nothing_else(tmp_path):
+    names = force_only(tmp_path)
+    assert "drivers.coil.source" in names
+    assert not rooms(names) & {"usb", "numba", "sim_backend", "gui", "matplotlib"}
+    assert not names & {"drivers.teslameter", "drivers.picoscope", "drivers.usbtmc"}
+    assert not names & {"tactile_lab.model.solver", "tactile_lab.spikes.detector"}
+
+
+def test_a_run_of_spikes_alone_loads_no_teslameter(tmp_path):
+    names = spikes_only(tmp_path)
+    assert {"drivers.picoscope.scope", "tactile_lab.spikes.detector"} <= names
+    assert not rooms(names) & {"usb", "gui", "matplotlib"}
+    assert not names & {"drivers.teslameter", "sim_backend.teslameter"}
+    assert not names & {"drivers.usbtmc", "sim_backend.usbtmc"}
+
+
+def test_the_model_alone_loads_no_bench(tmp_path):
+    names = simulated(tmp_path)
+    assert "tactile_lab.model.solver" in names
+    assert not rooms(names) & {"drivers", "sim_backend", "serial", "usb", "h5py", "gui"}
+    assert "tactile_lab.acquisition" not in names and "tactile_lab.engine" not in names
