@@ -15,8 +15,8 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QMenu, QWidget
 
 from gui.dialogs.closing import Closing
-from gui.opening import Opening
-from gui.panels import Panels
+from gui.screen.panels import Panels
+from gui.screen.screen import Screen
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Actions(QObject):
     """Fold a side panel, or unfold it."""
 
     def __init__(
-        self, window: QWidget, panels: Panels, opening: Opening, closing: Closing
+        self, window: QWidget, panels: Panels, opening: Screen, closing: Closing
     ) -> None:
         super().__init__(window)
         self._window, self._panels = window, panels

@@ -16,21 +16,21 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QWidget
 
 from gui.actions import Actions
 from gui.banner import Banner
-from gui.centre import Centre
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.dialogs.question import QuestionCard
-from gui.frames import Frames
 from gui.header.header import Header
 from gui.look.theme import Theme
-from gui.opening import Opening
-from gui.panels import Panels
 from gui.parts import column
-from gui.reading import move_on
 from gui.review.panel import ReviewPanel
+from gui.screen.centre import Centre
+from gui.screen.frames import Frames
+from gui.screen.panels import Panels
+from gui.screen.screen import Screen
 from gui.session.session import Session
 from gui.setup.panel import SetupPanel
 from gui.state import Snapshot, State
+from gui.tab_order import move_on
 
 NARROW = 1280
 """Window width, px, below which there is room for one side panel."""
@@ -70,7 +70,7 @@ class Window(QMainWindow):
         self.panels = Panels(
             session, theme, self.header, self.setup, self.centre, self.review
         )
-        self.opening = Opening(self.panels)
+        self.opening = Screen(self.panels)
         self.frames = Frames(self.panels, self.opening)
         self.actions_ = Actions(self, self.panels, self.opening, self.closing)
         self._leaving = False

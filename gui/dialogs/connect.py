@@ -36,8 +36,8 @@ from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 
 if TYPE_CHECKING:
-    from gui.opening import Opening
-    from gui.panels import Panels
+    from gui.screen.panels import Panels
+    from gui.screen.screen import Screen
     from tactile_lab.acquisition.ending import Executed
 
 WIRING, FIELD = "wiring_check", "calibrate_field"
@@ -294,7 +294,7 @@ class Connect(Overlay):
         self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
 
-def show_connect(window: QWidget, panels: Panels, opening: Opening) -> None:
+def show_connect(window: QWidget, panels: Panels, opening: Screen) -> None:
     """Open the dialog."""
     found = window.findChild(Connect)
     if isinstance(found, Connect):

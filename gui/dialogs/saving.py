@@ -27,7 +27,7 @@ from tactile_lab.errors import TactileLabError
 from tactile_lab.trace import FloatArray
 
 if TYPE_CHECKING:
-    from gui.panels import Panels
+    from gui.screen.panels import Panels
 
 TITLE = 34
 CSV_POINTS = 20_000

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gui.comparing import CompareBar
 from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
@@ -25,6 +24,7 @@ from gui.parts import column, label, line, panel, push
 from gui.record.log import LogView
 from gui.record.progress import Progress
 from gui.record.watching import WatchBar
+from gui.screen.compare_bar import CompareBar
 
 
 class EmptyCard(QFrame):

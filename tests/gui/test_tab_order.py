@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from gui.reading import in_reading_order
+from gui.tab_order import in_reading_order
 
 
 def names(root: QWidget) -> list[str]:

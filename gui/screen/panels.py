@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gui.centre import Centre
 from gui.header.header import Header
 from gui.look.theme import Theme
 from gui.review.panel import ReviewPanel
+from gui.screen.centre import Centre
 from gui.session.session import Session
 from gui.setup.panel import SetupPanel
 

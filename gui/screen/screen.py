@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtWidgets import QFileDialog
 
-from gui.agreeing import Agreeing
-from gui.choosing import choose_run, choose_scene
-from gui.comparing import load_comparison
 from gui.lanes.compare import Comparison
 from gui.lanes.source import LiveSource, PlanSource, Source
-from gui.panels import Panels
-from gui.records import Records
 from gui.review.entries import Entry, entries
 from gui.review.gathering import Gathering
+from gui.screen.agreeing import Agreeing
+from gui.screen.compare_bar import load_comparison
+from gui.screen.panels import Panels
+from gui.screen.records import Records
+from gui.screen.showing import lanes_shown
 from gui.session.form_plan import Planned
 from gui.session.log import Level
-from gui.showing import lanes_shown
 from gui.state import State
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
@@ -34,7 +34,7 @@ LATER = 1000
 """Milliseconds after a run's end until runs are listed anew: its record comes first."""
 
 
-class Opening(QObject):
+class Screen(QObject):
     """What is on screen: the plan, the run in progress, or a run from disk.
 
     Attributes:
@@ -92,15 +92,22 @@ class Opening(QObject):
 
     def ask_scene(self) -> None:
         """Let the user choose a scene, and open it."""
-        path = choose_scene(self._panels.centre.window())
-        if path is not None:
-            self.open_path(path)
+        name, _ = QFileDialog.getOpenFileName(
+            self._panels.centre.window(),
+            "Open a scene",
+            "",
+            "Scenes and protocols (*.toml *.py)",
+        )
+        if name:
+            self.open_path(Path(name))
 
     def ask_run(self) -> None:
         """Let the user choose a run, and open it."""
-        path = choose_run(self._panels.centre.window(), self._panels.session.out)
-        if path is not None:
-            self.open_path(path)
+        name = QFileDialog.getExistingDirectory(
+            self._panels.centre.window(), "Open a run", str(self._panels.session.out)
+        )
+        if name:
+            self.open_path(Path(name))
 
     def open_path(self, path: Path) -> None:
         """Open a scene, a protocol file, a run folder or a run's data file."""

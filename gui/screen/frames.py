@@ -6,8 +6,8 @@ import time
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from gui.opening import Opening
-from gui.panels import Panels
+from gui.screen.panels import Panels
+from gui.screen.screen import Screen
 from gui.state import State
 
 FAST, SLOW = 33, 100
@@ -26,7 +26,7 @@ class Frames(QObject):
     told = Signal(object)
     """The newest snapshot, as often as numbers can be read."""
 
-    def __init__(self, panels: Panels, opening: Opening) -> None:
+    def __init__(self, panels: Panels, opening: Screen) -> None:
         super().__init__(panels.centre)
         self._panels, self._opening = panels, opening
         self.frozen = False

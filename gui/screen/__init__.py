@@ -1,0 +1,1 @@
+"""What is on screen: the plan, a run in progress, runs from disk."""
