@@ -146,8 +146,10 @@ def _clock_uncertainty(segments: Records, time: float) -> float | None:
 def _trace(run: Run, name: str) -> RecordedSignal:
     signal = run.signal(name)
     cells = signal.trace(cells=CELLS)
-    half = np.diff(cells.time, append=cells.time[-1:]) / 2
-    half[-1:] = half[-2:-1]
+    # where the next cell comes after a gap, or not at all, a cell is as long as usual
+    half = np.full(len(cells), cells.width / 2)
+    joined = ~cells.gap[1:]
+    half[:-1][joined] = np.diff(cells.time)[joined] / 2
     return RecordedSignal(
         signal=name,
         time=cells.time + half,

@@ -123,5 +123,7 @@ def _edge(
     if not past.size or past[0] == 0:
         return None
     i = int(past[0])
+    if time[i] - time[i - 1] > 1.5 * np.median(np.diff(time)):
+        return None  # it came in a gap
     part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
     return float(time[i - 1] + part * (time[i] - time[i - 1]))

@@ -267,8 +267,8 @@ class Run:
             part = signal.between(start, end)
             cells = max(1, (part.stop - part.start) // together)
             found = signal.trace(part.start, part.stop, cells=cells)
-            step = np.diff(found.time[-2:]) if found.time.size > 1 else 0.0
-            return found.time[:-1] + step / 2, found.mean[:-1]  # the last may be short
+            # the last may be short
+            return found.time[:-1] + found.width / 2, found.mean[:-1]
 
         return seen
 

@@ -8,9 +8,10 @@ STEPS = np.array([0.0, 0.5, 1.0, 0.2])
 CAME = np.array([0.0, 1.0, 2.0, 3.0])
 
 
-def shunt(scale=1.0, late=0.0, noise=1e-3):
-    """The coil current as a scope sees it, in 1 ms bins."""
+def shunt(scale=1.0, late=0.0, noise=1e-3, blind=(0.0, 0.0)):
+    """The coil current as a scope sees it, in 1 ms bins, but not while it is blind."""
     time = np.arange(0, 4, 1e-3) + 5e-4
+    time = time[(time < blind[0]) | (time >= blind[1])]
     value = scale * STEPS[np.searchsorted(CAME + late, time, side="right") - 1]
     value = value + np.random.default_rng(0).normal(0, noise, time.size)
 
@@ -35,6 +36,12 @@ def test_levels_come_from_the_read_back_and_edges_from_the_shunt():
     assert found.steps[:, 1] == pytest.approx(STEPS + 1e-3)
     assert found.edges == 3
     assert found.steps[1:, 0] == pytest.approx(CAME[1:], abs=1.5e-3)
+
+
+def test_an_edge_in_a_gap_of_the_shunt_keeps_the_host_s_time():
+    found = applied_current(*rows(), shunt(blind=(1.99, 2.02)))
+    assert found.edges == 2
+    assert found.steps[1:, 0] == pytest.approx([1.0, 2.03, 3.0], abs=1.5e-3)
 
 
 def test_without_a_shunt_the_host_s_times_stand():
