@@ -21,9 +21,6 @@ SCOPE_NOISE = {
 }
 """Standard deviation at the scope's input, V."""
 
-MILD_STEEL = 0.05
-"""Half-width of the loop of a mild steel core, A; hard-drawn steel has 0.2 to 0.4 A."""
-
 _POSITIVE = ("follower_pole", "slew", "mains")
 _NOT_NEGATIVE = ("hum", "coil_lag", "eddy_lag", "hysteresis", "attraction", "pickup")
 
@@ -46,7 +43,8 @@ class PlantOptions:
         eddy_lag: lag of the field behind the current, s.
         hysteresis: half-width of the core's loop, A; 0.03 to 0.07 for mild steel.
         attraction: pull of the permanent magnet on the core, N; the same at every
-            current, so it is no drive (`passive_attraction` estimates it).
+            current, so it is no drive; 23 mN at 5 mm, 3.9 mN at 8 mm, by the
+            image of a dipole in the core.
         winding: resistance of the coil and where its heat goes.
         drift: relative error of the scope's sample clock, so 50e-6 is 50 ppm; above 0
             each interval lasts longer than the scope says, and whoever asks for
@@ -122,20 +120,3 @@ class PlantOptions:
     def noise_at(self, signal: str) -> float:
         """Standard deviation of an input that carries `signal`, V."""
         return self.noise.get(signal, SCOPE_NOISE.get(signal, 0.0))
-
-
-def passive_attraction(
-    r: float, *, moment: float = 0.0229, thickness: float = 0.85e-3
-) -> float:
-    """Pull between the permanent magnet and the steel core at 0 A, N.
-
-    The image of a point dipole at the magnet's centre, an overestimate when near:
-    23 mN at 5 mm, 3.9 mN at 8 mm.
-
-    Args:
-        r: distance between magnet and pole face, m.
-        moment: of the magnet, A m^2.
-        thickness: of the magnet, m.
-    """
-    mu_0 = 4e-7 * math.pi
-    return 3 * mu_0 * moment**2 / (32 * math.pi * (r + thickness / 2) ** 4)

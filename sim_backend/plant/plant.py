@@ -17,7 +17,7 @@ from sim_backend.plant.chain import Pulse
 from sim_backend.plant.coupling import Capacitor
 from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.plant.electromagnet import Electromagnet
-from sim_backend.plant.options import PlantOptions, passive_attraction
+from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import FloatArray, Pieces
 from sim_backend.plant.render import noise_table
 from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
@@ -26,8 +26,6 @@ from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.waveform import Waveform
-
-__all__ = ["MagnetLike", "Plant", "PlantOptions", "passive_attraction"]
 
 MEMORY = 0.2
 """How long the plant remembers what has been rendered, s."""
@@ -99,11 +97,6 @@ class Plant(DrivenCoil):
         self._edge = options.speed.edge(swing)
         self._rendered = 0.0
         self._acquisition: tuple[object, list[Coupled]] | None = None
-
-    def coil_temperature(self, time: float) -> float:
-        """Temperature of the winding above the room's at `time` s, K."""
-        with self._lock:
-            return self._electromagnet.temperature(time)
 
     def field(self, time: float) -> float:
         """Flux density of the electromagnet at `time` s, T."""

@@ -18,13 +18,11 @@ class StopRequest:
     Attributes:
         reason: why, for a person; None while nobody asked.
         signal: number of the POSIX signal behind it, if one was.
-        hurry: switch off at once, without the ramp (a second Ctrl-C).
     """
 
     clock: Clock
     reason: str | None = None
     signal: int | None = None
-    hurry: bool = False
 
     @property
     def requested(self) -> bool:
@@ -32,11 +30,9 @@ class StopRequest:
         return self.reason is not None
 
     def __call__(self, reason: str, *, signal: int | None = None) -> None:
-        """Ask to stop; asking again means hurry."""
+        """Ask to stop; the first who asks is remembered."""
         if self.reason is None:
             self.reason, self.signal = reason, signal
-        else:
-            self.hurry = True
         self.clock.notify()
 
 

@@ -54,7 +54,7 @@ class Circuit(Table):
         I_S: reverse current of the PiezoFET, A.
         V_GS: gate-source bias, V.
         m: slope factor.
-        V_T: thermal voltage, V; 0.025 V is 290 K (see `thermal_voltage`).
+        V_T: thermal voltage, V; 0.025 V is 290 K (kT/q).
         g31: piezoelectric voltage coefficient, V m/N; its sign is that of the force.
         h: thickness of the AlScN film, m.
         L: length of the cantilever, m.
@@ -273,16 +273,3 @@ def _checked(name: str, value: object, of: Unit) -> float:
 
 PARAMETERS = tuple(field.name for field in fields(Circuit))
 """Names of all parameters and options, in the order of Table 1."""
-
-
-def thermal_voltage(temperature: float) -> float:
-    """V_T = kT/q at `temperature` K, V.
-
-    Raises:
-        ParameterError: the temperature is not between 1 K and 1000 K.
-    """
-    if not 1.0 <= temperature <= 1000.0:
-        raise ParameterError(
-            f"temperature = {temperature} K must lie between 1 K and 1000 K."
-        )
-    return 1.380649e-23 * temperature / 1.602176634e-19

@@ -87,13 +87,6 @@ def wright_omega(z: ArrayLike) -> FloatArray:
     return omega
 
 
-def V_C2_slope(circuit: Circuit, V_C1: ArrayLike, V_C2: ArrayLike) -> FloatArray:
-    """dV_C2/dt between spikes, Eq. (18), V/s."""
-    c = circuit
-    slope: FloatArray = (I_C(c, V_C1) + c.I_bias - np.asarray(V_C2) / c.R_L) / c.C2
-    return slope
-
-
 def rest_V_C1(circuit: Circuit, V_P: float = 0.0) -> float:
     """Equilibrium of V_C1 at a given V_P, the root of Eq. (16), V.
 

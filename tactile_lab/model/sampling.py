@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, series_at
@@ -84,4 +82,3 @@ def _build(stamp: int) -> Callable[..., Any]:
 
 
 sample = _build(source_stamp())
-NO_SPIKES = np.empty(0)

@@ -14,8 +14,9 @@ import numpy as np
 
 BEGIN = time.perf_counter()
 
-from sim_backend import sensor  # noqa: E402
-from sim_backend.plant.plant import Plant, PlantOptions  # noqa: E402
+from sim_backend.plant import sensor  # noqa: E402
+from sim_backend.plant.options import PlantOptions  # noqa: E402
+from sim_backend.plant.plant import Plant  # noqa: E402
 from sim_backend.plant.render import digitise, noise_table  # noqa: E402
 from tactile_lab.bench import Channel  # noqa: E402
 from tactile_lab.magnetics import Magnet  # noqa: E402

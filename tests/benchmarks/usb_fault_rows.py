@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import random
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from fault_rows import Row  # beside this file
 
+sys.path.append(str(Path(__file__).parents[1] / "support"))
+from voltages import Voltages
+
 from drivers.usbtmc.scope import UsbtmcScope
-from sim_backend.plant.scope_source import Voltages
 from sim_backend.usbtmc.bus import SimulatedBus
 from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault

@@ -6,12 +6,12 @@ import re
 
 import numpy as np
 import pytest
+from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.faults import Fault
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
-from sim_backend.plant.scope_source import Voltages
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (

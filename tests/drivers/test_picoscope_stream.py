@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
-from sim_backend.plant.scope_source import Acquisition, Codes, Voltages
+from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 

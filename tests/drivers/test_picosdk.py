@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import ENVIRONMENT, PROTOTYPES, bind, candidates, load
 from drivers.picoscope.sdk_calls import LibraryCalls
 from sim_backend.picoscope.sdk import FakePs3000a, StreamingReady
-from sim_backend.plant.scope_source import Acquisition, Codes, Voltages
+from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import NotFoundError, RefusedError

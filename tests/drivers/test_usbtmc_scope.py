@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from voltages import Voltages
 
 from drivers.usbtmc.scope import UsbtmcScope
-from sim_backend.plant.scope_source import Voltages
 from sim_backend.usbtmc.bus import SimulatedBus
 from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault

@@ -19,7 +19,8 @@ from plant_world import (
     volts,
 )
 
-from sim_backend.plant.plant import Plant, PlantOptions, passive_attraction
+from sim_backend.plant.options import PlantOptions
+from sim_backend.plant.plant import Plant
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
@@ -74,13 +75,9 @@ def test_output_off_drives_no_current() -> None:
 
 
 def test_passive_attraction_is_a_constant_that_drives_nothing() -> None:
-    assert passive_attraction(5e-3) == pytest.approx(23e-3, rel=0.05)
-    assert passive_attraction(8e-3) == pytest.approx(3.9e-3, rel=0.05)
-    pulled = PlantOptions(
-        follower=False, bias=0, noise=QUIET, attraction=passive_attraction(6e-3)
-    )
+    pulled = PlantOptions(follower=False, bias=0, noise=QUIET, attraction=0.011)
     made = plant(pulled)
-    assert made.force(0.5) == pytest.approx(passive_attraction(6e-3))
+    assert made.force(0.5) == pytest.approx(0.011)
     free = plant(PlantOptions(follower=False, bias=0, noise=QUIET))
     assert np.array_equal(render(made, 0.05), render(free, 0.05))
 

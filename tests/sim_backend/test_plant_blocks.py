@@ -17,7 +17,7 @@ from plant_world import (
 )
 
 from sim_backend.plant import sensor
-from sim_backend.plant.plant import PlantOptions
+from sim_backend.plant.options import PlantOptions
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.simulate import simulate

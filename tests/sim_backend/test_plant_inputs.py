@@ -14,7 +14,7 @@ from plant_world import (
     volts,
 )
 
-from sim_backend.plant.plant import PlantOptions
+from sim_backend.plant.options import PlantOptions
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 

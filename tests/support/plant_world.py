@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sim_backend.plant.plant import Plant, PlantOptions
+from sim_backend.plant.options import PlantOptions
+from sim_backend.plant.plant import Plant
 from tactile_lab.bench import Channel
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
