@@ -8,11 +8,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from gui.setup.texts import exact
 from tactile_lab.quantity import parse
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
-from tactile_lab.scene.toml_text import to_toml
 from tactile_lab.table import dumped
 
 BY_PERSON = "read by a person"
@@ -85,11 +86,11 @@ def bench_text(choice: Choice) -> str:
             scope = {}
         scope |= {
             "driver": choice.scope,
-            "serial": choice.scope_serial or None,
-            "library": choice.scope_library or None,
+            "serial": choice.scope_serial,
+            "library": choice.scope_library,
             "channels": [_channel(choice, row) for row in choice.channels if row[1]],
         }
-        data["scope"] = scope
+        data["scope"] = {key: value for key, value in scope.items() if value != ""}
     if choice.meter_dialect == BY_PERSON:
         data["field_meter"] = {"driver": "manual"}
     elif choice.meter_port:
@@ -100,7 +101,7 @@ def bench_text(choice: Choice) -> str:
             "port": choice.meter_port,
         }
     data["magnet"] = {k: _typed(v) for k, v in choice.magnet.items() if v != ""}
-    return to_toml(data)
+    return tomli_w.dumps(data)
 
 
 def save_bench(choice: Choice, path: Path) -> BenchSpec:
@@ -177,10 +178,9 @@ def _channel(choice: Choice, row: tuple[str, str, str, str, str]) -> dict[str, A
     base = next((dict(one) for one in known if one["signal"] == signal), {})
     made = {**base, "signal": signal, "input": where, "range": full}
     made["offset"] = offset or "0 V"
-    made["shunt"] = shunt or None
-    if shunt:
-        made.pop("scale", None)
-    return made
+    if shunt or made.pop("shunt", None):
+        made.pop("scale", None)  # it follows from the shunt
+    return made | ({"shunt": shunt} if shunt else {})
 
 
 def _built_in() -> dict[str, Any]:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import tomli_w
+
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
-from tactile_lab.scene.toml_text import to_toml
 
 
 def presets(folder: Path, protocol: str) -> dict[str, Path]:
@@ -32,7 +33,7 @@ def save_preset(folder: Path, name: str, scene: Scene) -> Path:
             "- + . , up to 61 of them."
         )
     file = folder / scene.protocol.name / f"{name}.toml"
-    text = to_toml({"protocol": scene.to_dict()["protocol"]})
+    text = tomli_w.dumps({"protocol": scene.to_dict()["protocol"]})
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, encoding="utf-8")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import tomli_w
+
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
-from tactile_lab.scene.toml_text import to_toml
 from tactile_lab.table import dumped
 
 
@@ -28,7 +29,8 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
     """
     copy = path.with_name(f"{path.stem}-{calibration.parent.name}.csv")
     draft = path.with_suffix(".new.toml")
-    table = {**dumped(spec), "file": None}
+    table = dumped(spec)
+    table.pop("file", None)
     table["magnet"]["calibration"] = copy.name
     try:
         contents = calibration.read_bytes()
@@ -40,7 +42,7 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
         if not copy.exists():
             copy.write_bytes(contents)
             copy.chmod(0o444)
-        draft.write_text(to_toml(table), encoding="utf-8")
+        draft.write_text(tomli_w.dumps(table), encoding="utf-8")
         try:
             load_bench(draft)
         except SceneError:

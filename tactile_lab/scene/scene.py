@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.state import Start
 from tactile_lab.scene.bench_file import BenchSpec, is_file
 from tactile_lab.scene.sensor import Sensor
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
-from tactile_lab.scene.toml_text import to_toml
 from tactile_lab.table import dumped
 from tactile_lab.trial import Protocol
 
@@ -101,7 +102,7 @@ class Scene:
         if copies is not None:
             del data["conditions"]
             data = _renamed(data, {str(path): name for path, name in copies.items()})
-        return to_toml(data)
+        return tomli_w.dumps(data)
 
 
 def _renamed(data: Any, names: Mapping[str, str]) -> Any:

@@ -1,6 +1,5 @@
 """Whatever a scene file holds, loading it gives a scene or one clear refusal."""
 
-import math
 import tomllib
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from hypothesis import strategies as st
 from tactile_lab.errors import SceneError
 from tactile_lab.plugins import scene_path
 from tactile_lab.scene.load import TABLES, load, resolve
-from tactile_lab.scene.toml_text import to_toml
 
 DEMO = scene_path("demo").read_text(encoding="utf-8")
 
@@ -88,21 +86,3 @@ def test_a_damaged_demo_is_a_scene_or_a_refusal(tmp_path_factory, data):
         load(path)
     except SceneError as refused:
         assert "damaged.toml" in str(refused)
-
-
-@given(
-    st.dictionaries(
-        texts, st.one_of(scalars, st.lists(scalars), st.dictionaries(texts, scalars))
-    )
-)
-def test_written_toml_reads_back(data):
-    back = tomllib.loads(to_toml(data))
-    assert back == data
-    for key, value in data.items():
-        if isinstance(value, float) and value == 0:
-            assert math.copysign(1, back[key]) == math.copysign(1, value)
-
-
-def test_none_is_left_out_and_arrays_of_tables_survive():
-    data = {"a": 1, "b": None, "t": [{"x": 1}, {"x": [1, 2], "u": {"v": "w"}}]}
-    assert tomllib.loads(to_toml(data)) == {"a": 1, "t": data["t"]}
