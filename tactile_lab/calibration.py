@@ -163,7 +163,9 @@ class CalibrationFile:
             return value
         if not isinstance(value, str):
             raise SceneError("a text in quotes is needed")
-        folder: Path = (info.context or {}).get("folder", Path())
+        folder: Path | None = (info.context or {}).get("folder", Path())
+        if folder is None:
+            return None
         return read_calibration((folder / value).resolve())
 
     def write(self, value: Calibration | None) -> str | None:

@@ -46,7 +46,7 @@ def validated(
     table: Mapping[str, Any],
     at: tuple[str, ...],
     blame: Blame,
-    folder: Path = Path(),
+    folder: Path | None = Path(),
 ) -> M:
     """What a file holds as the noun it describes.
 
@@ -55,7 +55,7 @@ def validated(
         table: as the file has it; quantities are texts, lists are tuples.
         at: keys under which it was found.
         blame: names the origin of a key.
-        folder: what the files it names are relative to.
+        folder: what the files it names are relative to; None: they are not looked at.
 
     Raises:
         SceneError: one line for each key that is wrong.

@@ -35,8 +35,8 @@ def is_file(value: object) -> bool:
 
 
 def _located(name: str, info: ValidationInfo) -> str:
-    folder: Path = (info.context or {}).get("folder", Path())
-    return str((folder / name).resolve()) if is_file(name) else name
+    folder: Path | None = (info.context or {}).get("folder", Path())
+    return str((folder / name).resolve()) if folder and is_file(name) else name
 
 
 Located = AfterValidator(_located)

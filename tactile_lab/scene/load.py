@@ -273,7 +273,7 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
             raise SceneError(f'{path}: a bench file has no key "file".')
         _refuse_not_finite(under, _blame(str(path), {}))
         whole = _lists_to_tuples(under)
-        validated(BenchSpec, whole, (), _blame(str(path), {}), path.parent)
+        validated(BenchSpec, whole, (), _blame(str(path), {}), None)
         if inline.get("simulated") is False and under.get("simulated") is True:
             raise complaint(
                 ("bench", "simulated"), f"{file} is a simulated bench.", blame

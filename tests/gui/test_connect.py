@@ -230,7 +230,7 @@ def test_damaged_results_are_refused_with_what_to_do(tmp_path: Path) -> None:
 
 def test_dialog_keeps_what_it_does_not_show(tmp_path: Path) -> None:
     text = bench_text(start_choice()) + "[hand_set]\nV_GS = '1.3 V'\n"
-    text = text.replace('input = "C"', 'input = "C"\ncoupling = "AC"\nscale = 10.0')
+    text = text.replace('input = "C"', 'input = "C", coupling = "AC", scale = 10.0')
     (tmp_path / "before.toml").write_text(text)
     choice = start_choice()
     show_bench(choice, load_bench(tmp_path / "before.toml"))
