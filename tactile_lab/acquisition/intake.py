@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.acquisition.field_mean import FieldMean
+from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
 from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import SamplesLostError
@@ -26,26 +27,6 @@ class OnlineDetector(Protocol):
         ...
 
 
-class Sink(Protocol):
-    """What the recorder offers to the deciding loop."""
-
-    def segment(self, stream: Stream, start: float) -> None:
-        """A stream starts; its first sample is at `start` s on the run's axis."""
-        ...
-
-    def append(self, block: Block) -> None:
-        """Store a block; waits or raises RecordingError when the queue is full."""
-        ...
-
-    def gap(self, missing: int) -> None:
-        """A stream ended so many samples after the last that came."""
-        ...
-
-    def spikes(self, times: NDArray[np.float64], found: NDArray[np.void]) -> None:
-        """Store detected spikes with their times on the run's axis."""
-        ...
-
-
 class Intake:
     """Takes each block once, in order, and accounts for it.
 
@@ -57,7 +38,7 @@ class Intake:
     def __init__(self, live: Live) -> None:
         self._live = live
         self._row = 0
-        self._sink: Sink | None = None
+        self._journal: Journal | None = None
         self._detector: OnlineDetector | None = None
         self._stream: Stream | None = None
         self._field: FieldMean | None = None
@@ -84,7 +65,7 @@ class Intake:
         self,
         stream: Stream,
         start: float,
-        sink: Sink,
+        journal: Journal,
         detector: OnlineDetector | None = None,
         row: int = 0,
     ) -> None:
@@ -93,16 +74,16 @@ class Intake:
         Args:
             stream: as it runs.
             start: of its first sample on the run's axis, s.
-            sink: stores what comes.
+            journal: stores what comes.
             detector: finds spikes; None where none are searched.
             row: of each block that is searched.
         """
         self._row = row
         self._stream, self._start, self._expected = stream, start, 0
-        self._detector, self._sink = detector, sink
+        self._detector, self._journal = detector, journal
         self._field = FieldMean(stream, start)
         self._live.begin(stream, start)
-        sink.segment(stream, start)
+        journal.segment(stream, start)
 
     def add(self, block: Block) -> tuple[float, ...]:
         """Take a block; times of the spikes it completed, s on the run's axis.
@@ -111,7 +92,7 @@ class Intake:
             SamplesLostError: samples between this block and the last are missing,
                 though the scope streams without gaps.
         """
-        if self._stream is None or self._sink is None:
+        if self._stream is None or self._journal is None:
             raise SamplesLostError("A block arrived although no stream runs.")
         missing = block.first - self._expected
         if missing and (self._stream.gapless or missing < 0):
@@ -124,7 +105,7 @@ class Intake:
         for channel, over in zip(self._stream.channels, block.overrange, strict=True):
             if over:
                 self.overrange.add(channel.signal)
-        self._sink.append(block)
+        self._journal.append(block)
         self._live.add(block)
         if self._field is not None:
             self._field_readings += self._field.feed(block)
@@ -148,19 +129,19 @@ class Intake:
 
     def end(self, time: float) -> tuple[float, ...]:
         """The stream ended at run time `time`, s; times of spikes still open."""
-        if self._stream is not None and self._sink is not None:
+        if self._stream is not None and self._journal is not None:
             unseen = round((time - self.reached) / self._stream.interval)
             if unseen > 0 and not self._stream.gapless:
-                self._sink.gap(unseen)
+                self._journal.gap(unseen)
         found = () if self._detector is None else self._keep(self._detector.flush())
         self._stream, self._detector = None, None
         return found
 
     def _keep(self, found: NDArray[np.void]) -> tuple[float, ...]:
-        if found.size == 0 or self._stream is None or self._sink is None:
+        if found.size == 0 or self._stream is None or self._journal is None:
             return ()
         times = self._start + found["sample"] * self._stream.interval
-        self._sink.spikes(times, found)
+        self._journal.spikes(times, found)
         new = tuple(float(t) for t in times)
         self._spike_times.extend(new)
         self.spikes += len(new)

@@ -4,12 +4,31 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from tactile_lab.acquisition.intake import Sink
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.bench import Block, Stream
 from tactile_lab.trial import Outcome
 
 
-class Journal(Sink, Protocol):
+class Journal(Protocol):
     """The record of one run, written as it happens; times on the run's axis, s."""
+
+    def segment(self, stream: Stream, start: float) -> None:
+        """A stream starts; its first sample is at `start` s on the run's axis."""
+        ...
+
+    def append(self, block: Block) -> None:
+        """Store a block; waits or raises RecordingError when the queue is full."""
+        ...
+
+    def gap(self, missing: int) -> None:
+        """A stream ended so many samples after the last that came."""
+        ...
+
+    def spikes(self, times: NDArray[np.float64], found: NDArray[np.void]) -> None:
+        """Store detected spikes with their times on the run's axis."""
+        ...
 
     def current(
         self,

@@ -36,7 +36,6 @@ from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate
 from tactile_lab.store.folder import RunFolder, Status
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.store.recorder_thread import RecorderThread
 from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
 
@@ -91,7 +90,7 @@ class Execution(Task[Executed]):
         self._asked_field = asked_field
         self._check_somebody_is_there()
         self._search = SpikeSearch.of(scene, self.needs.detect_on)
-        self._recorder: RecorderThread | None = None
+        self._recorder: Recorder | None = None
         self._runner: Runner | None = None
         self.folder = RunFolder.create(
             Path(out),
@@ -147,13 +146,11 @@ class Execution(Task[Executed]):
             took=took,
         )
 
-    def _begin_record(self, stream: Stream | None) -> RecorderThread:
+    def _begin_record(self, stream: Stream | None) -> Recorder:
         """Start the record; codes can be scaled from now on."""
-        self._recorder = RecorderThread(
-            Recorder(
-                self.folder,
-                layout(self.plan, self.bench, self.folder, self._search, stream),
-            ),
+        self._recorder = Recorder(
+            self.folder,
+            layout(self.plan, self.bench, self.folder, self._search, stream),
             when_full="wait" if self.bench.clock.simulated else "error",
         )
         return self._recorder

@@ -13,6 +13,8 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.program import Program
@@ -31,7 +33,7 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.trial import Trial
+from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 
 MOST = 1_000_000_000
@@ -144,7 +146,7 @@ class Monitor(Task[Ending]):
             folder, layout(self.plan, self.bench, folder, self._search, held.stream)
         )
         held.replay(recorder)
-        recorder.trial(0, 0.0, held.length, label="watched", level=0.0)
+        recorder.outcome(_watched(held.length))
         settings = self._runner.instruments.settings
         over = [
             channel.signal
@@ -169,6 +171,15 @@ class Monitor(Task[Ending]):
         if isinstance(event, events.SpikesSeen):
             self._last = event.times[-1], event.rates[-1]
         self._emit(event)
+
+
+def _watched(length: float) -> Outcome:
+    """What is kept, as the one trial of its run; `length` s."""
+    trial = Trial(
+        force=Waveform.constant(0.0), duration=length, label="watched", level=0.0
+    )
+    none = np.empty(0)
+    return Outcome(trial=trial, index=0, start=0.0, spike_times=none, current=none)
 
 
 def _no_current(trial: Trial, update_interval: float, before: float) -> Waveform:

@@ -1,11 +1,12 @@
-"""Writes a run while it happens, in the calling thread."""
+"""Writes a run while it happens."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,17 +19,21 @@ from tactile_lab.store.data_file import DataFile
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
 from tactile_lab.store.layout import RECORDS, Layout
 from tactile_lab.store.pieces import Pieces
+from tactile_lab.store.write_queue import QUEUE_BYTES, WhenFull, Write, WriteQueue
 from tactile_lab.trial import Outcome
 
 CADENCE = 0.5
 """Longest time anything stays in memory only, s of real time."""
+
+ROW_BYTES = 256
+"""What a row of a table counts for while it waits for the disk."""
 
 
 class Recorder:
     """The record of one run; what `acquisition.journal.Journal` asks for.
 
     The file comes into being with the first `segment`, which knows the scaling;
-    records that come before it wait in memory and in the log.
+    rows that come before it wait in memory and in the log.
 
     Args:
         folder: of the run.
@@ -36,9 +41,17 @@ class Recorder:
         reserve: bytes that must stay free on the disk.
         sync: push the file to the disk every second (see `Durable`); unless given, for
             measured runs, because a simulated one can be computed again.
+        when_full: writes in a thread of its own, which the caller waits for where the
+            disk does not keep up ("wait") or not ("error"); None: in the caller's.
+        capacity: bytes that may wait for that thread.
+
+    Attributes:
+        folder: of the run.
+        queued: samples per channel taken so far.
 
     Raises:
-        RecordingError: from every method, when something cannot be stored.
+        RecordingError: from every method, when something cannot be stored, or too much
+            waits.
     """
 
     def __init__(
@@ -48,9 +61,12 @@ class Recorder:
         *,
         reserve: int = RESERVE,
         sync: bool | None = None,
+        when_full: WhenFull | None = None,
+        capacity: int = QUEUE_BYTES,
     ) -> None:
         self.folder = folder
-        self.layout = layout
+        self.queued = 0
+        self._layout = layout
         self._reserve = reserve
         self._sync = not layout.simulated if sync is None else sync
         self._waiting: dict[str, list[tuple[Any, ...]]] = {name: [] for name in RECORDS}
@@ -61,29 +77,30 @@ class Recorder:
         self._flushed = time.monotonic()
         self._failed = False
         if not layout.signals and layout.detection is None:
-            self._guard(lambda: self._open(None))
+            self._guard(self._open, None)
+        self._queue: WriteQueue | None = None
+        if when_full is not None:
+            self._queue = WriteQueue(
+                self._tick, CADENCE, when_full=when_full, capacity=capacity
+            )
+
+    @property
+    def waiting(self) -> float:
+        """How full the queue is, 0 to 1."""
+        return 0.0 if self._queue is None else self._queue.fullness
 
     def segment(self, stream: Stream, start: float) -> None:
         """A stream starts; its first sample is at `start` s on the run's axis."""
-        if self._file is None:
-            self._guard(lambda: self._open(stream))
-        self._rows = self.layout.rows(stream)
-        self._pieces.stream(stream, start)
-        self._waiting["segments"].append(self._pieces.segment)
+        self._do(partial(self._segment, stream, start))
 
     def append(self, block: Block) -> None:
         """Store a block; samples missing before it become a gap record."""
-        gap = self._pieces.skip_to(block.first)
-        if gap is not None:
-            self._waiting["gaps"].append((self._pieces.taken, *gap))
-            self._waiting["segments"].append(self._pieces.segment)
-        self._guard(lambda: self._append(block))
+        self._do(partial(self._append, block), block.codes.nbytes)
+        self.queued += block.samples
 
     def gap(self, missing: int) -> None:
         """Store that the stream went on for so many samples that never came."""
-        pieces = self._pieces
-        ended = pieces.reached + missing * pieces.segment[2]
-        self._row("gaps", pieces.taken, missing, ended)
+        self._do(partial(self._gap, missing))
 
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
         """Correct the running segment's place in time.
@@ -93,8 +110,7 @@ class Recorder:
             drift: of the scope's clock against the host's, s/s.
             uncertainty: of the aligned times, s.
         """
-        self._pieces.align(offset, drift, uncertainty)
-        self._guard(self._replace_segment)
+        self._do(partial(self._align, offset, drift, uncertainty))
 
     def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
         """Store spikes detected on line.
@@ -104,11 +120,8 @@ class Recorder:
             found: shape (k,), dtype `spikes.detector.SPIKE`, sample indices
                 counted from the start of the stream.
         """
-        samples = self._pieces.stored(found["sample"])
-        columns = (samples, times, found["amplitude"], found["width"])
-        self._waiting["spikes"] += zip(*columns, strict=True)
-        self._spikes += found.size
-        self.tick()
+        size = max(found.nbytes, ROW_BYTES)
+        self._do(partial(self._add_spikes, times, found), size)
 
     def current(
         self,
@@ -118,131 +131,144 @@ class Recorder:
         ratio: float | None = None,
     ) -> None:
         """Store a set-point and its read-back, A, and the resistance over cold."""
-        read = math.nan if measured is None else measured
-        warm = math.nan if ratio is None else ratio
-        self._row("current", time, setpoint, read, warm)
+        self._add("current", time, setpoint, _number(measured), _number(ratio))
 
     def field(self, time: float, field: float) -> None:
         """Store a teslameter reading, T."""
-        self._row("field", time, field)
+        self._add("field", time, field)
 
     def event(self, time: float, kind: str, text: str) -> None:
         """Store that something happened; the whole text goes to the log."""
-        self.folder.log(kind, text, time=time)
-        self._row("events", time, _fixed(kind, 16), _fixed(text, 160))
-
-    def trial(
-        self,
-        index: int,
-        start: float,
-        end: float,
-        *,
-        label: str = "",
-        level: float | None = None,
-        hold: tuple[float, float] | None = None,
-        spikes: int = 0,
-        skipped: int = 0,
-        pause: bool = False,
-        rest: float = math.nan,
-        drift: float | None = None,
-    ) -> None:
-        """Store a trial's place in the run, s, and level, N; see `trial.Trial`.
-
-        `rest` is V_C1 just before it, V; for `drift` see `trial.Outcome`.
-        """
-        held = hold or (math.nan, math.nan)
-        force = math.nan if level is None else level
-        self._row(
-            "trials", index, start, end, force, *held, spikes, skipped, pause,
-            _fixed(label, 48), rest, math.nan if drift is None else drift,
-        )  # fmt: skip
+        self._do(partial(self.folder.log, kind, text, time=time))
+        self._add("events", time, _fixed(kind, 16), _fixed(text, 160))
 
     def outcome(self, outcome: Outcome) -> None:
         """Store that a trial ended, and what came of it in numbers."""
         trial = outcome.trial
-        self.trial(
+        begin, end = trial.hold or (math.nan, math.nan)
+        self._add(
+            "trials",
             outcome.index,
             outcome.start,
             outcome.start + trial.length,
-            label=trial.label,
-            level=trial.level,
-            hold=trial.hold,
-            spikes=outcome.spike_times.size,
-            skipped=outcome.skipped,
-            pause=trial.pause,
-            rest=outcome.rest.get("V_C1", math.nan),
-            drift=outcome.drift,
+            _number(trial.level),
+            begin,
+            end,
+            outcome.spike_times.size,
+            outcome.skipped,
+            trial.pause,
+            _fixed(trial.label, 48),
+            _number(outcome.rest.get("V_C1")),
+            _number(outcome.drift),
         )
 
     def pause(self, start: float, end: float) -> None:
         """Store a planned pause, s: nothing was streamed, and that is no gap."""
-        self._row("pauses", start, end)
-
-    def tick(self) -> None:
-        """Write what has waited for longer than `CADENCE`."""
-        if time.monotonic() - self._flushed > CADENCE:
-            self._guard(self._flush)
+        self._add("pauses", start, end)
 
     def close(
-        self,
-        status: Status,
-        produced: Mapping[str, int] | int | None = None,
-        **entries: Any,
+        self, status: Status, produced: int | None = None, **entries: Any
     ) -> None:
-        """Write the rest, close the file and patch `run.json` with the counters.
+        """Write all that waits, close the file, patch `run.json` with the counters.
+
+        A run whose recorder failed is closed as faulted, whatever `status` says, and
+        the failure is raised.
 
         Args:
             status: how the run ended.
-            produced: samples the scope delivered, per signal or for each of them.
+            produced: samples per channel that the scope delivered.
             entries: more entries for `run.json`.
         """
+        failure: BaseException | None = None
+        if self._queue is not None:
+            failure = self._queue.close()
+            entries["queued"] = self.queued
         try:
             self._guard(self._close)
-        except RecordingError as failure:
+        except Exception as error:
+            failure = failure or error
+        if failure is not None:
             status = "faulted"
             entries["reason"] = entries.get("reason") or str(failure)
-            raise
-        finally:
-            counters = {
-                column.signal: {
-                    "produced": produced.get(column.signal)
-                    if isinstance(produced, Mapping)
-                    else produced,
-                    "written": column.written,
-                }
-                for column in self._columns
-            }
-            self.folder.finish(
-                status, samples=counters, spikes_online=self._spikes, **entries
-            )
+        counters = {
+            column.signal: {"produced": produced, "written": column.written}
+            for column in self._columns
+        }
+        self.folder.finish(
+            status, samples=counters, spikes_online=self._spikes, **entries
+        )
+        if failure is not None:
+            raise failure
 
     @property
     def _columns(self) -> list[SampleColumn]:
         return [] if self._file is None else self._file.samples
 
-    def _row(self, table: str, *values: Any) -> None:
-        self._waiting[table].append(values)
-        self.tick()
+    def _do(self, write: Write, size: int = ROW_BYTES) -> None:
+        """Write now, or have the thread do so; `size` bytes wait for it."""
+        if self._queue is None:
+            write()
+        else:
+            self._queue.put(write, size)
 
-    def _open(self, stream: Stream | None) -> None:
-        self._file = DataFile(self.folder.path, self.layout, stream, sync=self._sync)
-        self._flush()
+    def _add(self, table: str, *row: Any) -> None:
+        self._do(partial(self._row, table, row))
 
-    def _replace_segment(self) -> None:
-        row = self._pieces.segment
-        if self._waiting["segments"]:
-            self._waiting["segments"][-1] = row
-        elif self._file is not None:
-            self._file.replace_last("segments", row)
+    # what follows is done by the thread, where there is one
+
+    def _row(self, table: str, row: tuple[Any, ...]) -> None:
+        self._waiting[table].append(row)
+        self._tick()
+
+    def _segment(self, stream: Stream, start: float) -> None:
+        if self._file is None:
+            self._guard(self._open, stream)
+        self._rows = self._layout.rows(stream)
+        self._pieces.stream(stream, start)
+        self._waiting["segments"].append(self._pieces.segment)
 
     def _append(self, block: Block) -> None:
+        gap = self._pieces.skip_to(block.first)
+        if gap is not None:
+            self._waiting["gaps"].append((self._pieces.taken, *gap))
+            self._waiting["segments"].append(self._pieces.segment)
         over = sum(
             1 << bit for bit, row in enumerate(self._rows) if block.overrange[row]
         )
         if over:
-            row = (self._pieces.taken, block.samples, over)
-            self._waiting["overrange"].append(row)
+            self._waiting["overrange"].append((self._pieces.taken, block.samples, over))
         self._pieces.take(block.samples)
+        self._guard(self._write_samples, block)
+
+    def _gap(self, missing: int) -> None:
+        ended = self._pieces.reached + missing * self._pieces.segment[2]
+        self._row("gaps", (self._pieces.taken, missing, ended))
+
+    def _align(self, offset: float, drift: float, uncertainty: float) -> None:
+        self._pieces.align(offset, drift, uncertainty)
+        row = self._pieces.segment
+        if self._waiting["segments"]:
+            self._waiting["segments"][-1] = row
+        elif self._file is not None:
+            self._guard(self._file.replace_last, "segments", row)
+
+    def _add_spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
+        samples = self._pieces.stored(found["sample"])
+        columns = (samples, times, found["amplitude"], found["width"])
+        self._waiting["spikes"] += zip(*columns, strict=True)
+        self._spikes += found.size
+        self._tick()
+
+    def _tick(self) -> None:
+        """Write what has waited for longer than `CADENCE`."""
+        if time.monotonic() - self._flushed > CADENCE:
+            self._guard(self._flush)
+
+    def _open(self, stream: Stream | None) -> None:
+        self._file = DataFile(self.folder.path, self._layout, stream, sync=self._sync)
+        self._flush()
+
+    def _write_samples(self, block: Block) -> None:
         wrote = [
             column.append(block.codes[row])
             for column, row in zip(self._columns, self._rows, strict=True)
@@ -250,7 +276,7 @@ class Recorder:
         if any(wrote):
             self._flush()
         else:
-            self.tick()
+            self._tick()
 
     def _flush(self) -> None:
         if self._file is None:
@@ -285,10 +311,10 @@ class Recorder:
         finally:
             self._file.close(failed=self._failed)
 
-    def _guard(self, write: Callable[[], None]) -> None:
+    def _guard(self, write: Callable[..., None], *what: Any) -> None:
         """Turn what a disk can do to us into a message that says what is kept."""
         try:
-            write()
+            write(*what)
         except RecordingError:
             self._failed = True
             raise
@@ -300,6 +326,11 @@ class Recorder:
                 f"{kept} samples per channel are kept; free space on the disk or "
                 "choose another --out, and run `tactile-lab recover` on this run."
             ) from error
+
+
+def _number(value: float | None) -> float:
+    """As a table holds it: NaN for None."""
+    return math.nan if value is None else value
 
 
 def _fixed(text: str, size: int) -> bytes:

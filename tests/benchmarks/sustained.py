@@ -42,7 +42,6 @@ from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.store.recorder_thread import RecorderThread
 
 SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
 ROW = 2
@@ -95,7 +94,7 @@ def one(rate: float, seconds: float, root: Path) -> str:
     assert stream is not None
     folder = RunFolder.create(root, "sustained", {})
     layout = Layout(signals=SIGNALS, detection=DETECTION, simulated=True)
-    recorder = RecorderThread(Recorder(folder, layout, sync=True), when_full="error")
+    recorder = Recorder(folder, layout, sync=True, when_full="error")
     intake.begin(stream, 0.0, recorder, detector, ROW)
     worked, began, ended, fullest = time.process_time(), time.monotonic(), "", 0.0
     try:

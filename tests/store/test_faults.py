@@ -15,7 +15,6 @@ from tactile_lab.store import folder as folder_module
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.store.recorder_thread import RecorderThread
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
@@ -25,22 +24,22 @@ HERE = Path(__file__).parent
 class SlowRecorder(Recorder):
     """A recorder whose disk takes its time."""
 
-    def append(self, block):
+    def _append(self, block):
         time.sleep(0.02)
-        super().append(block)
+        super()._append(block)
 
 
 class FailingRecorder(Recorder):
     """A recorder whose disk gives up at the third block."""
 
-    def append(self, block):
+    def _append(self, block):
         if block.first >= 2048:
             raise RecordingError("the disk gave up")
-        super().append(block)
+        super()._append(block)
 
 
 def test_thread_stores_what_the_recorder_stores(bench, folder, layout):
-    recorder = RecorderThread(Recorder(folder, layout, reserve=0), when_full="wait")
+    recorder = Recorder(folder, layout, reserve=0, when_full="wait")
     made = bench.codes(20_000)
     bench.play(recorder, made, 333)
     recorder.event(1.0, "opened", "scope")
@@ -53,16 +52,18 @@ def test_thread_stores_what_the_recorder_stores(bench, folder, layout):
 
 
 def test_a_slow_disk_holds_up_a_simulated_run_but_loses_nothing(bench, folder, layout):
-    slow = SlowRecorder(folder, layout, reserve=0)
-    recorder = RecorderThread(slow, when_full="wait", capacity=20_000)
+    recorder = SlowRecorder(
+        folder, layout, reserve=0, when_full="wait", capacity=20_000
+    )
     bench.play(recorder, bench.codes(20_000), 1000)
     recorder.close("complete", 20_000)
     assert verify(folder.path).sound
 
 
 def test_a_slow_disk_ends_a_real_run_and_keeps_what_came(bench, folder, layout):
-    slow = SlowRecorder(folder, layout, reserve=0)
-    recorder = RecorderThread(slow, when_full="error", capacity=20_000)
+    recorder = SlowRecorder(
+        folder, layout, reserve=0, when_full="error", capacity=20_000
+    )
     with pytest.raises(RecordingError, match="does not keep up"):
         bench.play(recorder, bench.codes(20_000), 1000)
     recorder.close("faulted", 20_000)
@@ -73,8 +74,9 @@ def test_a_slow_disk_ends_a_real_run_and_keeps_what_came(bench, folder, layout):
 
 
 def test_what_goes_wrong_in_the_thread_reaches_the_caller(bench, folder, layout):
-    failing = FailingRecorder(folder, layout, reserve=0)
-    recorder = RecorderThread(failing, when_full="wait", capacity=20_000)
+    recorder = FailingRecorder(
+        folder, layout, reserve=0, when_full="wait", capacity=20_000
+    )
     with pytest.raises(RecordingError, match="gave up"):
         bench.play(recorder, bench.codes(20_000), 1024)
     with pytest.raises(RecordingError, match="gave up"):
@@ -87,12 +89,12 @@ def test_what_goes_wrong_in_the_thread_reaches_the_caller(bench, folder, layout)
 
 def test_a_waiting_caller_is_woken_by_a_failure(bench, folder, layout):
     class Stuck(Recorder):
-        def append(self, block):
+        def _append(self, block):
             released.wait(5)
             raise RecordingError("pulled out")
 
     released = threading.Event()
-    recorder = RecorderThread(Stuck(folder, layout), when_full="wait", capacity=5000)
+    recorder = Stuck(folder, layout, when_full="wait", capacity=5000)
     threading.Timer(0.1, released.set).start()
     with pytest.raises(RecordingError, match="pulled out"):
         bench.play(recorder, bench.codes(20_000), 1000)
@@ -204,8 +206,13 @@ def test_wall_clock_jumps_do_not_touch_the_record(bench, recorder, folder, monke
 
 
 def test_memory_is_bounded_by_the_queue(bench, folder, layout):
-    slow = SlowRecorder(folder, Layout(signals=("V_C1",), simulated=True), reserve=0)
-    recorder = RecorderThread(slow, when_full="wait", capacity=50_000)
+    recorder = SlowRecorder(
+        folder,
+        Layout(signals=("V_C1",), simulated=True),
+        reserve=0,
+        when_full="wait",
+        capacity=50_000,
+    )
     recorder.segment(bench.stream(), 0.0)
     made = bench.codes(10_000)
     fullest = 0.0
