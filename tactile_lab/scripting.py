@@ -10,11 +10,8 @@ from tactile_lab.acquisition import events
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import ParameterError, RunFolderError, UnsafeError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Result
-from tactile_lab.model.simulate import simulate as simulate_circuit
 from tactile_lab.planning.plan import Plan
 from tactile_lab.planning.plan import plan as plan_of
-from tactile_lab.planning.preview import model
 from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 from tactile_lab.scene.overrides import Overrides
@@ -25,6 +22,7 @@ from tactile_lab.store.run import Run
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
+    from tactile_lab.model.simulate import Result
     from tactile_lab.report.write import Report
 
 
@@ -157,7 +155,9 @@ def simulate(
                 "A circuit is simulated under a Waveform, such as "
                 "Waveform.pulse(0.15, ramp=0.01, hold=10.0)."
             )
-        return simulate_circuit(
+        from tactile_lab.model import simulate as solver
+
+        return solver.simulate(
             what, force, keep=keep or ("spikes",), tolerance=tolerance
         )
     if isinstance(force, Waveform):
@@ -165,6 +165,8 @@ def simulate(
             "A scene has a force of its own; give a Circuit with a Waveform, or a "
             "scene with changes of single keys."
         )
+    from tactile_lab.planning.preview import model
+
     scene = load(what, force)
     drive = timeline(scene, through_coil=False)
     wanted = keep or [s for s in scene.record.signals if s not in BENCH_ONLY]

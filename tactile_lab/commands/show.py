@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,11 @@ def command(run: Path, as_json: bool) -> None:
     if as_json:
         print_json(summary)
     else:
-        _print(summary)
+        kind = "simulated" if summary["simulated"] else "measured"
+        say(f"{summary['run']}: {summary['status']}, {kind}")
+        for name, value in _rows(summary):
+            if value:
+                say(f"{name:<13}{value}" if name else str(value))
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -100,45 +105,37 @@ def describe(path: Path) -> dict[str, Any]:
     return summary
 
 
-def _print(summary: dict[str, Any]) -> None:
+def _rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
+    """Names and what is shown beside them; rows without a value are left out."""
     from tactile_lab.quantity import show
     from tactile_lab.scene.tables import ZERO_CELSIUS
 
-    kind = "simulated" if summary["simulated"] else "measured"
-    say(f"{summary['run']}: {summary['status']}, {kind}")
     for key in ("reason", "started", "protocol", "scene", "bench"):
-        if summary[key]:
-            say(f"{key:<13}{summary[key]}")
-    for key, text in summary["notes"].items():
-        say(f"{key:<13}{text}")
+        yield key, summary[key]
+    yield from summary["notes"].items()
     if summary["temperature_K"] is not None:
-        say(f"temperature  {summary['temperature_K'] - ZERO_CELSIUS:.4g} °C")
-    for name, identity in summary["instruments"].items():
-        say(f"{name:<13}{identity}")
-    for line in summary["instruments_changed"]:
-        say(f"changed      {line}")
+        yield "temperature", f"{summary['temperature_K'] - ZERO_CELSIUS:.4g} °C"
+    yield from summary["instruments"].items()
+    yield from (("changed", line) for line in summary["instruments_changed"])
     if found := summary["detection"]:
         why = ", from the noise" if found["from"] == "noise" else ""
         threshold = show(found["threshold_V"], "V", 3)
-        say(f"detection    {found['signal']}, {found['kind']} at {threshold}{why}")
+        yield "detection", f"{found['signal']}, {found['kind']} at {threshold}{why}"
     if summary["duration_s"] is not None:
-        say(f"duration     {show(summary['duration_s'], 's')}")
+        yield "duration", show(summary["duration_s"], "s")
     for name, signal in summary["signals"].items():
         rate = show(signal["sample_rate_Hz"], "S/s")
         step = show(signal["resolution"], signal["unit"], 3)
-        say(f"{name:<13}{signal['samples']} samples, {rate}, step {step}")
+        yield name, f"{signal['samples']} samples, {rate}, step {step}"
     if summary["spikes"] is not None:
-        say(f"spikes       {summary['spikes']}")
+        yield "spikes", str(summary["spikes"])
     for trial in summary["trials"]:
-        say(
-            f"trial        {trial['label']:<12} {trial['start_s']:.3f} to "
-            f"{trial['end_s']:.3f} s, {trial['spikes']} spikes"
-        )
+        times = f"{trial['start_s']:.3f} to {trial['end_s']:.3f} s"
+        yield "trial", f"{trial['label']:<12} {times}, {trial['spikes']} spikes"
     if summary["overrange_blocks"]:
-        say(f"over range   in {summary['overrange_blocks']} blocks")
+        yield "over range", f"in {summary['overrange_blocks']} blocks"
     if summary["loss"]:
-        say(summary["loss"]["text"])
+        yield "", summary["loss"]["text"]
     for name, digest in summary["inputs"].items():
-        say(f"kept         {name}  sha256 {digest[:16]}")
-    for figure in summary["figures"]:
-        say(f"figure       {figure}")
+        yield "kept", f"{name}  sha256 {digest[:16]}"
+    yield from (("figure", figure) for figure in summary["figures"])

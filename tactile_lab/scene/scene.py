@@ -72,7 +72,7 @@ class Scene:
         file = getattr(self.protocol, "file", None)
         if isinstance(file, str):
             named.append(Path(file))
-        return tuple(path for path in named if path is not None)
+        return tuple(dict.fromkeys(path for path in named if path is not None))
 
     def to_dict(self) -> dict[str, Any]:
         """All keys, expanded; quantities as exact texts, file names absolute."""
