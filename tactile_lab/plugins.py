@@ -114,6 +114,11 @@ def protocol_class(name: str) -> type[Protocol]:
     return _only_protocol(importlib.import_module(known[name]), name)
 
 
+def ships(kind: type) -> bool:
+    """Whether a class stands in a file of a protocol that ships."""
+    return kind.__module__ in _protocols().values()
+
+
 def protocol_from_file(path: Path) -> type[Protocol]:
     """The protocol in a Python file of the user's own.
 

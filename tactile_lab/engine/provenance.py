@@ -12,6 +12,7 @@ from tactile_lab.bench import Bench, Stream
 from tactile_lab.engine.environment import environment
 from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import Plan
+from tactile_lab.plugins import ships
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, RunFolder
@@ -110,5 +111,5 @@ def _names(files: tuple[Path, ...]) -> dict[Path, str]:
 def _shipped(scene: Scene) -> Iterator[Path]:
     """Source files of a protocol that ships, those it builds on included."""
     for kind in type(scene.protocol).__mro__:
-        if kind.__module__.partition(".")[0] == "protocols":
+        if ships(kind):
             yield Path(inspect.getfile(kind))
