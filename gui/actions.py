@@ -42,7 +42,7 @@ class Actions(QObject):
     Args:
         window: has the shortcuts, is closed and pictured.
         panels: what they work on.
-        opening: opens scenes and runs.
+        screen: opens scenes and runs.
         closing: the question in which Esc is not STOP.
     """
 
@@ -50,11 +50,11 @@ class Actions(QObject):
     """Fold a side panel, or unfold it."""
 
     def __init__(
-        self, window: QWidget, panels: Panels, opening: Screen, closing: Closing
+        self, window: QWidget, panels: Panels, screen: Screen, closing: Closing
     ) -> None:
         super().__init__(window)
         self._window, self._panels = window, panels
-        self._opening, self._closing = opening, closing
+        self._screen, self._closing = screen, closing
         self.keys = self._all()
         self._shortcuts: list[QShortcut] = []
         for key in self.keys:
@@ -126,8 +126,8 @@ class Actions(QObject):
             Key(("Home",), "Start of the run", self._home, single=True),
             Key(("End",), "End of the run", lambda: view.set_follow(True), single=True),
             Key(("N",), "Note", panels.centre.log.note.setFocus, single=True),
-            Key(("Ctrl+O",), "Open a scene", self._opening.ask_scene),
-            Key(("Ctrl+Shift+O",), "Open a run", self._opening.ask_run),
+            Key(("Ctrl+O",), "Open a scene", self._screen.ask_scene),
+            Key(("Ctrl+Shift+O",), "Open a run", self._screen.ask_run),
             Key(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
             Key(("Ctrl+E",), "Export the view", lambda: self.export_view()),
             Key(("Ctrl+F",), "Search runs", self._search),
@@ -194,7 +194,7 @@ class Actions(QObject):
         """Export what the lanes show."""
         from gui.dialogs.saving import export_view
 
-        export_view(self._panels, self._opening.run)
+        export_view(self._panels, self._screen.run)
 
     def show_help(self, topic: str = "") -> None:
         """Show the shortcut list and the help of the panels, at a topic."""
@@ -207,15 +207,15 @@ class Actions(QObject):
         """Show the connect dialog."""
         from gui.dialogs.connect import show_connect
 
-        show_connect(self._window, self._panels, self._opening)
+        show_connect(self._window, self._panels, self._screen)
 
     def show_menu(self) -> None:
         """Open the menu below its button."""
         panels, menu = self._panels, QMenu(self._window)
         session, theme = panels.session, panels.theme
-        menu.addAction("Open scene …", self._opening.ask_scene)
+        menu.addAction("Open scene …", self._screen.ask_scene)
         menu.addAction("Save scene …", self.save_scene)
-        menu.addAction("Open run …", self._opening.ask_run)
+        menu.addAction("Open run …", self._screen.ask_run)
         menu.addAction("Export view …", self.export_view)
         menu.addSeparator()
         menu.addAction("Use simulated bench", lambda: session.connect_bench("sim"))

@@ -67,10 +67,10 @@ def begin(window: Window, target: str | None, bench: str | None) -> None:
     """What happens right after the window has appeared."""
     path = None if target is None else Path(target)
     is_run = path is not None and path.is_dir()
-    window.opening.open_scene(None if is_run else target)
+    window.screen_.open_scene(None if is_run else target)
     if is_run and path is not None:
-        window.opening.open_run(path)
-    window.opening.list_runs()
+        window.screen_.open_run(path)
+    window.screen_.list_runs()
     start(_load_reader, "load reader")
     window.page.setFocus()
     if bench is not None:  # in a turn of its own: the scene is painted meanwhile

@@ -70,9 +70,9 @@ class Window(QMainWindow):
         self.panels = Panels(
             session, theme, self.header, self.setup, self.centre, self.review
         )
-        self.opening = Screen(self.panels)
-        self.frames = Frames(self.panels, self.opening)
-        self.actions_ = Actions(self, self.panels, self.opening, self.closing)
+        self.screen_ = Screen(self.panels)
+        self.frames = Frames(self.panels, self.screen_)
+        self.actions_ = Actions(self, self.panels, self.screen_, self.closing)
         self._leaving = False
         self._connect()
         self.render_state()
@@ -90,7 +90,7 @@ class Window(QMainWindow):
             self.review.manual.show_bench(self.session.bench.spec)
         self.centre.show_empty(
             snapshot.state in (State.DISCONNECTED, State.CONNECTING)
-            and self.opening.run is None
+            and self.screen_.run is None
         )
         tools = self.centre.tools
         watching = self.session.monitor.alive
@@ -210,7 +210,7 @@ class Window(QMainWindow):
     def dropEvent(self, event: QDropEvent) -> None:
         """Open what was dropped."""
         for url in event.mimeData().urls()[:1]:
-            self.opening.open_path(Path(url.toLocalFile()))
+            self.screen_.open_path(Path(url.toLocalFile()))
         event.acceptProposedAction()
 
     # --- assembly
@@ -224,30 +224,30 @@ class Window(QMainWindow):
     def _connect(self) -> None:
         session = self.session
         session.status.changed.connect(self.render_state)
-        self.opening.changed.connect(self.render_state)
+        self.screen_.changed.connect(self.render_state)
         self.frames.told.connect(self.render_clock)
         self.actions_.fold_asked.connect(self.fold)
         session.log.added.connect(self.centre.log.add)
-        session.plan.arrived.connect(self.opening.plan_arrived)
-        session.source_changed.connect(self.opening.follow_run)
-        session.run.trial_ended.connect(self.opening.trial_ended)
-        session.run.ended.connect(self.opening.run_ended)
-        session.run.reported.connect(self.opening.reported)
+        session.plan.arrived.connect(self.screen_.plan_arrived)
+        session.source_changed.connect(self.screen_.follow_run)
+        session.run.trial_ended.connect(self.screen_.trial_ended)
+        session.run.ended.connect(self.screen_.run_ended)
+        session.run.reported.connect(self.screen_.reported)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
         self.banner.log_asked.connect(self.centre.log.show_safety)
         self.centre.log.noted.connect(session.note)
         self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
-        self.centre.empty.open_asked.connect(self.opening.ask_scene)
+        self.centre.empty.open_asked.connect(self.screen_.ask_scene)
         self.centre.empty.connect_asked.connect(self.actions_.connect_dialog)
-        self.centre.empty.recent_asked.connect(self.opening.open_run)
+        self.centre.empty.recent_asked.connect(self.screen_.open_run)
         self.closing.stopped.connect(self.leave)
         self.centre.tools.export_asked.connect(self.actions_.export_view)
         self.centre.tools.monitor.clicked.connect(session.watch)
         self.centre.watch_bar.record_asked.connect(session.record)
         self.centre.watch_bar.closed.connect(lambda: session.watch(False))
-        session.monitor.recorded.connect(lambda folder: self.opening.list_runs())
-        self.setup.scene_wanted.connect(self.opening.ask_scene)
+        session.monitor.recorded.connect(lambda folder: self.screen_.list_runs())
+        self.setup.scene_wanted.connect(self.screen_.ask_scene)
         manual = self.review.manual
         manual.begun.connect(session.begin_manual)
         manual.field_asked.connect(session.read_field)

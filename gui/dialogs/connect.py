@@ -294,15 +294,15 @@ class Connect(Overlay):
         self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
 
-def show_connect(window: QWidget, panels: Panels, opening: Screen) -> None:
+def show_connect(window: QWidget, panels: Panels, screen: Screen) -> None:
     """Open the dialog."""
     found = window.findChild(Connect)
     if isinstance(found, Connect):
         shown = found
     else:
         shown = Connect(window, panels.session, panels.theme)
-        shown.prepare_asked.connect(opening.open_scene)
-        shown.run_asked.connect(opening.run_scene)
+        shown.prepare_asked.connect(screen.open_scene)
+        shown.run_asked.connect(screen.run_scene)
     shown.show_bench()
     shown.open()
     shown.instruments.scan.setFocus()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -15,6 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gui.lanes.lane import Lane
+from gui.lanes.source import Source
 from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
@@ -25,6 +28,9 @@ from gui.record.log import LogView
 from gui.record.progress import Progress
 from gui.record.watching import WatchBar
 from gui.screen.compare_bar import CompareBar
+
+FOLLOWED = 5.0
+"""Visible time of a run that begins, s."""
 
 
 class EmptyCard(QFrame):
@@ -116,7 +122,7 @@ class Centre(QWidget):
         above.addWidget(self.tools)
         above.addWidget(line())
         above.addWidget(self.notice)
-        self.compare_bar = CompareBar(theme)
+        self.compare_bar = CompareBar(self.stack, self.view, theme)
         above.addWidget(self.compare_bar)
         self.watch_bar = WatchBar()
         above.addWidget(self.watch_bar)
@@ -138,6 +144,43 @@ class Centre(QWidget):
         lower.setMinimumHeight(151)
         column(self).addWidget(self.splitter)
         self.empty = EmptyCard(self.stack, theme)
+
+    def show_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
+        """Show another source, whole; `lanes`: None keeps those shown."""
+        self._show_lanes(lanes)
+        self.stack.show_source(source)
+        self.view.set_now(source.reach, source.length)
+        self.view.show_all()
+        self.stack.show_values()
+
+    def follow_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
+        """Show a source that grows, and follow it."""
+        self._show_lanes(lanes)
+        self.stack.show_source(source)
+        self.view.clear_cursors()
+        self.view.set_follow(True)
+        self.view.set_width(FOLLOWED)
+
+    def exchange_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
+        """Show another source of the same data: view and ranges stay."""
+        self.view.set_now(source.reach, source.length)
+        self._show_lanes(lanes)
+        self.stack.exchange_source(source)
+
+    def refresh(self, lanes: Sequence[Lane] | None) -> None:
+        """More has come of what is shown."""
+        self._show_lanes(lanes)
+        self.stack.refresh()
+        self.stack.show_values()
+
+    def say(self, problem: str) -> None:
+        """Say something above the lanes; "" takes it away."""
+        self.notice.setText(problem)
+        self.notice.setVisible(bool(problem))
+
+    def _show_lanes(self, lanes: Sequence[Lane] | None) -> None:
+        if lanes is not None:
+            self.stack.show_lanes(lanes)
 
     def show_empty(self, wanted: bool) -> None:
         """Show or hide the card of the empty state."""

@@ -1,21 +1,17 @@
-"""Comparing two or three runs: loading them, and the bar that arranges them."""
+"""The bar that arranges compared runs: how they are aligned and laid out."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QFont, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
 from gui.lanes.compare import MARKS, Comparison, Layout
-from gui.lanes.source import Member
+from gui.lanes.stack import LaneStack
+from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, empty, label
-from gui.review.entries import Entry
-from tactile_lab.engine.threads import start
-from tactile_lab.errors import TactileLabError
 
 ALIGNED = ("start", "step", "cursor")
 LAYOUTS = (Layout.STACK, Layout.OVERLAY, Layout.DIFFERENCE)
@@ -24,17 +20,12 @@ LAYOUTS = (Layout.STACK, Layout.OVERLAY, Layout.DIFFERENCE)
 class CompareBar(QFrame):
     """The runs with colour and marker, how they are aligned and laid out."""
 
-    changed = Signal()
     closed = Signal()
-    agreed = Signal(float)
-    """Where the runs were aligned at the cursor, s."""
 
-    def __init__(self, theme: Theme) -> None:
+    def __init__(self, stack: LaneStack, view: TimeView, theme: Theme) -> None:
         super().__init__()
-        self._theme = theme
+        self._stack, self._view, self._theme = stack, view, theme
         self.comparison: Comparison | None = None
-        self.at = 0.0
-        self._cursor: float | None = None
         self.align = Segments(["Start", "Step", "Cursor"], "Align")
         for number, words in enumerate(
             (
@@ -69,7 +60,8 @@ class CompareBar(QFrame):
         self.align.group.idClicked.connect(self._align)
         self.layout_.group.idClicked.connect(self._lay_out)
         theme.changed.connect(self._show_names)
-        self.look_at(0.0, None)
+        view.cursors_changed.connect(self._allow_cursor)
+        self._allow_cursor()
         self.hide()
 
     def show_comparison(self, comparison: Comparison | None) -> None:
@@ -80,11 +72,6 @@ class CompareBar(QFrame):
             self.align.choose(0)
             self.layout_.choose(0)
             self._show_names()
-
-    def look_at(self, time: float, cursor: float | None) -> None:
-        """The step at `time` and what is nearest to cursor A can be aligned, s."""
-        self.at, self._cursor = time, cursor
-        self.align.group.button(ALIGNED.index("cursor")).setEnabled(cursor is not None)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leave words out where there is no room for them."""
@@ -119,44 +106,23 @@ class CompareBar(QFrame):
         made.ensurePolished()
         return made
 
+    def _allow_cursor(self) -> None:
+        """What is nearest to cursor A can be aligned where there is one."""
+        there = self._view.cursors is not None
+        self.align.group.button(ALIGNED.index("cursor")).setEnabled(there)
+
     def _align(self, number: int) -> None:
         if self.comparison is None:
             return
-        how = ALIGNED[number]
-        if how == "cursor" and self._cursor is not None:
-            self.agreed.emit(self.comparison.align(how, self._cursor))
+        view, how = self._view, ALIGNED[number]
+        if how == "cursor" and view.cursors is not None:
+            agreed = self.comparison.align(how, view.cursors[0])
+            view.move_cursor(0, agreed)
         else:
-            self.comparison.align(how, self.at)
-        self.changed.emit()
+            self.comparison.align(how, view.start + view.width / 2)
+        self._stack.refresh()
 
     def _lay_out(self, number: int) -> None:
         if self.comparison is not None:
             self.comparison.layout = LAYOUTS[number]
-            self.changed.emit()
-
-
-def load_comparison(
-    chosen: list[Entry],
-    loaded: Callable[[Comparison], None],
-    failed: Callable[[str], None],
-) -> None:
-    """Load two or three runs in a background thread, which calls one of the two."""
-
-    def work() -> None:
-        from gui.lanes.stored import RunSource
-
-        members: list[Member] = []
-        try:
-            for entry in chosen[:3]:
-                source = RunSource(entry.folder)
-                clock = entry.folder.name[11:17]
-                name = ":".join(clock[k : k + 2] for k in (0, 2, 4))
-                members.append(Member(f"{name} {entry.scene}".strip(), source))
-        except (TactileLabError, OSError) as error:
-            for member in members:
-                member.source.close()
-            failed(str(error))
-            return
-        loaded(Comparison(members))
-
-    start(work, "compare")
+            self._stack.refresh()

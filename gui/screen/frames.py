@@ -26,9 +26,9 @@ class Frames(QObject):
     told = Signal(object)
     """The newest snapshot, as often as numbers can be read."""
 
-    def __init__(self, panels: Panels, opening: Screen) -> None:
+    def __init__(self, panels: Panels, screen: Screen) -> None:
         super().__init__(panels.centre)
-        self._panels, self._opening = panels, opening
+        self._panels, self._screen = panels, screen
         self.frozen = False
         self.costs: list[float] = []
         self.paints: list[float] = []
@@ -53,7 +53,7 @@ class Frames(QObject):
         panels, session = self._panels, self._panels.session
         moved = session.poll()
         now = time.monotonic()
-        live = session.source is not None and self._opening.run is None
+        live = session.source is not None and self._screen.run is None
         if live and not self.frozen and not panels.centre.window().isMinimized():
             source = session.source
             assert source is not None
@@ -61,7 +61,7 @@ class Frames(QObject):
             if source.running or moved:
                 view.set_now(source.reach, source.length)
                 panels.centre.stack.refresh()
-        self._opening.take_fetched()
+        self._screen.take_fetched()
         if now - self._numbers >= NUMBERS:
             self._numbers = now
             self._show_numbers(live)
@@ -81,7 +81,7 @@ class Frames(QObject):
             panels.centre.progress.show_run(
                 snapshot, holds, source.length, source.reach, session.run.trial,
                 "Monitor: only Record keeps what is seen" if session.monitor.alive
-                else self._opening.ending,
+                else self._screen.ending,
             )  # fmt: skip
             running = session.state in (State.RUNNING, State.ABORTING)
             panels.setup.show_head(source.reach if running else None)

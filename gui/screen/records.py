@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
+from gui.lanes.compare import Comparison
+from gui.lanes.source import Member, Source
+from gui.review.entries import Entry
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.events import ModelPart
@@ -25,19 +29,21 @@ class Records(QObject):
     Attributes:
         loaded: a run was read; its model follows.
         exchanged: the run that has ended was read, and its model has come too.
+        compared: a `Comparison` was read.
         failed: why a run was not read, or has no model.
-        shown: the run on screen, if it is from disk; set by whoever shows it.
+        shown: what is from disk on screen; set by whoever shows it.
     """
 
     loaded = Signal(object)
     exchanged = Signal(object)
+    compared = Signal(object)
     failed = Signal(str)
     _read = Signal(object, bool)
 
     def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self._session = session
-        self.shown: RunSource | None = None
+        self.shown: Source | None = None
         self._ended: RunSource | None = None
         self._awaited: Path | None = None
         self._read.connect(self._arrived)
@@ -58,6 +64,36 @@ class Records(QObject):
         if self._ended is not None:
             self._ended.close()
             self._ended = None
+
+    def leave(self) -> bool:
+        """Let go of what is shown and what is awaited; whether anything was shown."""
+        self.forget()
+        shown, self.shown = self.shown, None
+        if shown is not None:
+            shown.close()
+        return shown is not None
+
+    def compare(self, chosen: Sequence[Entry]) -> None:
+        """Read two or three runs, to be compared."""
+
+        def work() -> None:
+            from gui.lanes.stored import RunSource
+
+            members: list[Member] = []
+            try:
+                for entry in chosen[:3]:
+                    source = RunSource(entry.folder)
+                    clock = entry.folder.name[11:17]
+                    name = ":".join(clock[k : k + 2] for k in (0, 2, 4))
+                    members.append(Member(f"{name} {entry.scene}".strip(), source))
+            except (TactileLabError, OSError) as error:
+                for member in members:
+                    member.source.close()
+                self.failed.emit(str(error))
+                return
+            self.compared.emit(Comparison(members))
+
+        start(work, "compare")
 
     def _load(self, folder: Path, *, ended: bool) -> None:
         def work() -> None:
@@ -90,8 +126,8 @@ class Records(QObject):
             self._ended = self._awaited = None
             self._add(ended, reply)
             self.exchanged.emit(ended)
-        elif self.shown is not None and self.shown.path == folder:
-            self._add(self.shown, reply)
+        elif (shown := self._shown(folder)) is not None:
+            self._add(shown, reply)
 
     def _add(self, source: RunSource, reply: Reply[ModelPart]) -> None:
         if reply.value is None:
@@ -104,8 +140,15 @@ class Records(QObject):
         """Have a part of the model sampled closely."""
 
         def seen(reply: Reply[ModelPart]) -> None:
-            shown = self.shown
-            if shown is not None and shown.path == folder and reply.value is not None:
+            shown = self._shown(folder)
+            if shown is not None and reply.value is not None:
                 shown.add_twin_part(reply.value)
 
         self._session.desk.ask(ModelOfRun(folder, start, end, count), seen)
+
+    def _shown(self, folder: Path) -> RunSource | None:
+        """The run on screen, if it is that in `folder`."""
+        from gui.lanes.stored import RunSource
+
+        shown = self.shown
+        return shown if isinstance(shown, RunSource) and shown.path == folder else None

@@ -1,4 +1,4 @@
-"""Opening scenes and runs, and what the lanes show because of it."""
+"""What is on screen: the plan, the run in progress, or what was opened from disk."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QFileDialog
 
 from gui.lanes.compare import Comparison
+from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.source import LiveSource, PlanSource, Source
 from gui.review.entries import Entry, entries
 from gui.review.gathering import Gathering
-from gui.screen.agreeing import Agreeing
-from gui.screen.compare_bar import load_comparison
 from gui.screen.panels import Panels
 from gui.screen.records import Records
-from gui.screen.showing import lanes_shown
 from gui.session.form_plan import Planned
 from gui.session.log import Level
 from gui.state import State
@@ -27,62 +25,60 @@ from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
+    from gui.session.agreement import Agreement
     from tactile_lab.acquisition.ending import Executed
-
 
 LATER = 1000
 """Milliseconds after a run's end until runs are listed anew: its record comes first."""
 
+COMPARED = 2000
+"""Milliseconds after which a run in progress is compared with the model anew."""
+
+WATCHED = ("V_C1", "V_C2", "V_K", "spikes")
+"""What the monitor shows."""
+
 
 class Screen(QObject):
-    """What is on screen: the plan, the run in progress, or a run from disk.
+    """Opens scenes and runs, and decides which source the lanes show.
 
     Attributes:
-        run: the run from disk on screen, None while plan or live run are.
         ending: how the run on screen ended, in words.
     """
 
     changed = Signal()
-    failed = Signal(str)
     listed = Signal(object)
-    compared = Signal(object)
 
     def __init__(self, panels: Panels) -> None:
         super().__init__(panels.centre)
         self._panels = panels
-        self.run: Source | None = None
         self.ending = ""
         self.gathering = Gathering(panels.review.results, panels.session, self)
-        Agreeing(panels.session, self.gathering)
+        self.gathering.agreed.connect(self._agreed)
         self._modelled: Source | None = None
         self._ended: Path | None = None
-        self._records = Records(panels.session, self)
-        self._records.loaded.connect(self._show_run)
-        self._records.exchanged.connect(self._exchange)
-        self._records.failed.connect(self.say)
-        self.failed.connect(self.say)
+        self._records = records = Records(panels.session, self)
+        records.loaded.connect(self._show_run)
+        records.exchanged.connect(self._exchange)
+        records.compared.connect(self._show_comparison)
+        records.failed.connect(self.say)
         self.listed.connect(self._list)
-        self.compared.connect(self._show_comparison)
         runs = panels.review.runs
         runs.opened.connect(lambda entry: self.open_run(entry.folder))
         runs.again.connect(self._again)
-        runs.compared.connect(
-            lambda chosen: load_comparison(chosen, self.compared.emit, self.failed.emit)
-        )
-        bar = panels.centre.compare_bar
-        bar.changed.connect(panels.centre.stack.refresh)
-        view = panels.centre.view
-        view.changed.connect(
-            lambda: bar.look_at(
-                view.start + view.width / 2, (view.cursors or [None])[0]
-            )
-        )
-        bar.agreed.connect(lambda time: view.move_cursor(0, time))
-        bar.closed.connect(self.close_run)
+        runs.compared.connect(records.compare)
+        panels.centre.compare_bar.closed.connect(self.close_run)
         panels.review.results.report_asked.connect(self.gathering.open_report)
         panels.review.export.clicked.connect(
             lambda: self.gathering.open_folder(panels.session.out)
         )
+        timer = QTimer(self)
+        timer.timeout.connect(self.compare_live)
+        timer.start(COMPARED)
+
+    @property
+    def run(self) -> Source | None:
+        """A run from disk, or some compared; None while plan or live run are shown."""
+        return self._records.shown
 
     # --- asked by the user
 
@@ -133,9 +129,11 @@ class Screen(QObject):
         except (TactileLabError, OSError) as error:
             self.say(str(error))
             return False
-        after = self._panels.setup.form.texts()
-        new = [f"{key} {before[key]} → {value}" for key, value in after.items()
-               if key in before and before[key] != value]  # fmt: skip
+        new = [
+            f"{key} {before[key]} → {value}"
+            for key, value in self._panels.setup.form.texts().items()
+            if before.get(key, value) != value
+        ]
         said = f"Scene {name or 'demo'} loaded"
         self._panels.session.log.add(
             Level.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
@@ -157,6 +155,29 @@ class Screen(QObject):
         out = self._panels.session.out
         start(lambda: self.listed.emit(entries(out)), "list runs")
 
+    def close_run(self) -> None:
+        """Go back from a run on disk to the session's last run, or to the plan."""
+        self.leave_run()
+        source, centre = self._panels.session.source, self._panels.centre
+        if source is not None and centre.stack.source is not source:
+            centre.show_source(source, self._lanes())
+            if self._ended is not None:
+                self._records.exchange(self._ended)
+        self._panels.setup.plan_now()
+
+    def leave_run(self) -> None:
+        """Let go of what is from disk on screen."""
+        self.gathering.forget()
+        if self._records.leave():
+            self._panels.centre.compare_bar.show_comparison(None)
+            self._panels.session.run.name = ""
+        self._panels.centre.say("")
+
+    def say(self, problem: str) -> None:
+        """Tell why something could not be opened, above the lanes and in the log."""
+        self._panels.session.log.add(Level.ERROR, "open", problem)
+        self._panels.centre.say(problem)
+
     # --- told by the session
 
     def plan_arrived(self, planned: Planned) -> None:
@@ -165,29 +186,18 @@ class Screen(QObject):
         if planned.expectation is None or self._busy or self.run is not None:
             return
         if session.source is None:
-            self.show_lanes()
-            preview = planned.expectation.preview
-            self._panels.centre.view.set_now(0.0, preview.length)
-            self._panels.centre.stack.show_source(PlanSource(preview))
-            self._panels.centre.view.show_span(0.0, preview.length)
+            source = PlanSource(planned.expectation.preview)
+            self._panels.centre.show_source(source, self._lanes())
 
     def follow_run(self, source: LiveSource) -> None:
         """Show the run that begins."""
         self.leave_run()
         self._ended = None
-        panels = self._panels
-        self.show_lanes()
-        panels.centre.stack.show_source(source)
-        view = panels.centre.view
-        view.clear_cursors()
-        panels.centre.tools.cursors.setChecked(False)
-        view.follow = True
-        view.set_width(5.0)
-        view.set_follow(True)
-        panels.centre.tools.follow.setChecked(True)
-        if not panels.session.monitor.alive:
+        centre, session = self._panels.centre, self._panels.session
+        centre.follow_source(source, self._lanes())
+        if not session.monitor.alive:
             self.ending = ""
-            expectation = panels.session.run.expectation
+            expectation = session.run.expectation
             steps = expectation.estimate.trials if expectation else 0
             searched = expectation is None or expectation.needs.detect_on is not None
             self.gathering.begin(steps, fires=searched)
@@ -219,99 +229,90 @@ class Screen(QObject):
             if self.run.has_model and self._modelled is not self.run:
                 self._modelled = self.run
                 self.gathering.compare_with_model(self.run)
-            self.show_lanes()
-            self._panels.centre.stack.refresh()
-            self._panels.centre.stack.show_values()
+            self._panels.centre.refresh(self._lanes())
 
-    def close_run(self) -> None:
-        """Go back from a run on disk to the session's last run, or to the plan."""
-        self.leave_run()
-        source, centre = self._panels.session.source, self._panels.centre
-        if source is not None and centre.stack.source is not source:
-            self.show_lanes()
-            centre.stack.show_source(source)
-            centre.view.set_now(source.reach, source.length)
-            centre.view.show_all()
-            if self._ended is not None:
-                self._records.exchange(self._ended)
-        self._panels.setup.plan_now()
+    def compare_live(self) -> None:
+        """Compare the run in progress with the model, while probes are on the circuit.
 
-    def show_lanes(self) -> None:
-        """Show the lanes of what is on screen."""
-        lanes = lanes_shown(self._panels.session, self.run)
-        if lanes is not None:
-            self._panels.centre.stack.show_lanes(lanes)
+        Also between two steps, so that the session knows how well they agree.
+        """
+        session = self._panels.session
+        live = session.state is State.RUNNING and session.run.probes == "circuit"
+        if live and session.source is not None:
+            self.gathering.compare_with_model(session.source)
 
     # --- inside
 
-    def leave_run(self) -> None:
-        """Let go of the run from disk on screen."""
-        self._records.forget()
-        self.gathering.forget()
-        if self.run is not None:
-            self.run.close()
-            self.run = self._records.shown = None
-            self._panels.centre.compare_bar.show_comparison(None)
-            self._panels.session.run.name = ""
-        self._panels.centre.notice.hide()
+    def _agreed(self, agreement: Agreement | None) -> None:
+        self._panels.session.run.agreement = agreement
 
-    def _show_run(self, source: RunSource) -> None:
-        panels = self._panels
+    def _lanes(self) -> tuple[Lane, ...] | None:
+        """The lanes of what is on screen; what is left out has none. None: no plan."""
+        session = self._panels.session
+        if session.monitor.alive:
+            return lanes_for(WATCHED, twin=False)
+        if self.run is not None:
+            return lanes_for(self.run.signals, twin=self.run.has_model)
+        expectation = session.plan_on_screen
+        if expectation is None:
+            return None
+        needs, record = expectation.needs, expectation.record
+        signals = {"force", *needs.stored} | (set(record.signals) & {"spikes", "field"})
+        if needs.detect_on is not None:
+            signals.add("spikes")
+        if "coil_current" not in record.signals:
+            signals.discard("coil_current")
+        return lanes_for(signals, twin=bool(expectation.preview.traces))
+
+    def _may_show(self, source: Source, what: str) -> bool:
+        """Whether nothing is in progress; else `source` is let go."""
         if self._busy:
             source.close()
-            self.say("A run is in progress; old runs open when it has ended.")
-            return
+            self.say(f"A run is in progress; {what} when it has ended.")
+            return False
         self.leave_run()
-        self.run = self._records.shown = source
+        self._records.shown = source
+        return True
+
+    def _show_run(self, source: RunSource) -> None:
+        if not self._may_show(source, "old runs open"):
+            return
+        panels = self._panels
         panels.session.run.name = f"Looking at {source.path.name}"
-        view = panels.centre.view
-        view.set_now(source.reach, source.length)
-        view.clear_cursors()
-        panels.centre.tools.cursors.setChecked(False)
-        self.show_lanes()
-        panels.centre.stack.show_source(source)
-        view.show_all()
-        panels.centre.stack.show_values()
+        panels.centre.view.clear_cursors()
+        panels.centre.show_source(source, self._lanes())
         status = str(source.info.get("status"))
         self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
         self.gathering.stored(source)
-        panels.review.runs.show_current(source.path)
-        self._show_progress(source)
+        self._show_stored(source)
         self.changed.emit()
 
     def _exchange(self, source: RunSource) -> None:
         """Show the record in place of what was seen live; nothing else moves."""
-        panels = self._panels
         if self._busy or self.run is not None:
             source.close()
             return
-        self.run = self._records.shown = source
-        panels.centre.view.set_now(source.reach, source.length)
-        self.show_lanes()
-        panels.centre.stack.exchange_source(source)
-        panels.review.runs.show_current(source.path)
-        self._show_progress(source)
+        self._records.shown = source
+        self._panels.centre.exchange_source(source, self._lanes())
+        self._show_stored(source)
 
-    def _show_progress(self, source: RunSource) -> None:
+    def _show_stored(self, source: RunSource) -> None:
+        self._panels.review.runs.show_current(source.path)
         self._panels.centre.progress.show_run(
-            self._panels.session.snapshot(), source.holds, source.length,
-            source.reach, None, self.ending,
-        )  # fmt: skip
+            self._panels.session.snapshot(),
+            source.holds,
+            source.length,
+            source.reach,
+            None,
+            self.ending,
+        )
 
     def _show_comparison(self, comparison: Comparison) -> None:
-        session, centre = self._panels.session, self._panels.centre
-        if self._busy:
-            comparison.close()
-            self.say("A run is in progress; runs are compared when it has ended.")
+        if not self._may_show(comparison, "runs are compared"):
             return
-        self.leave_run()
-        self.run = comparison
-        session.run.name = f"Comparing {len(comparison.members)} runs"
-        centre.compare_bar.show_comparison(comparison)
-        centre.view.set_now(comparison.reach, comparison.length)
-        self.show_lanes()
-        centre.stack.show_source(comparison)
-        centre.view.show_all()
+        self._panels.session.run.name = f"Comparing {len(comparison.members)} runs"
+        self._panels.centre.compare_bar.show_comparison(comparison)
+        self._panels.centre.show_source(comparison, self._lanes())
         self.changed.emit()
 
     def _queue(self, scene: str, title: str) -> None:
@@ -332,10 +333,3 @@ class Screen(QObject):
         self._panels.centre.empty.show_recent(
             [(f"{e.title} · {e.started} · {e.status}", e.folder) for e in found[:4]]
         )
-
-    def say(self, problem: str) -> None:
-        """Tell why something could not be opened, above the lanes and in the log."""
-        self._panels.session.log.add(Level.ERROR, "open", problem)
-        self._panels.centre.notice.setText(problem)
-        self._panels.centre.notice.setStyleSheet("")
-        self._panels.centre.notice.show()

@@ -50,16 +50,16 @@ def record(millions: float, out: Path) -> tuple[Path, str]:
 
 def opened(bench: Bench, folder: Path, what: str) -> RunSource:
     """Open the run from the browser and wait for the lanes."""
-    opening = bench.window.opening
+    screen = bench.window.screen_
     bench.clear()
     before, begun = memory(), time.perf_counter()
-    opening.open_run(folder)
-    bench.until(lambda: isinstance(opening.run, RunSource), 60)
+    screen.open_run(folder)
+    bench.until(lambda: isinstance(screen.run, RunSource), 60)
     took = time.perf_counter() - begun
     bench.say(f"{what}: in the lanes after {took:.2f} s, {memory() - before:.0f} MB.")
     bench.report("opening")
-    assert isinstance(opening.run, RunSource)
-    return opening.run
+    assert isinstance(screen.run, RunSource)
+    return screen.run
 
 
 def zoomed(bench: Bench, source: RunSource, pictures: Path | None) -> None:

@@ -85,11 +85,11 @@ class Lab:
         if session.state is State.DISCONNECTED:
             session.connect_bench("sim")
         self.until(lambda: session.state is State.READY)
-        window.opening.close_run()
+        window.screen_.close_run()
         wanted = str(self.folder / "short.toml")
         texts = window.setup.form.texts()
         if session.plan.expectation is None or texts != self.texts:
-            window.opening.open_scene(wanted)
+            window.screen_.open_scene(wanted)
             session.plan.expectation = None
             self.until(lambda: session.plan.expectation is not None)
             self.texts = window.setup.form.texts()

@@ -17,7 +17,7 @@ def model_chip(lab):
 
 def test_spikes_are_expected_before_a_run_and_the_residual_is_told_after(lab) -> None:
     window, session = lab.window, lab.session
-    window.opening.leave_run()
+    window.screen_.leave_run()
     window.render_state()
     assert "spikes expected" in model_chip(lab).value.text()
     lab.complete_run()
@@ -30,7 +30,7 @@ def test_spikes_are_expected_before_a_run_and_the_residual_is_told_after(lab) ->
     assert f"V_C1 {text}" in window.review.results.bars.accessibleName(), "one number"
     assert "in step" in chip.accessibleName()
     assert chip.lamp is Lamp.GOOD
-    window.opening.close_run()
+    window.screen_.close_run()
     assert session.run.agreement is None
 
 
@@ -48,7 +48,7 @@ def test_a_run_is_compared_between_two_steps_too(lab) -> None:
     """The run of an hour has one step, which does not end."""
     lab.run()
     lab.until(lambda: lab.session.run.agreement is not None)
-    assert lab.window.opening.gathering.findings == []
+    assert lab.window.screen_.gathering.findings == []
 
 
 def test_in_step_is_a_residual_within_its_band() -> None:

@@ -27,7 +27,7 @@ def idle(lab) -> None:
 def test_dropped_scene_and_run_wait_with_their_cost(lab) -> None:
     window, session = lab.window, lab.session
     busy(lab)
-    window.opening.open_path(lab.folder / "short.toml")
+    window.screen_.open_path(lab.folder / "short.toml")
     assert [item.title for item in session.queue.items] == ["short"]
     lab.until(lambda: session.queue.items[0].expectation is not None)
     name = window.setup.queue.cards[0].accessibleName()
@@ -35,7 +35,7 @@ def test_dropped_scene_and_run_wait_with_their_cost(lab) -> None:
     broken = lab.folder / "2026-11-21_100000_broken"
     broken.mkdir(exist_ok=True)
     (broken / "scene.toml").write_text('[protocol]\nname = "no such"\n')
-    window.opening.open_path(broken)
+    window.screen_.open_path(broken)
     assert len(session.queue.items) == 1 and window.centre.notice.isVisible()
     idle(lab)
 

@@ -62,7 +62,7 @@ def test_run_moves_lanes_and_gives_results(lab) -> None:
     source = session.source
     assert source is not None and source.reach > 1.0
     assert not source.trace("V_C1", 0.0, 2.0, 500).empty
-    assert [f.label for f in window.opening.gathering.findings] == ["80 mN", "120 mN"]
+    assert [f.label for f in window.screen_.gathering.findings] == ["80 mN", "120 mN"]
     assert window.review.results.mark.startswith("final")
     lab.until(lambda: window.header.stop.truth is Truth.OFF)
 
@@ -83,7 +83,7 @@ def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
     lab.until(lambda: session.state is State.READY)
     coil = session.coil_view()
     assert coil is not None and coil.output is False and coil.verified_off
-    assert window.opening.ending.startswith("aborted")
+    assert window.screen_.ending.startswith("aborted")
 
 
 def test_stop_is_enabled_in_every_state(lab) -> None:
@@ -195,11 +195,11 @@ def test_old_run_opens_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
     folder = lab.complete_run()
     live_spikes = session.source.spikes.copy()
-    lab.until(lambda: window.opening.run is not None)  # its record, by itself
-    record = window.opening.run
-    window.opening.open_run(folder)
-    lab.until(lambda: window.opening.run not in (None, record))
-    run = window.opening.run
+    lab.until(lambda: window.screen_.run is not None)  # its record, by itself
+    record = window.screen_.run
+    window.screen_.open_run(folder)
+    lab.until(lambda: window.screen_.run not in (None, record))
+    run = window.screen_.run
     assert np.allclose(run.spikes, live_spikes, atol=1e-3)
     lab.until(lambda: run.model is not None)
     window.centre.view.show_span(0.2, 0.001)
@@ -212,25 +212,25 @@ def test_old_run_opens_in_the_same_lanes(lab) -> None:
 
 
 def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
-    window, opening = lab.window, lab.window.opening
+    window, screen = lab.window, lab.window.screen_
     folder = lab.complete_run()
-    lab.until(lambda: opening.run is not None)
-    assert opening.run.path == folder
+    lab.until(lambda: screen.run is not None)
+    assert screen.run.path == folder
     assert window.session.run.name == folder.name
-    assert window.centre.stack.source is opening.run
-    assert opening.run.model is not None, "the model does not blink"
+    assert window.centre.stack.source is screen.run
+    assert screen.run.model is not None, "the model does not blink"
     live = window.session.source
     window.centre.view.show_span(0.2, 0.001)
-    lab.until(lambda: opening.run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+    lab.until(lambda: screen.run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
     assert live.trace("V_C2", 0.2, 0.201, 1000).time.size < 10, "seen live: bins"
 
 
 def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     window = lab.window
     folder = lab.runs(1)[0]
-    window.opening.open_run(folder)
+    window.screen_.open_run(folder)
     lab.until(lambda: window.session.run.name == f"Looking at {folder.name}")
-    run, stack, view = window.opening.run, window.centre.stack, window.centre.view
+    run, stack, view = window.screen_.run, window.centre.stack, window.centre.view
     begin, _ = run.holds[-1].held
     run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])
     view.show_span(begin, 0.25)
@@ -274,7 +274,7 @@ def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
     assert window.setup.form.field("levels").text == "70 mN"
     bad = lab.folder / "bad.toml"
     bad.write_text('[protocol]\nname = "pulses"\nlevel = ["70 mN"]\n')
-    window.opening.open_path(bad)
+    window.screen_.open_path(bad)
     assert window.centre.notice.isVisible()
     assert "levels" in window.centre.notice.text()
     assert window.setup.form.field("levels").text == "70 mN"
@@ -396,7 +396,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
     lab.runs(1)
     lab.complete_run()
-    window.opening.list_runs()
+    window.screen_.list_runs()
     lab.until(lambda: len(window.review.runs.cards) >= 2)
     complete = [c for c in window.review.runs.cards if c.entry.status == "complete"]
     for card in complete[:2]:
@@ -404,7 +404,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert window.review.runs.compare.isEnabled()
     window.review.runs.compare.click()
     lab.until(lambda: window.centre.compare_bar.isVisible())
-    comparison = window.opening.run
+    comparison = window.screen_.run
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert "residual" not in keys, "the model is not compared"
     window.centre.compare_bar.align.group.button(1).click()
@@ -432,11 +432,11 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
         time = float(lines[2].split(",")[header.index(f"{run}_force_time_s")])
         known = member.source.trace("force", 0.0, 1.0, 100)
         assert abs(time - known.time[0] - member.shift) < 1e-6
-    window.opening.close_run()
+    window.screen_.close_run()
     assert not window.centre.compare_bar.isVisible()
     assert stack.source is session.source, "back to the last run"
-    lab.until(lambda: stack.source is window.opening.run, 30.0)
-    assert window.opening.run.path == session.run.folder, "and then to its record"
+    lab.until(lambda: stack.source is window.screen_.run, 30.0)
+    assert window.screen_.run.path == session.run.folder, "and then to its record"
     lab.until(lambda: "●" not in stack.row("V_C1").card.text)
 
 

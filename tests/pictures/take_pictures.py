@@ -92,15 +92,15 @@ def _after(stage: Stage) -> None:
     stage.until(window.review.results.report.isVisible)
     stage.shoot("window_complete")
     window.review.show_tab(1)
-    window.opening.list_runs()
+    window.screen_.list_runs()
     stage.until(lambda: window.review.runs.cards)
-    window.opening.open_run(window.review.runs.cards[0].entry.folder)
+    window.screen_.open_run(window.review.runs.cards[0].entry.folder)
     stage.live(1.0)
-    stage.until(lambda: getattr(window.opening.run, "model", None) is not None)
+    stage.until(lambda: getattr(window.screen_.run, "model", None) is not None)
     window.centre.view.show_span(9.2, 0.6)
     stage.live(0.4)
     stage.shoot("window_old_run")
-    window.opening.close_run()
+    window.screen_.close_run()
 
 
 def _manual(stage: Stage) -> None:
@@ -162,18 +162,18 @@ def _wiring(stage: Stage) -> None:
     stage.until(lambda: dialog.wiring.verdicts)
     stage.shoot("window_wiring")
     stage.close_overlays()
-    stage.window.opening.open_scene(None)
+    stage.window.screen_.open_scene(None)
 
 
 def _compare(stage: Stage) -> None:
     """Two shorter runs beside the first."""
     window = stage.window
     for levels in ("80, 120, 160, 180 mN", "90, 130, 170, 200 mN"):
-        window.opening.close_run()
+        window.screen_.close_run()
         window.setup.form.field("levels").set_text(levels)
         stage.run()
     window.setup.form.reset()
-    window.opening.list_runs()
+    window.screen_.list_runs()
     stage.live(0.6)
     window.review.show_tab(1)
     cards = window.review.runs.cards
@@ -183,11 +183,10 @@ def _compare(stage: Stage) -> None:
     window.review.runs.compare.click()
     stage.until(window.centre.compare_bar.isVisible)
     window.centre.view.show_span(8.0, 5.0)
-    window.centre.compare_bar.at = 10.0
     window.centre.compare_bar.align.group.button(1).click()
     stage.live(0.5)
     stage.shoot("window_compare")
-    window.opening.close_run()
+    window.screen_.close_run()
 
 
 def _monitor(stage: Stage) -> None:
@@ -205,7 +204,7 @@ def _unplugged(stage: Stage) -> None:
     demo = (resources.files("protocols") / "scenes" / "demo.toml").read_text()
     Path("demo.toml").write_text(f'{demo}\n[simulated]\ncoil_unplugged = "7 s"\n')
     stage.window.review.show_tab(0)
-    stage.window.opening.open_scene("demo.toml")
+    stage.window.screen_.open_scene("demo.toml")
     stage.planned()
     stage.window.setup.start()
     stage.until(lambda: stage.session.state is State.FAULT)
