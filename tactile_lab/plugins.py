@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
+import traceback
 from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
@@ -75,8 +76,11 @@ def module_from_file(path: Path, what: str) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as reason:
         del sys.modules[spec.name]
+        frames = traceback.extract_tb(reason.__traceback__)
+        lines = [f.lineno for f in frames if f.filename == str(path)]
+        line = f" (line {lines[-1]})" if lines else ""
         raise SceneError(
-            f"{what} file {path} does not run: {type(reason).__name__}: {reason}"
+            f"{what} file {path} does not run: {type(reason).__name__}: {reason}{line}"
         ) from reason
     return module
 

@@ -163,16 +163,16 @@ class Protocol(BaseModel):
         return self
 
     @classmethod
-    def fault(cls, error: Exception) -> str:
+    def fault(cls, error: BaseException) -> str:
         """What went wrong in this protocol, with file and line of its own code.
 
         For the errors of `tactile_lab.errors`, which are raised on purpose, it is
-        their text.
+        their text; for those of other code their kind and text.
         """
         if isinstance(error, TactileLabError):
             return str(error)
+        told = f"{type(error).__name__}: {error}"
         file = inspect.getfile(cls)
         frames = traceback.extract_tb(error.__traceback__)
         line = next((f.lineno for f in reversed(frames) if f.filename == file), None)
-        where = Path(file).name if line is None else f"{Path(file).name}, line {line}"
-        return f"{where}: {type(error).__name__}: {error}"
+        return told if line is None else f"{Path(file).name}, line {line}: {told}"

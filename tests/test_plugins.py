@@ -7,6 +7,7 @@ import pytest
 
 from tactile_lab.errors import SceneError, nearest
 from tactile_lab.instruments.registry import coil_capability
+from tactile_lab.planning.timeline import timeline
 from tactile_lab.plugins import (
     protocol_class,
     protocol_from_file,
@@ -80,3 +81,13 @@ def test_a_faster_line_updates_faster():
     slow = coil_capability(CoilSpec(baud=9600)).update_interval
     fast = coil_capability(CoilSpec(baud=19200)).update_interval
     assert 0.02 < fast < slow < 0.2
+
+
+def test_a_protocol_that_raises_is_told_with_file_and_line(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(GOOD + "    def trials(self):\n        yield 1 / 0\n")
+    with pytest.raises(SceneError, match=r"mine\.py, line 9: ZeroDivisionError"):
+        timeline(load(file), through_coil=True)
+    file.write_text(GOOD + "\n\nnonsense\n")
+    with pytest.raises(SceneError, match=r"does not run: NameError: .* \(line 10\)"):
+        load(file)

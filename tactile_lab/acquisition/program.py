@@ -20,6 +20,7 @@ class Program:
 
     Attributes:
         trials: the protocol's generator, not started yet.
+        fault: says what went wrong where the protocol or other code failed.
         channels: scope channels to enable, in row order.
         interval: sample interval asked for, s.
         search: how spikes are searched; None where they are not.
@@ -34,6 +35,7 @@ class Program:
     """
 
     trials: Callable[[], Trials]
+    fault: Callable[[BaseException], str]
     channels: tuple[Channel, ...]
     interval: float
     search: SpikeSearch | None

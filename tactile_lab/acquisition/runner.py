@@ -97,7 +97,7 @@ class Runner:
                 state, reason, failure = events.RunState.FAULTED, str(error), error
             except BaseException as error:
                 state, failure = events.RunState.FAULTED, error
-                reason = f"{type(error).__name__}: {error}"
+                reason = self._program.fault(error)
             try:
                 self._account.state(events.RunState.STOPPING, "making the coil safe")
             finally:  # whatever a watcher does

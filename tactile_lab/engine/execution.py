@@ -188,6 +188,7 @@ class Execution(Task[Executed]):
         scene, needed = self.scene, self.needs
         return Program(
             trials=scene.protocol.trials,
+            fault=scene.protocol.fault,
             channels=needed.channels,
             interval=1.0 / scene.record.sample_rate,
             search=self._search,

@@ -88,6 +88,7 @@ class Monitor(Task[Ending]):
         self._runner = Runner(
             Program(
                 trials=scene.protocol.trials,
+                fault=scene.protocol.fault,
                 channels=needed.channels,
                 interval=1.0 / scene.record.sample_rate,
                 search=self._search,

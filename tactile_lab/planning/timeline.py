@@ -98,7 +98,7 @@ def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
     except TactileLabError:
         raise
     except Exception as reason:
-        raise SceneError(f"{name} fails: {type(reason).__name__}: {reason}") from reason
+        raise SceneError(f"{name} fails: {scene.protocol.fault(reason)}") from reason
     finally:
         trials.close()
     if not driver.steps:

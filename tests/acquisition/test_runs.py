@@ -221,7 +221,13 @@ def test_a_protocol_that_fails_in_the_middle_leaves_the_coil_off(run_scene, tmp_
     ran = run_scene(scene=str(file))
     assert ran.done.state is RunState.FAULTED
     assert ran.done.off.verified
-    assert "the protocol has a bug" in ran.done.reason
+    line = (
+        file.read_text()
+        .splitlines()
+        .index("            raise RuntimeError('the protocol has a bug')")
+    )
+    told = f"{file.name}, line {line + 1}: RuntimeError: the protocol has a bug"
+    assert ran.done.reason == told
     assert "in trials" in (ran.folder / "traceback.txt").read_text()
 
 
