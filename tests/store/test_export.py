@@ -89,6 +89,39 @@ def test_impossible_parts_are_refused(run, tmp_path):
         to_csv.export(run, tmp_path, Selection(rate=1e6))
 
 
+@pytest.mark.parametrize(
+    "start, end", [(2.0, 1.0), (1.0, 1.0), (99.0, None), (9.0, 12.0)]
+)
+@pytest.mark.parametrize("form", [to_csv, to_mat])
+def test_a_part_with_nothing_in_it_is_refused_and_touches_no_file(
+    run, tmp_path, form, start, end
+):
+    """Ends before it begins, is empty, lies behind the run, or in a planned pause."""
+    target = tmp_path / "made"
+    before = {file: file.read_bytes() for file in form.export(run, target, Selection())}
+    with pytest.raises(RunFolderError, match="The run has nothing from"):
+        form.export(run, target, Selection(start=start, end=end))
+    assert {file: file.read_bytes() for file in before} == before
+
+
+def test_a_refused_rate_touches_no_file(run, tmp_path):
+    signals, *_ = to_csv.export(run, tmp_path, Selection())
+    before = signals.read_bytes()
+    with pytest.raises(RunFolderError, match="cannot be exported at"):
+        to_csv.export(run, tmp_path, Selection(rate=1e6))
+    assert signals.read_bytes() == before
+
+
+def test_no_file_of_an_earlier_export_stays(run, tmp_path):
+    folder = tmp_path / "csv"
+    to_csv.export(run, folder, Selection())
+    (folder / "notes.csv").write_text("mine")
+    quiet = Selection(start=0.0, end=0.3)
+    made = {file.name for file in to_csv.export(run, folder, quiet)}
+    assert "spikes.csv" not in made
+    assert {file.name for file in folder.iterdir()} == {*made, "notes.csv"}
+
+
 def test_nwb_passes_its_inspector_with_spikes_in_seconds(run, tmp_path):
     pynwb = pytest.importorskip("pynwb")
     inspector = pytest.importorskip("nwbinspector")

@@ -20,9 +20,11 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
     """Write `file`; signals are structs with time (s), values (single, SI) and unit.
 
     Raises:
-        RunFolderError: more samples than the format can hold, or not in the run.
+        RunFolderError: more samples than the format can hold, or a signal, rate or
+            time the run does not have.
         OSError: the file cannot be written.
     """
+    selection.check(run)
     names = selection.names(run)
     spans = selection.spans(run)
     interval = run.signal(names[0]).interval if names else 1.0

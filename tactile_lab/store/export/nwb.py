@@ -20,8 +20,8 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
     """Write `file`: codes with conversion and offset, units table, trials, stimulus.
 
     Raises:
-        RunFolderError: pynwb is not installed, a rate was asked for, or a signal is
-            not in the run.
+        RunFolderError: pynwb is not installed, a rate was asked for, or a signal or
+            time the run does not have.
         OSError: the file cannot be written.
     """
     try:
@@ -32,6 +32,7 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
         ) from error
     if selection.rate is not None:
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
+    selection.check(run)
     kind = "simulated" if run.simulated else "measured"
     notes = run.info.get("notes") or {}
     title = run.info.get("title") or run.info.get("protocol") or "run"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
+from tactile_lab.quantity import show
 from tactile_lab.store.run import Run
 
 PIECE = 1 << 18
@@ -34,6 +35,25 @@ class Selection:
     start: float = 0.0
     end: float | None = None
     rate: float | None = None
+
+    def check(self, run: Run) -> None:
+        """Refuse what the run does not have, before a file is touched.
+
+        Raises:
+            RunFolderError: a signal that is not stored, a rate above the run's, or a
+                time without anything in it.
+        """
+        names = self.names(run)
+        if names:
+            self.average(run.signal(names[0]).interval)
+        end = run.duration if self.end is None else self.end
+        found = self.spans(run) if names else self.start < min(end, run.duration)
+        if not found or end <= self.start:
+            raise RunFolderError(
+                f"The run has nothing from {show(self.start, 's')} until "
+                f"{show(end, 's')}; it lasts {show(run.duration, 's')}. Choose a part "
+                "that begins before it ends."
+            )
 
     def names(self, run: Run) -> tuple[str, ...]:
         """Signals to export.
@@ -66,7 +86,7 @@ class Selection:
     def spans(self, run: Run) -> list[tuple[int, int]]:
         """(first, one past last) sample of each stretch without a gap."""
         names = self.names(run)
-        if not names:
+        if not names or not run.samples:
             return []
         chosen = run.signal(names[0]).between(self.start, self.end)
         edges = [*run.axis.first.tolist(), run.samples]
