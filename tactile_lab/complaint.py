@@ -126,22 +126,23 @@ def _line(error: Any, kind: Any, at: tuple[str, ...], blame: Blame) -> str:
             f"Known: {', '.join(known)}."
         )
     if not loc:  # a check of the whole table
-        return f"{origin}: {place(full, table=True)}: {_sentence(_reason(error))}"
+        return f"{origin}: {place(full, table=True)}: {_sentence(reason(error))}"
     if error["type"] == "missing":
         return f"{origin}: {place(full)} is missing{_example(kind, loc)}."
-    reason = _reason(error)
+    told = reason(error)
     value = written(error["input"])
-    shown = "" if value in reason or isinstance(error["input"], dict) else f" = {value}"
-    if isinstance(error["input"], str) and value not in reason:
-        reason = reason.replace(error["input"], value.strip('"'))
-    return f"{origin}: {place(full)}{shown}: {_sentence(reason)}"
+    shown = "" if value in told or isinstance(error["input"], dict) else f" = {value}"
+    if isinstance(error["input"], str) and value not in told:
+        told = told.replace(error["input"], value.strip('"'))
+    return f"{origin}: {place(full)}{shown}: {_sentence(told)}"
 
 
 def _sentence(text: str) -> str:
     return text if text.endswith(("?", ".")) else f"{text}."
 
 
-def _reason(error: Any) -> str:
+def reason(error: Any) -> str:
+    """What pydantic found wrong with one value, for a person; no full stop."""
     kind = error["type"]
     if kind == "value_error":
         return str(error["ctx"]["error"]).rstrip(".")

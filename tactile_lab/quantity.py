@@ -41,7 +41,7 @@ def parse(text: str, unit: str) -> float:
             f'"{text}" is not a quantity; write a number, a space and a unit in '
             f"{unit}, such as {example(unit)}."
         )
-    digits, written = match.group(1).replace("−", "-"), match.group(2)
+    digits, written = typed(match.group(1)), match.group(2)
     if written is None:
         raise QuantityError(
             f'"{text}" has no unit; write for example {example(unit, digits)}.'
@@ -148,7 +148,26 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     text = f"{number:.{digits}g}"
     if "e+" in text and abs(number) < 1e4:
         text = f"{float(text):.0f}"
-    return f"{text} {prefix}{unit}".replace("-", "−").rstrip()
+    return printed(f"{text} {prefix}{unit}").rstrip()
+
+
+def exact(value: float, unit: str) -> str:
+    """The shortest text with a prefix that `parse` reads back to the same value."""
+    for digits in range(4, 18):
+        text = show(value, unit, digits)
+        if parse(text, unit) == value:
+            return text
+    return f"{value!r} {unit}"
+
+
+def printed(text: str) -> str:
+    """`text` with the true minus, as it is shown."""
+    return text.replace("-", "−")
+
+
+def typed(text: str) -> str:
+    """`text` with the minus that keyboards and files have."""
+    return text.replace("−", "-")
 
 
 def count(number: int, what: str) -> str:

@@ -10,8 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from gui.setup.texts import exact
-from tactile_lab.quantity import parse
+from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.table import dumped

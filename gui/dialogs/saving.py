@@ -22,7 +22,7 @@ from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.tokens import LIGHT, Tokens
 from gui.session.log import Level
-from gui.setup.texts import FieldError
+from gui.setup.parameter import FieldError
 from tactile_lab.errors import TactileLabError
 from tactile_lab.trace import FloatArray
 

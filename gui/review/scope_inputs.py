@@ -8,11 +8,11 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLineEdit, QWidget
 
 from gui.parts import column, empty, label, push
-from gui.setup.texts import exact, toml
+from gui.setup.parameter import toml
 from tactile_lab.bench import Channel
 from tactile_lab.errors import QuantityError, SceneError
 from tactile_lab.instruments.registry import scope_capability
-from tactile_lab.quantity import parse, show
+from tactile_lab.quantity import exact, parse, show
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.table import dumped
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from decimal import Decimal
+
 from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
@@ -15,14 +18,12 @@ from PySide6.QtWidgets import (
     QStyleOptionFrame,
     QToolButton,
     QVBoxLayout,
-    QWidget,
 )
 
 from gui.parts import label
-from gui.setup.kinds import Kind, Parameter
-from gui.setup.texts import FieldError, entry_of, exact, text_of
+from gui.setup.parameter import FieldError, Kind, Parameter, entry_of, text_of
 from tactile_lab.errors import QuantityError
-from tactile_lab.quantity import parse
+from tactile_lab.quantity import exact, parse
 
 NAME = 100
 """Width of the column of names, px: longer ones take two lines."""
@@ -38,9 +39,12 @@ class QuantityEdit(QLineEdit):
     While nobody edits it, text longer than the field is shortened.
     """
 
+    edited = Signal()
+
     def __init__(self, parameter: Parameter) -> None:
         super().__init__()
         self._parameter = parameter
+        self.textEdited.connect(self.edited)
 
     @property
     def shown(self) -> str:
@@ -76,19 +80,82 @@ class QuantityEdit(QLineEdit):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Step with the arrow keys."""
         unit = self._parameter.unit
-        steps = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}.get(Qt.Key(event.key()), 0)
-        if not steps or unit is None or self._parameter.kind is not Kind.QUANTITY:
+        up = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}.get(Qt.Key(event.key()), 0)
+        if not up or unit is None or self._parameter.kind is not Kind.QUANTITY:
             super().keyPressEvent(event)
             return
         try:
             value = parse(self.text(), unit.symbol)
         except QuantityError:
             return
-        step = 10.0 ** (len(f"{abs(value):.0e}") and int(f"{abs(value):.0e}"[2:]))
-        if value == step and steps < 0:
+        step = leading_place(value)
+        if value == step and up < 0:
             step /= 10
-        self.setText(exact(float(f"{value + steps * step:.12g}"), unit.symbol))
-        self.textEdited.emit(self.text())
+        self.setText(exact(float(f"{value + up * step:.12g}"), unit.symbol))
+        self.edited.emit()
+
+    def put(self, text: str) -> None:
+        """Show `text` from its start."""
+        self.setText(text)
+        self.setCursorPosition(0)
+
+
+def leading_place(value: float) -> float:
+    """Worth of one in the leading digit's place: 100 of 250, 0.01 of 0.03; 1 of 0."""
+    return 10.0 ** Decimal(repr(value)).adjusted() if value else 1.0
+
+
+class Switch(QCheckBox):
+    """On or off; its text is "True" or "False"."""
+
+    edited = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.toggled.connect(self.edited)
+
+    def text(self) -> str:
+        """What it says."""
+        return str(self.isChecked())
+
+    def put(self, text: str) -> None:
+        """Switch."""
+        self.setChecked(text == "True")
+
+
+class Choice(QComboBox):
+    """One of several words."""
+
+    edited = Signal()
+
+    def __init__(self, choices: Sequence[str]) -> None:
+        super().__init__()
+        self.addItems(list(choices))
+        self.currentTextChanged.connect(self.edited)
+
+    def text(self) -> str:
+        """The word chosen."""
+        return self.currentText()
+
+    def put(self, text: str) -> None:
+        """Choose a word."""
+        self.setCurrentText(text)
+
+
+def editor(parameter: Parameter) -> QuantityEdit | Switch | Choice:
+    """What edits a parameter: it has `text`, `put` and `edited`."""
+    if parameter.kind is Kind.SWITCH:
+        return Switch()
+    if parameter.kind is Kind.CHOICE:
+        return Choice(parameter.choices)
+    edit = QuantityEdit(parameter)
+    if parameter.optional:
+        edit.setPlaceholderText("automatic")
+    elif not parameter.required and not text_of(parameter, parameter.default):
+        edit.setPlaceholderText("none")
+    if parameter.kind in (Kind.QUANTITY, Kind.INTEGER, Kind.NUMBER):
+        edit.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return edit
 
 
 class Field(QFrame):
@@ -105,28 +172,26 @@ class Field(QFrame):
         self._mark.setFixedSize(3, 22)
         self._reason = label("", "error", wrap=True)
         self._reason.hide()
-        self._edit: QLineEdit | None = None
-        self._box: QComboBox | None = None
-        self._check: QCheckBox | None = None
         name = label(parameter.title, wrap=True)
-        name.setToolTip(self._tip())
+        name.setToolTip(parameter.help)
         name.setFixedWidth(NAME)
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
         row.addWidget(self._mark)
         row.addWidget(name, 0)
-        editor = self._editor()
-        name.setBuddy(editor)
-        self.setFocusProxy(editor)
-        editor.setAccessibleName(parameter.title)
-        editor.setAccessibleDescription(self._tip())
-        editor.setToolTip(self._tip())
-        if self._check is None:
-            row.addWidget(editor, 1)
-        else:
-            row.addWidget(editor)
+        self._editor = editor(parameter)
+        self._editor.edited.connect(self._edited)
+        name.setBuddy(self._editor)
+        self.setFocusProxy(self._editor)
+        self._editor.setAccessibleName(parameter.title)
+        self._editor.setAccessibleDescription(parameter.help)
+        self._editor.setToolTip(parameter.help)
+        if isinstance(self._editor, Switch):
+            row.addWidget(self._editor)
             row.addStretch(1)
+        else:
+            row.addWidget(self._editor, 1)
         if parameter.kind is Kind.FILE:
             row.addWidget(self._browse())
         whole = QVBoxLayout(self)
@@ -139,22 +204,11 @@ class Field(QFrame):
     @property
     def text(self) -> str:
         """What stands in the field."""
-        if self._check is not None:
-            return str(self._check.isChecked())
-        if self._box is not None:
-            return self._box.currentText()
-        assert self._edit is not None
-        return self._edit.text()
+        return self._editor.text()
 
     def set_text(self, text: str) -> None:
         """Put text into the field."""
-        if self._check is not None:
-            self._check.setChecked(text == "True")
-        elif self._box is not None:
-            self._box.setCurrentText(text)
-        elif self._edit is not None:
-            self._edit.setText(text)
-            self._edit.setCursorPosition(0)
+        self._editor.put(text)
         self.check()
 
     @property
@@ -181,54 +235,22 @@ class Field(QFrame):
         colour = "palette(highlight)" if self.is_changed else "transparent"
         self._mark.setStyleSheet(f"background: {colour}; border-radius: 1px;")
         self._mark.setToolTip(f"Default: {self.default or 'none'}")
-        if self._edit is not None:
-            self._edit.setToolTip(f"{self.text}\n{self._tip()}".strip())
+        if isinstance(self._editor, QuantityEdit):
+            self._editor.setToolTip(f"{self.text}\n{self.parameter.help}".strip())
 
     def show_problem(self, problem: str) -> None:
         """Show why the value cannot be used, "" if it can."""
         self._reason.setText(problem)
         self._reason.setVisible(bool(problem))
-        if (
-            self._edit is not None
-            and self._edit.property("invalid") != str(bool(problem)).lower()
-        ):
-            self._edit.setProperty("invalid", str(bool(problem)).lower())
-            self._edit.style().unpolish(self._edit)
-            self._edit.style().polish(self._edit)
+        invalid = str(bool(problem)).lower()
+        if self._editor.property("invalid") != invalid:
+            self._editor.setProperty("invalid", invalid)
+            self._editor.style().unpolish(self._editor)
+            self._editor.style().polish(self._editor)
 
     def lock(self, locked: bool) -> None:
         """Forbid or allow editing."""
-        for editor in (self._edit, self._box, self._check):
-            if editor is not None:
-                editor.setEnabled(not locked)
-
-    def _tip(self) -> str:
-        unit = self.parameter.unit
-        limits = unit.limits() if unit is not None else ""
-        parts = [self.parameter.help, f"Allowed: {limits}." if limits else ""]
-        if self.default:
-            parts.append(f"Default: {self.default}.")
-        return " ".join(part for part in parts if part)
-
-    def _editor(self) -> QWidget:
-        if self.parameter.kind is Kind.SWITCH:
-            self._check = QCheckBox()
-            self._check.toggled.connect(self._edited)
-            return self._check
-        if self.parameter.kind is Kind.CHOICE:
-            self._box = QComboBox()
-            self._box.addItems(list(self.parameter.choices))
-            self._box.currentTextChanged.connect(self._edited)
-            return self._box
-        self._edit = QuantityEdit(self.parameter)
-        self._edit.textEdited.connect(self._edited)
-        if self.parameter.optional:
-            self._edit.setPlaceholderText("automatic")
-        elif not self.parameter.required and not self.default:
-            self._edit.setPlaceholderText("none")
-        if self.parameter.kind in (Kind.QUANTITY, Kind.INTEGER, Kind.NUMBER):
-            self._edit.setAlignment(Qt.AlignmentFlag.AlignRight)
-        return self._edit
+        self._editor.setEnabled(not locked)
 
     def _browse(self) -> QToolButton:
         button = QToolButton()

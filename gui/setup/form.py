@@ -1,15 +1,17 @@
-"""The form: generated from a protocol's typed parameters, never written by hand."""
+"""The form: generated from the typed keys of a protocol, or of any table of a scene."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from pydantic.fields import FieldInfo
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QWidget
 
 from gui.parts import column, empty
 from gui.setup.fields import Field
-from gui.setup.kinds import parameter
-from gui.setup.texts import FieldError
+from gui.setup.parameter import parameter
 from tactile_lab.trial import Protocol
 
 
@@ -25,14 +27,28 @@ class Form(QWidget):
         self.protocol: type[Protocol] | None = None
         self._shown: dict[str, str] = {}
         self._locked = False
+        self._table = "protocol"
         self._rows = column(self, spacing=6)
 
     def show_protocol(self, kind: type[Protocol], values: dict[str, object]) -> None:
         """Make the fields of a protocol; `values` are SI, by key."""
-        empty(self._rows)
         self.protocol = kind
+        self.show_table("protocol", kind.parameters(), values)
+
+    def show_table(
+        self, name: str, keys: Mapping[str, FieldInfo], values: Mapping[str, object]
+    ) -> None:
+        """Make the fields of a table of a scene.
+
+        Args:
+            name: of the table, such as "record".
+            keys: what it may hold, as `tactile_lab.table.fields_of` tells.
+            values: SI, by key; the default where one is not among them.
+        """
+        empty(self._rows)
+        self._table = name
         self.fields = []
-        for key, info in kind.parameters().items():
+        for key, info in keys.items():
             wanted = parameter(key, info)
             field = Field(wanted, values.get(key, wanted.default))
             field.lock(self._locked)
@@ -89,7 +105,7 @@ class Form(QWidget):
         return ""
 
     def overrides(self) -> list[str]:
-        """The form as ``--set`` options: ``protocol.key=value``.
+        """The form as ``--set`` options: ``table.key=value``.
 
         Raises:
             FieldError: a field cannot be used.
@@ -98,7 +114,7 @@ class Form(QWidget):
         for field in self.fields:
             entry = field.entry()
             if entry is not None:
-                made.append(f"protocol.{field.parameter.key}={entry}")
+                made.append(f"{self._table}.{field.parameter.key}={entry}")
         return made
 
     def lock(self, locked: bool) -> None:
@@ -135,6 +151,3 @@ class _Edit(QUndoCommand):
         if not self._done:
             self._form.set_texts(self._after)
         self._done = True
-
-
-__all__ = ["FieldError", "Form"]

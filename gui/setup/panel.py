@@ -16,12 +16,12 @@ from gui.session.session import Session
 from gui.setup.buttons import Buttons
 from gui.setup.estimate import EstimateView
 from gui.setup.page import Page
+from gui.setup.parameter import FieldError
 from gui.setup.picker import Picker, about
 from gui.setup.preset_button import PresetButton
 from gui.setup.queue import QueueView
 from gui.setup.strip import Strip
 from gui.setup.subject import Subject
-from gui.setup.texts import FieldError
 from gui.state import Snapshot, State, run_problem
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError

@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QLineEdit, QMenu, QWidgetAction
 from gui.look.theme import Theme
 from gui.parts import IconButton
 from gui.setup.form import Form
+from gui.setup.parameter import FieldError, text_of
 from gui.setup.presets import parameters, presets, save_preset
-from gui.setup.texts import FieldError, text_of
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 

@@ -9,10 +9,9 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 
 from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
-from gui.setup.kinds import Kind, parameter
-from gui.setup.texts import FieldError, entry_of, exact, listed
+from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
-from tactile_lab.quantity import parse
+from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
 
 NAMES = [name for name in protocol_names() if name != "waveform"]

@@ -1,0 +1,218 @@
+"""One key of a table as a form edits it: kind, text in the field, what a file holds.
+
+No Qt here. Any table can be a form: `tactile_lab.table.fields_of` has its keys.
+"""
+
+from __future__ import annotations
+
+import json
+import types
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
+
+from tactile_lab.complaint import reason
+from tactile_lab.quantity import Unit, exact, parse, printed, typed
+
+
+class Kind(Enum):
+    """How a parameter is edited."""
+
+    QUANTITY = "quantity"
+    QUANTITIES = "quantities"
+    INTEGER = "integer"
+    NUMBER = "number"
+    SWITCH = "switch"
+    CHOICE = "choice"
+    FILE = "file"
+    TEXT = "text"
+    OTHER = "other"
+
+
+PLAIN = {bool: Kind.SWITCH, int: Kind.INTEGER, float: Kind.NUMBER, str: Kind.TEXT}
+
+
+class FieldError(ValueError):
+    """What stands in a field cannot be used; the message says why."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One key of a table as a form needs it.
+
+    Attributes:
+        key: its name in the table.
+        info: type, limits, default and description.
+        kind: how it is edited.
+        unit: of a quantity or of each of several; None otherwise.
+        optional: whether it may be left out.
+        choices: of a choice.
+    """
+
+    key: str
+    info: FieldInfo
+    kind: Kind
+    unit: Unit | None
+    optional: bool
+    choices: tuple[str, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The key as a person reads it."""
+        words = self.key.replace("_", " ")
+        return words if words[:1].isupper() else words[:1].upper() + words[1:]
+
+    @property
+    def required(self) -> bool:
+        """Whether it has no default."""
+        return self.info.is_required()
+
+    @property
+    def default(self) -> Any:
+        """Its default; None where it must be given."""
+        if self.required:
+            return None
+        return self.info.get_default(call_default_factory=True)
+
+    @property
+    def help(self) -> str:
+        """What it is and what is allowed, for a person."""
+        limits = self.unit.limits() if self.unit is not None else ""
+        parts = [self.info.description, f"Allowed: {limits}." if limits else ""]
+        default = text_of(self, self.default)
+        parts.append(f"Default: {default}." if default else "")
+        return " ".join(part for part in parts if part)
+
+    @cached_property
+    def type(self) -> TypeAdapter[Any]:
+        """Validates one value."""
+        kind: Any = self.info.annotation
+        for constraint in self.info.metadata:
+            kind = Annotated[kind, constraint]
+        return TypeAdapter(kind, config=ConfigDict(strict=True))
+
+
+def parameter(key: str, info: FieldInfo) -> Parameter:
+    """The parameter that a field of a table describes."""
+    inner, optional, units = _taken_apart(info.annotation)
+    units += [entry for entry in info.metadata if isinstance(entry, Unit)]
+    choices: tuple[str, ...] = ()
+    if get_origin(inner) is tuple and (items := _taken_apart(get_args(inner)[0])[2]):
+        kind, units = Kind.QUANTITIES, items
+    elif units:
+        kind = Kind.QUANTITY
+    elif get_origin(inner) is Literal:
+        kind, choices = Kind.CHOICE, tuple(str(choice) for choice in get_args(inner))
+    elif inner is str and key in ("file", "path"):
+        kind = Kind.FILE
+    else:
+        kind = PLAIN.get(inner, Kind.OTHER)
+    return Parameter(key, info, kind, units[0] if units else None, optional, choices)
+
+
+def _taken_apart(kind: Any) -> tuple[Any, bool, list[Unit]]:
+    """A type without Annotated and None, whether None was allowed, and its units."""
+    if hasattr(kind, "__metadata__"):
+        inner, optional, units = _taken_apart(kind.__origin__)
+        kept = [entry for entry in kind.__metadata__ if isinstance(entry, Unit)]
+        return inner, optional, units + kept
+    if get_origin(kind) in (Union, types.UnionType):
+        rest = [one for one in get_args(kind) if one is not type(None)]
+        if len(rest) == 1:
+            inner, _, units = _taken_apart(rest[0])
+            return inner, True, units
+        return kind, len(rest) < len(get_args(kind)), []
+    return kind, False, []
+
+
+def text_of(parameter: Parameter, value: Any) -> str:
+    """A parameter's SI value as it stands in its field."""
+    if value is None:
+        return ""
+    unit = parameter.unit
+    if parameter.kind is Kind.QUANTITY and unit is not None:
+        return exact(float(value), unit.symbol)
+    if parameter.kind is Kind.QUANTITIES and unit is not None:
+        return listed([float(v) for v in value], unit.symbol)
+    return toml(value) if parameter.kind is Kind.OTHER else str(value)
+
+
+def listed(values: list[float], symbol: str) -> str:
+    """Values with one unit at the end where that is exact: "80, 120, 160 mN"."""
+    if not values:
+        return ""
+    unit = exact(max(values, key=abs), symbol).partition(" ")[2]
+    factor = parse(f"1 {unit}", symbol)
+    short = [f"{value / factor:.10g}" for value in values]
+    if [parse(f"{text} {unit}", symbol) for text in short] == values:
+        return printed(f"{', '.join(short)} {unit}")
+    return ", ".join(exact(value, symbol) for value in values)
+
+
+def entry_of(parameter: Parameter, text: str) -> str | None:
+    """What a scene file holds for the text in a field; None to leave the key out.
+
+    Raises:
+        FieldError: the text cannot be used; says what is allowed.
+    """
+    text = text.strip()
+    if not text:
+        if parameter.optional or not parameter.required:
+            return None
+        raise FieldError(f"{parameter.title} must be given.")
+    if parameter.kind is Kind.OTHER:
+        return text
+    value = _value(parameter, text)
+    try:
+        parameter.type.validate_python(value)
+    except ValidationError as wrong:
+        raise FieldError(f"{reason(wrong.errors()[0])}.") from wrong
+    return toml(value)
+
+
+def _value(parameter: Parameter, text: str) -> Any:
+    """What a field's text means, not yet checked; quantities are texts."""
+    symbol = parameter.unit.symbol if parameter.unit is not None else ""
+    match parameter.kind:
+        case Kind.QUANTITY:
+            return _quantity(text, symbol)
+        case Kind.QUANTITIES:
+            parts = [one.strip() for one in text.replace(";", ",").split(",")]
+            parts = [one for one in parts if one] or [""]
+            shared = parts[-1].partition(" ")[2].strip() or symbol
+            return tuple(_quantity(one, shared) for one in parts if one)
+        case Kind.SWITCH:
+            return text == "True"
+        case Kind.INTEGER | Kind.NUMBER as kind:
+            number, what = (
+                (int, "whole number") if kind is Kind.INTEGER else (float, "number")
+            )
+            try:
+                return number(typed(text))
+            except ValueError as error:
+                raise FieldError(f"{text} is not a {what}.") from error
+    return text
+
+
+def _quantity(text: str, unit: str) -> str:
+    """Text with a unit: a bare number gets `unit`."""
+    text = typed(text)
+    try:
+        float(text)
+    except ValueError:
+        return text
+    return f"{text} {unit}"
+
+
+def toml(value: Any) -> str:
+    """A value in one line of TOML."""
+    if isinstance(value, dict):
+        inner = ", ".join(f"{key} = {toml(item)}" for key, item in value.items())
+        return f"{{ {inner} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml(item) for item in value)}]"
+    return json.dumps(value, ensure_ascii=False)
