@@ -72,11 +72,14 @@ def usbtmc(table: ScopeSpec, world: World) -> UsbtmcScope:
     from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
 
     row = usbtmc_dialect(table)
+    scope = SimulatedDs1000z(
+        _wired(world), world.clock, clock_error=world.simulated.clock_error
+    )
     device = SimulatedDevice(
         vendor=row.vendor,
         product=row.product,
         serial=table.serial or "DS1ZSIM0001",
-        function=UsbtmcFunction(SimulatedDs1000z(_wired(world), world.clock)),
+        function=UsbtmcFunction(scope),
         interface=INTERFACE,
         faults=world.faults.get("scope", ()),
     )

@@ -84,6 +84,7 @@ class SimulatedDs1000z:
         serial: serial number.
         variant: model.
         sluggish: how many status questions after arming still tell of the last record.
+        clock_error: relative error of its sample clock; 50e-6 is 50 ppm.
     """
 
     def __init__(
@@ -94,6 +95,7 @@ class SimulatedDs1000z:
         serial: str = "DS1ZSIM0001",
         variant: str = "DS1104Z",
         sluggish: int = 0,
+        clock_error: float = 0.0,
     ) -> None:
         self.identity = f"RIGOL TECHNOLOGIES,{variant},{serial},00.04.04"
         self.channels = {str(n): _Channel() for n in range(1, 5)}
@@ -103,6 +105,7 @@ class SimulatedDs1000z:
         self._depth: int | None = None
         self._running = True
         self._sluggish, self._stale = sluggish, 0
+        self._stretch = 1 + clock_error
         self._record: _Record | None = None
         self._acquisition: Acquisition | None = None
         self._reading = {"source": "1", "mode": "NORM", "form": "BYTE"}
@@ -258,7 +261,7 @@ class SimulatedDs1000z:
     def _sample(self, acquisition: Acquisition) -> int:
         """Samples taken by now."""
         elapsed = self._clock.now() - acquisition.started
-        return math.floor(elapsed / acquisition.interval + 1e-6)
+        return math.floor(elapsed / (acquisition.interval * self._stretch) + 1e-6)
 
     def _status(self) -> str:
         record = self._record

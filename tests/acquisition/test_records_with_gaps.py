@@ -99,6 +99,24 @@ def test_every_sample_lies_at_its_own_time(tmp_path, bench):
         assert (shunt[:] < bounds.max(axis=0) + 2 * code).all()
 
 
+def test_probes_in_the_wrong_place_show(tmp_path, bench):
+    mistakes = (
+        'simulated.swapped=["V_C1", "V_K"]',
+        'simulated.open_probes=["coil_current"]',
+        'simulated.noise={ V_C1 = "200 mV" }',
+    )
+    scene = load(
+        "demo", (*SHORT, THREE, "record.sample_rate=1 MS/s", *mistakes), str(bench)
+    )
+    done = Execution(scene, tmp_path / "runs").run()
+    with Run.load(done.folder) as run:
+        assert abs(run.signal("V_C1")[:10_000].mean()) < 0.1
+        swapped = run.signal("V_K")[:10_000]
+        assert swapped.mean() == pytest.approx(4.34, abs=0.1)
+        assert swapped.std() == pytest.approx(0.2, rel=0.1)
+        assert abs(run.signal("coil_current")[:]).max() < 0.5
+
+
 def test_a_planned_pause_is_no_gap(tmp_path, bench):
     rate = "record.sample_rate=1 MS/s"
     few = ("protocol.hold=0.3 s", "protocol.gap=1 s")

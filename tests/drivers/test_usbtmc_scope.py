@@ -43,10 +43,16 @@ VOLTS = {
 
 class Lab:
     def __init__(
-        self, *faults: UsbFault, sluggish: int = 0, **function: object
+        self,
+        *faults: UsbFault,
+        sluggish: int = 0,
+        clock_error: float = 0.0,
+        **function: object,
     ) -> None:
         self.clock = SimulatedClock()
-        self.rigol = SimulatedDs1000z(Voltages(VOLTS), self.clock, sluggish=sluggish)
+        self.rigol = SimulatedDs1000z(
+            Voltages(VOLTS), self.clock, sluggish=sluggish, clock_error=clock_error
+        )
         self.function = UsbtmcFunction(self.rigol, **function)  # type: ignore[arg-type]
         self.device = SimulatedDevice(
             vendor=0x1AB1, product=0x04CE, serial="DS1ZSIM0001", maker="Rigol",
@@ -91,6 +97,21 @@ def test_records_mean_the_volts_at_the_inputs(header_once: bool) -> None:
     firsts = [block.first for block in blocks]
     assert all(b > a + 30_000 for a, b in itertools.pairwise(firsts))
     assert blocks[0].overrange == (False, False, False)
+
+
+def test_a_wrong_sample_clock_does_not_shift_records() -> None:
+    lab, seen = Lab(clock_error=0.01), []
+
+    class Source(Voltages):
+        def render(self, acquisition, first, samples):  # type: ignore[no-untyped-def]
+            begun = acquisition.started + first * acquisition.interval * 1.01
+            seen.append(begun - (lab.clock.now() - samples * acquisition.interval))
+            return super().render(acquisition, first, samples)
+
+    lab.rigol._source = Source(VOLTS)
+    lab.records(40)
+    # each is read within some polls after its end, the last as soon as the first
+    assert -0.1 < min(seen) and max(seen) < 1e-3
 
 
 def test_out_of_range_is_flagged() -> None:
