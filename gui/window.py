@@ -130,7 +130,7 @@ class Window(QMainWindow):
             self.closing.ask(self.session.snapshot())
             return
         if self.session.busy or self.session.monitor.alive:
-            self.session.watch(False)
+            self.session.show_monitor(False)
             self._leaving = True
             event.ignore()
             return
@@ -243,9 +243,9 @@ class Window(QMainWindow):
         self.centre.empty.recent_asked.connect(self.screen_.open_run)
         self.closing.stopped.connect(self.leave)
         self.centre.tools.export_asked.connect(self.actions_.export_view)
-        self.centre.tools.monitor.clicked.connect(session.watch)
-        self.centre.watch_bar.record_asked.connect(session.record)
-        self.centre.watch_bar.closed.connect(lambda: session.watch(False))
+        self.centre.tools.monitor.clicked.connect(session.show_monitor)
+        self.centre.monitor_bar.record_asked.connect(session.record)
+        self.centre.monitor_bar.closed.connect(lambda: session.show_monitor(False))
         session.monitor.recorded.connect(lambda folder: self.screen_.list_runs())
         self.setup.scene_wanted.connect(self.screen_.ask_scene)
         manual = self.review.manual

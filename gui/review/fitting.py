@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import Source
 from gui.session.finding import Finding
-from gui.session.fit import Beside, Fit, FitSteps, beside
+from gui.session.fit import Fit, FitInput, FitSteps, fit_input
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 
@@ -30,7 +30,7 @@ class Fitting(QObject):
         self._session = session
         self._serial = 0
         self._busy = False
-        self._next: tuple[tuple[Finding, ...], Beside] | None = None
+        self._next: tuple[tuple[Finding, ...], FitInput] | None = None
 
     def ask(self, findings: Sequence[Finding], source: Source | None) -> None:
         """Fit `findings`, and compare `source` with the model beside it."""
@@ -39,7 +39,7 @@ class Fitting(QObject):
             self._next = None
             self.fitted.emit(None)
             return
-        self._next = tuple(findings), beside(source)
+        self._next = tuple(findings), fit_input(source)
         self._go_on()
 
     def forget(self) -> None:

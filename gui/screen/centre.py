@@ -25,8 +25,8 @@ from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import column, label, line, panel, push
 from gui.record.log import LogView
+from gui.record.monitor_bar import MonitorBar
 from gui.record.progress import Progress
-from gui.record.watching import WatchBar
 from gui.screen.compare_bar import CompareBar
 
 FOLLOWED = 5.0
@@ -124,8 +124,8 @@ class Centre(QWidget):
         above.addWidget(self.notice)
         self.compare_bar = CompareBar(self.stack, self.view, theme)
         above.addWidget(self.compare_bar)
-        self.watch_bar = WatchBar()
-        above.addWidget(self.watch_bar)
+        self.monitor_bar = MonitorBar()
+        above.addWidget(self.monitor_bar)
         above.addWidget(self.stack, 1)
         lower = panel()
         below = column(lower, spacing=7)

@@ -88,7 +88,7 @@ class Frames(QObject):
 
     def _show_monitor(self) -> None:
         panels, monitor = self._panels, self._panels.session.monitor
-        bar = panels.centre.watch_bar
+        bar = panels.centre.monitor_bar
         if monitor.alive:
             bar.show_sensor(monitor.sensor, recording=monitor.recording)
         elif bar.isVisible():

@@ -71,7 +71,7 @@ class Bar:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class FitInput:
     """Measured and modelled signals of the run so far, taken at one instant."""
 
     spikes: FloatArray
@@ -96,11 +96,11 @@ class Fit:
     agreement: Agreement | None
 
 
-def beside(source: Source) -> Beside:
+def fit_input(source: Source) -> FitInput:
     """What `fit` compares; cheap, and called where the source may be read."""
     reach = source.reach
     twin = source.twin_spikes
-    return Beside(
+    return FitInput(
         source.spikes.copy(),
         twin[twin < reach],
         {
@@ -119,14 +119,14 @@ class FitSteps(Job[Fit]):
 
     name = "fit"
     steps: tuple[Finding, ...]
-    seen: Beside
+    seen: FitInput
 
     def work(self, engine: Engine) -> Fit:
         """The fit."""
         return fit(self.steps, self.seen)
 
 
-def fit(findings: Sequence[Finding], seen: Beside) -> Fit:
+def fit(findings: Sequence[Finding], seen: FitInput) -> Fit:
     """Fit the steps so far, and compare the run with the model."""
     steps = [f for f in findings if f.level is not None]
     model = [_modelled(f, seen.twin_spikes) for f in steps] if _has_model(seen) else []
@@ -151,7 +151,7 @@ def fit(findings: Sequence[Finding], seen: Beside) -> Fit:
     return Fit(cards, (*bars, *_spikes(seen)), points, apart.get("V_C1"))
 
 
-def _has_model(seen: Beside) -> bool:
+def _has_model(seen: FitInput) -> bool:
     return bool(seen.twin_spikes.size) or any(
         not model.empty for _, model in seen.voltages.values()
     )
@@ -242,7 +242,7 @@ def _agreement(measured: Trace, model: Trace) -> Agreement | None:
     return Agreement(rms / (extent[1] - extent[0]), rms)
 
 
-def _spikes(seen: Beside) -> list[Bar]:
+def _spikes(seen: FitInput) -> list[Bar]:
     if not (seen.spikes.size and seen.twin_spikes.size):
         return []
     found = match(seen.spikes, seen.twin_spikes)

@@ -156,7 +156,7 @@ class Session(QObject):
             self.manual.start(self.bench.request)
             self.status.changed.emit()
 
-    def watch(self, on: bool) -> None:
+    def show_monitor(self, on: bool) -> None:
         """Show the sensor live between runs, coil off; or stop that."""
         if not on:
             self.monitor.stop("monitor off")

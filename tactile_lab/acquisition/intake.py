@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,8 @@ from tactile_lab.acquisition.live import Live
 from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import SamplesLostError
 
-
-class OnlineDetector(Protocol):
-    """Finds spikes in one channel's consecutive codes; see `spikes.detector`."""
-
-    def feed(self, first: int, codes: NDArray[np.int16]) -> NDArray[np.void]:
-        """Spikes completed by these codes: fields sample, amplitude, width."""
-        ...
-
-    def flush(self) -> NDArray[np.void]:
-        """Spikes that were still open; the stream has ended."""
-        ...
+if TYPE_CHECKING:  # compiled code, which a run without spikes does not load
+    from tactile_lab.spikes.detector import Detector, ResetDetector
 
 
 class Intake:
@@ -39,7 +30,7 @@ class Intake:
         self._live = live
         self._row = 0
         self._journal: Journal | None = None
-        self._detector: OnlineDetector | None = None
+        self._detector: Detector | ResetDetector | None = None
         self._stream: Stream | None = None
         self._field: FieldMean | None = None
         self._field_readings: list[Reading] = []
@@ -66,7 +57,7 @@ class Intake:
         stream: Stream,
         start: float,
         journal: Journal,
-        detector: OnlineDetector | None = None,
+        detector: Detector | ResetDetector | None = None,
         row: int = 0,
     ) -> None:
         """A stream starts.

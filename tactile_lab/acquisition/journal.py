@@ -24,7 +24,7 @@ class Journal(Protocol):
 
     def gap(self, missing: int) -> None:
         """A stream ended so many samples after the last that came."""
-        ...
+        return
 
     def spikes(self, times: NDArray[np.float64], found: NDArray[np.void]) -> None:
         """Store detected spikes with their times on the run's axis."""
@@ -38,7 +38,7 @@ class Journal(Protocol):
         ratio: float | None = None,
     ) -> None:
         """A set-point as applied, A; read-back and resistance over cold, if known."""
-        ...
+        return
 
     def field(self, time: float, field: float) -> None:
         """A teslameter reading, T."""
@@ -46,7 +46,7 @@ class Journal(Protocol):
 
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
         """Correct the running segment's times by `offset` s and `drift` s/s."""
-        ...
+        return
 
     def event(self, time: float, kind: str, text: str) -> None:
         """Something happened."""
@@ -54,8 +54,8 @@ class Journal(Protocol):
 
     def outcome(self, outcome: Outcome) -> None:
         """A trial ended."""
-        ...
+        return
 
     def pause(self, start: float, end: float) -> None:
         """A planned pause: nothing was streamed from `start` to `end` s; no gap."""
-        ...
+        return

@@ -17,7 +17,6 @@ from tactile_lab.acquisition.alignment import align
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
-from tactile_lab.trial import Outcome
 
 Spikes = tuple[NDArray[np.float64], NDArray[Any]]
 
@@ -77,8 +76,8 @@ class Held:
         )
 
 
-class Ring:
-    """A `Journal` that holds the newest samples and what happened meanwhile.
+class Ring(Journal):
+    """Holds the newest samples and what happened meanwhile.
 
     Args:
         length: how much it holds, s.
@@ -131,9 +130,6 @@ class Ring:
             while self._field and self._field[0][0] < oldest:
                 self._field.popleft()
 
-    def gap(self, missing: int) -> None:
-        """Nothing: what is held ends with its last sample."""
-
     def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
         """Hold spikes."""
         with self._lock:
@@ -145,27 +141,9 @@ class Ring:
             self._field.append((time, field))
 
     def event(self, time: float, kind: str, text: str) -> None:
-        """Hold what happened; the few events of a watch are all held."""
+        """Hold what happened; the few events of a monitor are all held."""
         with self._lock:
             self._events.append((time, kind, text))
-
-    def current(
-        self,
-        time: float,
-        setpoint: float,
-        measured: float | None,
-        ratio: float | None = None,
-    ) -> None:
-        """Nothing: the coil is off."""
-
-    def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
-        """Nothing: without a current there are no edges to align by."""
-
-    def outcome(self, outcome: Outcome) -> None:
-        """Nothing: the parts of a watch mean nothing."""
-
-    def pause(self, start: float, end: float) -> None:
-        """Nothing: a watch has no pauses."""
 
     def _time(self, sample: int) -> float:
         assert self._stream is not None

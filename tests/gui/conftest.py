@@ -78,7 +78,7 @@ class Lab:
         self.until(window.isActiveWindow)
         if session.busy:
             session.stop("test is over")
-        session.watch(False)
+        session.show_monitor(False)
         self.until(lambda: not session.busy and not session.monitor.alive)
         self.until(lambda: session.link.idle)
         session.acknowledge()

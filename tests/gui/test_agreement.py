@@ -3,7 +3,7 @@
 import numpy as np
 
 from gui.session.agreement import Agreement
-from gui.session.fit import Beside, fit
+from gui.session.fit import FitInput, fit
 from gui.state import Lamp
 from tactile_lab.trace import Trace
 
@@ -56,7 +56,7 @@ def test_in_step_is_a_residual_within_its_band() -> None:
     model = 4 + 0.5 * np.sin(time)
     for off, in_step in ((0.049, True), (0.051, False)):
         both = (Trace.line(time, model + off), Trace.line(time, model))
-        found = fit([], Beside(np.empty(0), np.empty(0), {"V_C1": both})).agreement
+        found = fit([], FitInput(np.empty(0), np.empty(0), {"V_C1": both})).agreement
         assert found is not None and found.in_step is in_step
         assert abs(found.rms - off) < 1e-6
         assert abs(found.error - off / 1.0) < 1e-3, "over the range of V_C1, 1 V"

@@ -11,7 +11,7 @@ from gui.lanes.readings import interval_text
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.wording import unbroken
 from gui.session.finding import Finding, finding
-from gui.session.fit import Beside, fit
+from gui.session.fit import FitInput, fit
 from tactile_lab.trace import Trace
 
 HOLD = (0.0, 2.0)
@@ -28,11 +28,11 @@ STEPS = [step(0.08, 0, 0), step(0.12, 5, 1), step(0.16, 10, 2), step(0.2, 15, 3)
 TRAIN = np.concatenate([s.start + s.times for s in STEPS])
 
 
-def seen(late: float = 0.0, off: float = 0.0) -> Beside:
+def seen(late: float = 0.0, off: float = 0.0) -> FitInput:
     time = np.linspace(0, 12, 500)
     model = 4 + 0.5 * np.sin(time)
     both = (Trace.line(time, model + off), Trace.line(time, model))
-    return Beside(TRAIN + late, TRAIN, {"V_C1": both})
+    return FitInput(TRAIN + late, TRAIN, {"V_C1": both})
 
 
 def test_cards_tell_onset_slope_and_why_not() -> None:
@@ -60,7 +60,7 @@ def test_bars_measure_the_distance_to_the_model() -> None:
 
 
 def test_no_model_no_bars() -> None:
-    alone = Beside(TRAIN, np.empty(0), {"V_C1": (Trace.nothing(), Trace.nothing())})
+    alone = FitInput(TRAIN, np.empty(0), {"V_C1": (Trace.nothing(), Trace.nothing())})
     found = fit(STEPS, alone)
     assert found.bars == () and found.model == ()
     assert found.cards[0].model == ""

@@ -443,8 +443,8 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
 def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     window, session = lab.window, lab.session
     window.centre.tools.monitor.click()
-    lab.until(lambda: "silent" in window.centre.watch_bar.words)
-    assert "mV" in window.centre.watch_bar.words
+    lab.until(lambda: "silent" in window.centre.monitor_bar.words)
+    assert "mV" in window.centre.monitor_bar.words
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
     assert session.state is State.READY
@@ -461,9 +461,9 @@ def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
 
 def test_record_keeps_what_the_monitor_saw(lab) -> None:
     window, session = lab.window, lab.session
-    session.watch(True)
+    session.show_monitor(True)
     lab.until(lambda: session.monitor.sensor.held > 0.3)
-    window.centre.watch_bar.record.click()
+    window.centre.monitor_bar.record.click()
     kept = []
     session.monitor.recorded.connect(kept.append)
     lab.until(lambda: kept)
@@ -471,6 +471,6 @@ def test_record_keeps_what_the_monitor_saw(lab) -> None:
     run = Run.load(kept[0])
     assert run.status == "complete" and "V_C1" in run.signals
     run.close()
-    session.watch(False)
+    session.show_monitor(False)
     lab.until(lambda: not session.monitor.alive)
-    lab.until(lambda: not window.centre.watch_bar.isVisible())
+    lab.until(lambda: not window.centre.monitor_bar.isVisible())

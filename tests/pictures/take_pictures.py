@@ -192,10 +192,10 @@ def _compare(stage: Stage) -> None:
 def _monitor(stage: Stage) -> None:
     window, session = stage.window, stage.session
     window.review.show_tab(1)
-    session.watch(True)
+    session.show_monitor(True)
     stage.until(lambda: (seen := session.monitor.source) and seen.reach > 6.0)
     stage.shoot("window_monitor")
-    session.watch(False)
+    session.show_monitor(False)
     stage.until(lambda: not session.monitor.alive)
 
 

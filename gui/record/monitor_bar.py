@@ -1,4 +1,4 @@
-"""The bar above the lanes while the sensor is watched: where it stands, and Record."""
+"""The bar above the lanes while the sensor is monitored: its state, and Record."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gui.parts import column, label, push, set_role
 from tactile_lab.engine.sensor import SensorState
 
 
-class WatchBar(QFrame):
+class MonitorBar(QFrame):
     """V_C1, V_C2, rate and the distance to the threshold, for trimming V_GS by hand."""
 
     record_asked = Signal()
