@@ -121,8 +121,12 @@ class Intake:
     def end(self, time: float) -> tuple[float, ...]:
         """The stream ended at run time `time`, s; times of spikes still open."""
         if self._stream is not None and self._journal is not None:
-            unseen = round((time - self.reached) / self._stream.interval)
-            if unseen > 0 and not self._stream.gapless:
+            # a scope that was never polled has seen nothing, at no time
+            polled = time > self.reached and not self._stream.gapless
+            unseen = (
+                round((time - self.reached) / self._stream.interval) if polled else 0
+            )
+            if unseen > 0:
                 self._journal.gap(unseen)
         found = () if self._detector is None else self._keep(self._detector.flush())
         self._stream, self._detector = None, None
