@@ -27,7 +27,6 @@ class Column:
         self._id = dataset.id
         self._type = h5py.h5t.py_create(dataset.dtype, logical=True)
         self.length = int(dataset.shape[0])
-        self.dtype = dataset.dtype
 
     def put(self, first: int, values: NDArray[Any]) -> None:
         """Write `values` from index `first` on; the dataset then ends after them."""
@@ -67,11 +66,6 @@ class SampleColumn:
         self._held = 0
         self._first = 0
         self.written = 0
-
-    @property
-    def count(self) -> int:
-        """Samples taken so far, written or held back."""
-        return self._first + self._held
 
     def append(self, codes: NDArray[np.int16]) -> bool:
         """Take codes, shape (n,); True where at least one chunk went to the file.

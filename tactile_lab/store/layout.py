@@ -37,48 +37,60 @@ CHUNK_TIME = 0.25
 """Length of one chunk, s: what a crash can cost at most."""
 
 CHECK = np.dtype([("samples", "u4"), ("crc32", "u4")])
+COLUMNS: dict[str, dict[str, tuple[str, str]]] = {
+    "segments": {
+        "first": ("i8", "sample"),
+        "time": ("f8", "s"),
+        "interval": ("f8", "s"),
+        "host": ("f8", "s"),
+        "drift": ("f8", "s/s"),
+        "uncertainty": ("f8", "s"),
+    },
+    "gaps": {
+        "sample": ("i8", "sample"),
+        "missing": ("i8", "sample"),
+        "time": ("f8", "s"),
+    },
+    "overrange": {
+        "sample": ("i8", "sample"),
+        "samples": ("i8", "sample"),
+        "channels": ("u4", "bit per row"),
+    },
+    "spikes": {
+        "sample": ("f8", "sample"),
+        "time": ("f8", "s"),
+        "amplitude": ("i2", "code"),
+        "width": ("f4", "sample"),
+    },
+    "current": {
+        "time": ("f8", "s"),
+        "setpoint": ("f8", "A"),
+        "measured": ("f8", "A"),
+        "resistance_ratio": ("f8", "1"),
+    },
+    "field": {"time": ("f8", "s"), "field": ("f8", "T")},
+    "trials": {
+        "index": ("u4", ""),
+        "start": ("f8", "s"),
+        "end": ("f8", "s"),
+        "level": ("f8", "N"),
+        "hold_start": ("f8", "s"),
+        "hold_end": ("f8", "s"),
+        "spikes": ("u4", ""),
+        "skipped": ("u4", ""),
+        "pause": ("u1", ""),
+        "label": ("S48", ""),
+        "rest_V_C1": ("f8", "V"),
+        "drift_V_C1": ("f8", "V"),
+    },
+    "pauses": {"start": ("f8", "s"), "end": ("f8", "s")},
+    "events": {"time": ("f8", "s"), "kind": ("S16", ""), "text": ("S160", "")},
+}
+"""Type and unit of each column of each table."""
+
 RECORDS = {
-    "segments": np.dtype(
-        [
-            ("first", "i8"), ("time", "f8"), ("interval", "f8"), ("host", "f8"),
-            ("drift", "f8"), ("uncertainty", "f8"),
-        ]
-    ),
-    "gaps": np.dtype([("sample", "i8"), ("missing", "i8"), ("time", "f8")]),
-    "overrange": np.dtype([("sample", "i8"), ("samples", "i8"), ("channels", "u4")]),
-    "spikes": np.dtype(
-        [("sample", "f8"), ("time", "f8"), ("amplitude", "i2"), ("width", "f4")]
-    ),
-    "current": np.dtype(
-        [
-            ("time", "f8"), ("setpoint", "f8"), ("measured", "f8"),
-            ("resistance_ratio", "f8"),
-        ]
-    ),
-    "field": np.dtype([("time", "f8"), ("field", "f8")]),
-    "trials": np.dtype(
-        [
-            ("index", "u4"), ("start", "f8"), ("end", "f8"), ("level", "f8"),
-            ("hold_start", "f8"), ("hold_end", "f8"), ("spikes", "u4"),
-            ("skipped", "u4"), ("pause", "u1"), ("label", "S48"),
-            ("rest_V_C1", "f8"), ("drift_V_C1", "f8"),
-        ]
-    ),
-    "pauses": np.dtype([("start", "f8"), ("end", "f8")]),
-    "events": np.dtype([("time", "f8"), ("kind", "S16"), ("text", "S160")]),
-}  # fmt: skip
-UNITS = {
-    "segments": "first: sample, time: s, interval: s, host: s, drift: s/s, "
-    "uncertainty: s",
-    "gaps": "sample: sample, missing: sample, time: s",
-    "overrange": "sample: sample, samples: sample, channels: bit per row",
-    "spikes": "sample: sample, time: s, amplitude: code, width: sample",
-    "current": "time: s, setpoint: A, measured: A, resistance_ratio: 1",
-    "field": "time: s, field: T",
-    "trials": "start: s, end: s, level: N, hold_start: s, hold_end: s, "
-    "rest_V_C1: V, drift_V_C1: V",
-    "pauses": "start: s, end: s",
-    "events": "time: s",
+    table: np.dtype([(name, kind) for name, (kind, _) in columns.items()])
+    for table, columns in COLUMNS.items()
 }
 PYRAMID_CHUNK = 8192
 """Entries in one chunk of the pyramid: few reads for a view of a whole run."""
@@ -140,7 +152,8 @@ def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
     """
     file.attrs.update(schema=SCHEMA, simulated=layout.simulated, **layout.attributes)
     for name, record in RECORDS.items():
-        create_table(file, name, record).attrs["units"] = UNITS[name]
+        units = [f"{column}: {u}" for column, (_, u) in COLUMNS[name].items() if u]
+        create_table(file, name, record).attrs["units"] = ", ".join(units)
     spikes = file["spikes"].attrs
     if layout.detection is not None:
         spikes.update(asdict(layout.detection))

@@ -18,7 +18,7 @@ from tactile_lab.store.columns import SampleColumn
 from tactile_lab.store.data_file import DataFile
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
 from tactile_lab.store.layout import RECORDS, Layout
-from tactile_lab.store.pieces import Pieces
+from tactile_lab.store.sample_counter import SampleCounter
 from tactile_lab.store.write_queue import QUEUE_BYTES, WhenFull, Write, WriteQueue
 from tactile_lab.trial import Outcome
 
@@ -73,7 +73,7 @@ class Recorder:
         self._file: DataFile | None = None
         self._spikes = 0
         self._rows: tuple[int, ...] = ()
-        self._pieces = Pieces()
+        self._counter = SampleCounter()
         self._flushed = time.monotonic()
         self._failed = False
         if not layout.signals and layout.detection is None:
@@ -224,36 +224,38 @@ class Recorder:
         if self._file is None:
             self._guard(self._open, stream)
         self._rows = self._layout.rows(stream)
-        self._pieces.stream(stream, start)
-        self._waiting["segments"].append(self._pieces.segment)
+        self._counter.stream(stream, start)
+        self._waiting["segments"].append(self._counter.segment)
 
     def _append(self, block: Block) -> None:
-        gap = self._pieces.skip_to(block.first)
+        gap = self._counter.skip_to(block.first)
         if gap is not None:
-            self._waiting["gaps"].append((self._pieces.taken, *gap))
-            self._waiting["segments"].append(self._pieces.segment)
+            self._waiting["gaps"].append((self._counter.taken, *gap))
+            self._waiting["segments"].append(self._counter.segment)
         over = sum(
             1 << bit for bit, row in enumerate(self._rows) if block.overrange[row]
         )
         if over:
-            self._waiting["overrange"].append((self._pieces.taken, block.samples, over))
-        self._pieces.take(block.samples)
+            self._waiting["overrange"].append(
+                (self._counter.taken, block.samples, over)
+            )
+        self._counter.take(block.samples)
         self._guard(self._write_samples, block)
 
     def _gap(self, missing: int) -> None:
-        ended = self._pieces.reached + missing * self._pieces.segment[2]
-        self._row("gaps", (self._pieces.taken, missing, ended))
+        ended = self._counter.reached + missing * self._counter.segment[2]
+        self._row("gaps", (self._counter.taken, missing, ended))
 
     def _align(self, offset: float, drift: float, uncertainty: float) -> None:
-        self._pieces.align(offset, drift, uncertainty)
-        row = self._pieces.segment
+        self._counter.align(offset, drift, uncertainty)
+        row = self._counter.segment
         if self._waiting["segments"]:
             self._waiting["segments"][-1] = row
         elif self._file is not None:
             self._guard(self._file.replace_last, "segments", row)
 
     def _add_spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
-        samples = self._pieces.stored(found["sample"])
+        samples = self._counter.stored(found["sample"])
         columns = (samples, times, found["amplitude"], found["width"])
         self._waiting["spikes"] += zip(*columns, strict=True)
         self._spikes += found.size

@@ -41,7 +41,7 @@ OF_SAMPLES = {"segments": "first", "gaps": "sample", "overrange": "sample"}
 
 
 @dataclass(frozen=True)
-class Recovery:
+class Recovered:
     """What could be saved.
 
     Attributes:
@@ -58,7 +58,7 @@ class Recovery:
     original: Path | None
 
 
-def recover(path: Path) -> Recovery:
+def recover(path: Path) -> Recovered:
     """Recover the run in folder `path`; the file as it was stays beside the new one.
 
     Raises:
@@ -78,31 +78,35 @@ def recover(path: Path) -> Recovery:
             f"{path} has no {LEDGER} that tells what was written. Put it back; after a "
             f"run of an older version, read what {DATA} holds."
         )
+    # a recovery that was cut short itself has put it there already
+    killed = path / KEPT if (path / KEPT).exists() else path / DATA
     written = read_ledger(path / LEDGER)
-    if not written.declared:
+    if not written.declared or not killed.exists():
         return _without_samples(path, info)
-    check_space(path, (path / DATA).stat().st_size + RESERVE)
+    check_space(path, killed.stat().st_size + RESERVE)
     new = path / "data.recovering.h5"
     try:
         new.write_bytes(written.declared)
         with h5py.File(new, "r+", libver="latest") as file:
-            samples, dropped = _fill(file, written, path / DATA)
+            samples, dropped = _fill(file, written, killed)
     except OSError as error:
         new.unlink(missing_ok=True)
         raise RecordingError(f"{new} cannot be written: {error}.") from error
-    (path / DATA).rename(path / KEPT)
-    new.rename(path / DATA)
+    killed.rename(path / KEPT)
+    new.replace(path / DATA)
+    recovery = _derive(path, samples, dropped)
     (path / LEDGER).unlink()
-    return _derive(path, samples, dropped)
+    return recovery
 
 
-def _without_samples(path: Path, info: dict[str, Any]) -> Recovery:
+def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:
     """A run that died before its first sample."""
     kept = None
     if (path / DATA).exists():
         kept = (path / DATA).rename(path / KEPT)
+    (path / LEDGER).unlink(missing_ok=True)
     write_json(path / INFO, {**info, "status": "recovered", "samples": {}})
-    return Recovery(0, 0, 0, kept)
+    return Recovered(0, 0, 0, kept)
 
 
 def _can_be_opened(path: Path) -> bool:
@@ -186,7 +190,7 @@ class _Chunks:
         return np.empty(0, np.int16)
 
 
-def _derive(path: Path, samples: int, dropped: int) -> Recovery:
+def _derive(path: Path, samples: int, dropped: int) -> Recovered:
     """Find the spikes again, count, and patch `run.json`."""
     with Run.load(path) as run:
         if searched_is_stored(run):
@@ -214,4 +218,4 @@ def _derive(path: Path, samples: int, dropped: int) -> Recovery:
         Column(file["spikes"]).put(0, rows)
     write_json(path / INFO, info)
     write_certificate(path)
-    return Recovery(samples, dropped, rows.size, path / KEPT)
+    return Recovered(samples, dropped, rows.size, path / KEPT)

@@ -10,6 +10,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import show
@@ -17,7 +18,6 @@ from tactile_lab.store.certificate import (
     Certificate,
     certify,
     redetect,
-    searched_is_stored,
     unmatched,
 )
 from tactile_lab.store.columns import pyramid_of
@@ -25,9 +25,12 @@ from tactile_lab.store.folder import DATA, INFO, digest, is_live, read_info
 from tactile_lab.store.layout import BIN, RECORDS
 from tactile_lab.store.run import Run
 
+UNREADABLE = (OSError, KeyError, RuntimeError)
+"""What h5py raises for damaged bytes."""
+
 
 @dataclass(frozen=True)
-class Finding:
+class Damage:
     """One thing that is not as it was written.
 
     Attributes:
@@ -43,7 +46,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verification:
     """What `verify` found.
 
     Attributes:
@@ -52,7 +55,7 @@ class Verdict:
         notes: what a person should know that is no damage.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[Damage, ...]
     certificate: Certificate | None
     notes: tuple[str, ...] = ()
 
@@ -62,30 +65,30 @@ class Verdict:
         return not self.findings
 
 
-def verify(path: Path) -> Verdict:
+def verify(path: Path) -> Verification:
     """Check the run in folder `path`, reading all of it; changes nothing."""
     try:
         info = read_info(path)
     except RunFolderError as error:
-        return Verdict((Finding(INFO, str(error)),), None)
+        return Verification((Damage(INFO, str(error)),), None)
     findings, notes = [], []
     if info["status"] == "running":
         if is_live(path):
             notes.append("the run is still being written; what is there was checked")
         else:
             findings.append(
-                Finding(INFO, "the run was cut short; `tactile-lab recover` it")
+                Damage(INFO, "the run was cut short; `tactile-lab recover` it")
             )
     findings += _files(path, info)
     if not (path / DATA).exists():
         if info.get("samples"):
-            findings.append(Finding(DATA, "the file is missing"))
+            findings.append(Damage(DATA, "the file is missing"))
         notes.append("the run stored no samples")
-        return Verdict(tuple(findings), None, tuple(notes))
+        return Verification(tuple(findings), None, tuple(notes))
     try:
         run = Run.load(path)
     except RunFolderError as error:
-        return Verdict((*findings, Finding(DATA, str(error))), None, tuple(notes))
+        return Verification((*findings, Damage(DATA, str(error))), None, tuple(notes))
     certificate = None
     with run:
         try:
@@ -100,93 +103,85 @@ def verify(path: Path) -> Verdict:
                 if certificate.differing and info["status"] != "running":
                     findings += _spikes(run)
         except (OSError, KeyError, RuntimeError, ValueError) as error:
-            findings.append(
-                Finding(DATA, f"its structure is damaged ({_brief(error)})")
-            )
-    return Verdict(tuple(findings), certificate, tuple(notes))
+            findings.append(Damage(DATA, f"its structure is damaged ({_brief(error)})"))
+    return Verification(tuple(findings), certificate, tuple(notes))
 
 
-def _files(path: Path, info: dict[str, Any]) -> Iterator[Finding]:
+def _files(path: Path, info: dict[str, Any]) -> Iterator[Damage]:
     """Files beside the data that are missing or not as they were written."""
     for name, wanted in (info.get("files") or {}).items():
         try:
             data = (path / name).read_bytes()
         except OSError as error:
-            yield Finding(name, f"cannot be read ({error.strerror})")
+            yield Damage(name, f"cannot be read ({error.strerror})")
             continue
         if digest(data) != wanted:
-            yield Finding(name, "was changed after the run (SHA-256 differs)")
+            yield Damage(name, "was changed after the run (SHA-256 differs)")
 
 
-def _length(run: Run) -> Iterator[Finding]:
+def _length(run: Run) -> Iterator[Damage]:
     """Whether the file is as long as it was when it was closed."""
     length = run.table("events").file.id.get_filesize()
     missing = length - (run.path / DATA).stat().st_size
     if missing > 0 and run.status != "running":
-        yield Finding(DATA, f"{missing} bytes are missing at the end")
+        yield Damage(DATA, f"{missing} bytes are missing at the end")
 
 
-def _tables(run: Run) -> Iterator[Finding]:
+def _tables(run: Run) -> Iterator[Damage]:
     """Tables that cannot be read; their checksums are HDF5's own."""
     for name in RECORDS:
         try:
             run.records(name)
-        except (OSError, KeyError, RuntimeError) as error:
-            yield Finding(f"{DATA} /{name}", f"cannot be read ({_brief(error)})")
+        except UNREADABLE as error:
+            yield Damage(f"{DATA} /{name}", f"cannot be read ({_brief(error)})")
 
 
-def _channel(run: Run, name: str) -> Iterator[Finding]:
+def _channel(run: Run, name: str) -> Iterator[Damage]:
     """Chunks of one channel that are missing, unreadable or not as written."""
-    place = f"{DATA} /samples/{name}"
+    place, derived = f"{DATA} /samples/{name}", f"{DATA} /pyramid/{name}"
+    running = run.status == "running"
     try:
         samples, checks, pyramid = run.column(name)
         written = checks[()]
-    except (OSError, KeyError, RuntimeError) as error:
-        yield Finding(place, f"cannot be read ({_brief(error)})")
-        return
-    size = samples.chunks[0]
-    if run.status == "running":
-        written = written[:-1]  # its writer may be, or may have died, in the last chunk
-    stored = int(written["samples"].sum(dtype=np.int64))
-    if stored != samples.shape[0] and run.status != "running":
-        yield Finding(
-            place, f"{samples.shape[0]} samples are stored but {stored} have checksums"
-        )
-    sound = True
-    for number, (count, crc) in enumerate(written.tolist()):
-        first = number * size
-        what = _chunk(samples, first, count, crc)
-        if what is not None:
-            sound = False
-            yield Finding(f"{place}[{first}:{first + count}]", what + _when(run, first))
-    if not sound:
+    except UNREADABLE as error:
+        yield Damage(place, f"cannot be read ({_brief(error)})")
         return
     try:
         bins = pyramid[()]
-    except (OSError, RuntimeError) as error:
-        yield Finding(f"{DATA} /pyramid/{name}", f"cannot be read ({_brief(error)})")
-        return
-    for number, count in enumerate(written["samples"].tolist()):
-        first = number * size
-        codes = samples[first : first + count]
-        part = bins[first // BIN : -(-(first + count) // BIN)]
-        if run.status == "running" and first // BIN + part.size == bins.size:
-            break  # its writer holds back, or has lost, the newest
-        if not np.array_equal(part, pyramid_of(codes)):
-            yield Finding(
-                f"{DATA} /pyramid/{name}",
-                f"does not fit samples {first} to {first + count - 1}",
-            )
+    except UNREADABLE as error:
+        yield Damage(derived, f"cannot be read ({_brief(error)})")
+        bins = None
+    if running:
+        written = written[:-1]  # its writer may be, or may have died, in the last chunk
+    stored = int(written["samples"].sum(dtype=np.int64))
+    if stored != samples.shape[0] and not running:
+        yield Damage(
+            place, f"{samples.shape[0]} samples are stored but {stored} have checksums"
+        )
+    for number, (count, crc) in enumerate(written.tolist()):
+        first = number * samples.chunks[0]
+        stop = first + count
+        codes = _chunk(samples, first, count, crc)
+        if isinstance(codes, str):
+            yield Damage(f"{place}[{first}:{stop}]", codes + _when(run, first))
+        elif bins is not None:
+            part = bins[first // BIN : -(-stop // BIN)]
+            # the writer of a running one holds back, or has lost, the newest
+            newest = running and -(-stop // BIN) >= bins.size
+            if not newest and not np.array_equal(part, pyramid_of(codes)):
+                yield Damage(derived, f"does not fit samples {first} to {stop - 1}")
 
 
-def _chunk(samples: h5py.Dataset, first: int, count: int, crc: int) -> str | None:
-    """What is wrong with one chunk; None if it is sound."""
+def _chunk(
+    samples: h5py.Dataset, first: int, count: int, crc: int
+) -> NDArray[Any] | str:
+    """The codes of one chunk, or what is wrong with it."""
     try:
-        codes = samples[first : first + count]
+        codes: NDArray[Any] = samples[first : first + count]
         if zlib.crc32(codes.data) == crc:
-            return None
+            return codes
         what = "the samples are not those that were written (CRC-32 differs)"
-    except (OSError, RuntimeError) as error:
+    except UNREADABLE as error:
         what = f"the chunk cannot be decompressed ({_brief(error)})"
     try:
         info = samples.id.get_chunk_info_by_coord((first,))
@@ -206,35 +201,34 @@ def _when(run: Run, sample: int) -> str:
     return f", from {show(float(axis.time_of(float(sample))), 's', 6)} on"
 
 
-def _counters(run: Run) -> Iterator[Finding]:
+def _counters(run: Run) -> Iterator[Damage]:
     """Counters in `run.json` that do not fit the file."""
     for name, counters in (run.info.get("samples") or {}).items():
         written = counters.get("written")
         if name in run.signals and written != run.stored(name):
-            yield Finding(
+            yield Damage(
                 f"{INFO} samples.{name}",
                 f"says {written} samples were written; {DATA} has {run.stored(name)}",
             )
     online = run.info.get("spikes_online")
     if online is not None and online != run.records("spikes").size:
-        yield Finding(
+        yield Damage(
             f"{INFO} spikes_online",
             f"says {online} spikes; {DATA} has {run.records('spikes').size}",
         )
 
 
-def _spikes(run: Run) -> Iterator[Finding]:
+def _spikes(run: Run) -> Iterator[Damage]:
     """Spikes that are stored but not in the samples, or the other way round."""
-    assert searched_is_stored(run)
     odd = unmatched(run.records("spikes")["sample"], redetect(run)["sample"])
     for sample in odd[:10]:
-        yield Finding(
+        yield Damage(
             f"{DATA} /spikes",
             f"stored and found again differ at sample {sample:.3f}"
             + _when(run, int(sample)),
         )
     if odd.size > 10:
-        yield Finding(f"{DATA} /spikes", f"and at {odd.size - 10} more")
+        yield Damage(f"{DATA} /spikes", f"and at {odd.size - 10} more")
 
 
 def _brief(error: Exception) -> str:

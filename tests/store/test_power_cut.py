@@ -13,7 +13,7 @@ from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.ledger import LEDGER, read_ledger
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.store.recover import recover
+from tactile_lab.store.recover import KEPT, recover
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
@@ -124,6 +124,19 @@ def test_a_run_without_its_ledger_is_left_as_it_is(cut_runs, tmp_path):
         recover(path)
     with Run.load(path) as run:
         assert (run.status, run.samples > 100_000) == ("running", True)
+
+
+def test_a_recovery_that_was_cut_short_is_begun_again(cut_runs, tmp_path):
+    left, _, _ = cut_runs
+    path, other = tmp_path / "run", tmp_path / "other"
+    shutil.copytree(left, path)
+    shutil.copytree(left, other)
+    (path / DATA).rename(path / KEPT)
+    (path / "data.recovering.h5").write_bytes(b"half of it")
+    again, whole = recover(path), recover(other)
+    assert (again.samples, again.spikes) == (whole.samples, whole.spikes)
+    assert again.samples > 100_000
+    assert verify(path).sound
 
 
 def test_a_torn_entry_ends_the_ledger(cut_runs, tmp_path):

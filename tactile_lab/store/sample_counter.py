@@ -1,4 +1,4 @@
-"""Stretches without a gap: where streamed samples lie in the record and in time."""
+"""Counts streamed samples: where they lie in the record and in time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Segment = tuple[int, float, float, float, float, float]
 """A row of `layout.RECORDS["segments"]`."""
 
 
-class Pieces:
+class SampleCounter:
     """Keeps count of the samples of a run, stream after stream, gap after gap.
 
     Attributes:
@@ -30,7 +30,7 @@ class Pieces:
     def stream(self, stream: Stream, start: float) -> None:
         """A stream starts; its first sample is at `start` s on the run's axis."""
         self._stream, self._expected = stream, 0
-        self._begin(start)
+        self._begin(stream, start)
 
     def skip_to(self, first: int) -> tuple[int, float] | None:
         """Samples missing before stream index `first`, and its run time, s.
@@ -53,7 +53,7 @@ class Pieces:
             return None
         at = self.reached + missing * self.segment[2]
         self._expected = first
-        self._begin(at)
+        self._begin(self._stream, at)
         return missing, at
 
     @property
@@ -80,12 +80,16 @@ class Pieces:
         first, start, interval, host, _, _ = self.segment
         self.segment = (first, start + offset, interval, host, drift, uncertainty)
 
-    def _begin(self, start: float) -> None:
+    def _begin(self, stream: Stream, start: float) -> None:
         """Samples from here on follow one another from `start` s on."""
-        assert self._stream is not None
         self._begins = [one for one in self._begins if one[0] < self._expected]
         self._begins.append((self._expected, self.taken))
-        interval = self._stream.interval
-        host = self._stream.started + self._expected * interval
-        uncertainty = self._stream.uncertainty
-        self.segment = (self.taken, start, interval, host, 0.0, uncertainty)
+        host = stream.started + self._expected * stream.interval
+        self.segment = (
+            self.taken,
+            start,
+            stream.interval,
+            host,
+            0.0,
+            stream.uncertainty,
+        )
