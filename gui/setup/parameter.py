@@ -104,7 +104,7 @@ def parameter(key: str, info: FieldInfo) -> Parameter:
     if get_origin(inner) is tuple and (items := _taken_apart(get_args(inner)[0])[2]):
         kind, units = Kind.QUANTITIES, items
     elif units:
-        kind = Kind.QUANTITY
+        kind = Kind.QUANTITY if units[0].symbol else Kind.NUMBER
     elif get_origin(inner) is Literal:
         kind, choices = Kind.CHOICE, tuple(str(choice) for choice in get_args(inner))
     elif inner is str and key in ("file", "path"):
@@ -138,7 +138,9 @@ def text_of(parameter: Parameter, value: Any) -> str:
         return exact(float(value), unit.symbol)
     if parameter.kind is Kind.QUANTITIES and unit is not None:
         return listed([float(v) for v in value], unit.symbol)
-    return toml(value) if parameter.kind is Kind.OTHER else str(value)
+    if parameter.kind is Kind.OTHER:
+        return toml(parameter.type.dump_python(value))
+    return str(value)
 
 
 def listed(values: list[float], symbol: str) -> str:
@@ -170,7 +172,9 @@ def entry_of(parameter: Parameter, text: str) -> str | None:
     try:
         parameter.type.validate_python(value)
     except ValidationError as wrong:
-        raise FieldError(f"{reason(wrong.errors()[0])}.") from wrong
+        told = reason(wrong.errors()[0])
+        named = told[:1].isupper() or not told[:1].isalpha()
+        raise FieldError(f"{told if named else f'{text}: {told}'}.") from wrong
     return toml(value)
 
 

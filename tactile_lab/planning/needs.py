@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from tactile_lab.bench import Channel
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.registry import check_scope, scope_capability
-from tactile_lab.planning.asked import asked_signals
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import SIGNALS
@@ -70,7 +69,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
         LimitError: the scope cannot stream so, or the coil cannot play it.
     """
     drive = drive or timeline(scene, through_coil=True)
-    asked, recorded = asked_signals(scene), set(scene.record.signals)
+    asked, recorded = scene.asked, set(scene.record.signals)
     scope, meter = scene.bench.scope, scene.bench.field_meter
     wired = {c.signal: c for c in scope.channels} if scope is not None else {}
     derives_I_DS = "I_DS" not in wired  # from V_C1 by Eq. (16)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import SceneError
-from tactile_lab.planning.asked import asked_signals
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
@@ -63,7 +62,7 @@ class ModelOutcome(Outcome):
     @property
     def spike_times(self) -> NDArray[np.float64]:
         """Spikes of this trial, s from its start."""
-        if not asked_signals(self._scene) & {"spikes", "rate"}:
+        if not self._scene.asked & {"spikes", "rate"}:
             raise SceneError(
                 f"protocol {self._scene.protocol.name} looks at spikes, but neither "
                 'records them nor declares needs = ("spikes",).'

@@ -60,6 +60,12 @@ class Scene:
         return start if isinstance(start, Start) else None
 
     @property
+    def asked(self) -> frozenset[str]:
+        """Signals that are recorded, and those its protocol looks at."""
+        wished = {name for name in self.protocol.wishes() if self.bench.measures(name)}
+        return frozenset((*self.record.signals, *self.protocol.needs, *wished))
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Files beside the scene itself that it was made from; kept with a run."""
         named = [self.bench.path, self.protocol_source]

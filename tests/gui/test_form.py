@@ -1,4 +1,5 @@
 import inspect
+from functools import reduce
 
 import pytest
 from hypothesis import given
@@ -13,6 +14,7 @@ from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
+from tactile_lab.table import fields_of
 
 NAMES = [name for name in protocol_names() if name != "waveform"]
 
@@ -38,6 +40,22 @@ def test_every_protocol_has_a_form_of_its_defaults(
     assert form.problem == ""
     plain, again = (load(inspect.getfile(kind), o) for o in ((), form.overrides()))
     assert again.protocol.model_dump() == plain.protocol.model_dump()
+
+
+@pytest.mark.parametrize(
+    "name", ["record", "detect", "conditions", "coil", "sensor", "bench.magnet"]
+)
+def test_any_table_of_a_scene_can_be_a_form(app: QApplication, name: str) -> None:
+    """Scene -> form -> overrides -> scene: the same table."""
+
+    def table(scene):
+        return reduce(getattr, name.split("."), scene)
+
+    given = table(load(None, ["record.sample_rate=2 MS/s", "sensor.m=5.5"]))
+    keys, form = fields_of(type(given)), Form()
+    form.show_table(name, keys, {key: getattr(given, key) for key in keys})
+    assert form.problem == ""
+    assert table(load(None, form.overrides())) == given
 
 
 def test_lengths_and_units_are_shown_and_checked(app: QApplication) -> None:
