@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -12,12 +11,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab import notebook
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent
 from tactile_lab.quantity import count, show
-from tactile_lab.signals import SIGNALS
 from tactile_lab.spikes.detection import Detection
+from tactile_lab.store import frames
 from tactile_lab.store.applied import (
     BIN_TIME,
     AppliedCurrent,
@@ -26,9 +24,9 @@ from tactile_lab.store.applied import (
     held,
 )
 from tactile_lab.store.data_file import open_data
-from tactile_lab.store.derived import drain_current_of, table
+from tactile_lab.store.derived import drain_current_of
 from tactile_lab.store.folder import DATA, is_live, read_info
-from tactile_lab.store.layout import BIN, RECORDS
+from tactile_lab.store.layout import BIN
 from tactile_lab.store.signal import Axis, StoredSignal
 from tactile_lab.waveform import Waveform
 
@@ -352,16 +350,7 @@ class Run:
         Raises:
             RunFolderError: xarray is not installed, or there is no such signal.
         """
-        made = _optional("xarray").Dataset
-        time, columns = table(self, start, end, signals, rate)
-        dataset: xarray.Dataset = made(coords={"time": time})
-        dataset["time"].attrs["units"] = "s"
-        for name, values in columns.items():
-            known = SIGNALS[name]
-            attrs = {"units": known.unit, "long_name": known.title}
-            dataset[name] = ("time", values, attrs)
-        dataset.attrs.update(run=self.path.name, simulated=int(self.simulated))
-        return dataset
+        return frames.as_xarray(self, start, end, signals, rate)
 
     def to_pandas(
         self,
@@ -385,27 +374,7 @@ class Run:
         Raises:
             RunFolderError: pandas is not installed, or there is no such table.
         """
-        pd = _optional("pandas")
-        frame: pandas.DataFrame
-        if what == "signals":
-            time, columns = table(self, start, end, signals, rate)
-            frame = pd.DataFrame(columns, index=pd.Index(time, name="time"))
-            return frame
-        if what in ("spikes", "rate"):
-            rows = getattr(self, what)
-        elif what in RECORDS:
-            rows = self.records(what)
-        else:
-            raise RunFolderError(
-                f"A run has no table {what!r}; give signals, rate or one of "
-                f"{', '.join(RECORDS)}."
-            )
-        fields = {name: rows[name] for name in rows.dtype.names}
-        for name, values in fields.items():
-            if values.dtype.kind == "S":
-                fields[name] = np.char.decode(values, "utf-8", errors="replace")
-        frame = pd.DataFrame(fields)
-        return frame
+        return frames.as_pandas(self, what, start, end, signals, rate)
 
     def stored(self, name: str) -> int:
         """Samples of one channel that have a checksum."""
@@ -425,45 +394,4 @@ class Run:
         )
 
     def _repr_html_(self) -> str:
-        """The same for a notebook, with the trials."""
-        info = self.info
-        rows = [
-            ("status", f"{self.status} {info.get('reason') or ''}".strip()),
-            ("protocol", info.get("protocol")),
-            ("bench", info.get("bench")),
-            ("physics", "simulated" if self.simulated else "measured"),
-            ("started", info.get("started")),
-            ("duration", show(self.duration, "s")),
-            ("signals", ", ".join(self.signals)),
-            ("spikes", len(self.table("spikes"))),
-            ("loss", (info.get("loss") or {}).get("text")),
-            ("folder", self.path),
-        ]
-        trials = [
-            (
-                row["label"].decode(errors="replace"),
-                show(row["start"], "s"),
-                show(row["end"], "s"),
-                row["spikes"],
-            )
-            for row in self.trials
-        ]
-        head = ("trial", "start", "end", "spikes")
-        return notebook.facts(repr(self).strip("<>"), rows) + notebook.table(
-            head, trials
-        )
-
-
-def _optional(name: str) -> Any:
-    """A library that is installed only where it is wanted.
-
-    Raises:
-        RunFolderError: it is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise RunFolderError(
-            f"{name} is not installed; `pip install {name}`, or read arrays with "
-            "run.signal()."
-        ) from error
+        return frames.as_html(self)
