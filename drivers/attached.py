@@ -24,7 +24,7 @@ from tactile_lab.instruments.dialects import (
     load_dialect,
     meter_dialect,
 )
-from tactile_lab.instruments.serial_dialect import SerialDialect, Wire
+from tactile_lab.instruments.serial_dialect import SerialDialect, SerialSettings
 
 DIALOUT = (
     "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
@@ -142,7 +142,7 @@ def _serial_dialects() -> list[SerialDialect]:
     return [dialect for dialect in every if isinstance(dialect, SerialDialect)]
 
 
-def _quick(wire: Wire) -> Wire:
+def _quick(wire: SerialSettings) -> SerialSettings:
     return wire.model_copy(update={"timeout": 0.3})
 
 

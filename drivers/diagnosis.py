@@ -28,7 +28,7 @@ LATE = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Diagnosis:
     """One thing looked at.
 
     Attributes:
@@ -51,7 +51,7 @@ def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
         folder: where runs are stored.
         needed_rate: what a run must be able to store, bytes/s.
     """
-    looks: tuple[Callable[[], Finding], ...] = (
+    looks: tuple[Callable[[], Diagnosis], ...] = (
         python,
         packages,
         picosdk,
@@ -62,21 +62,21 @@ def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
     return [asdict(finding) for finding in (*(look() for look in looks), *ports())]
 
 
-def python() -> Finding:
+def python() -> Diagnosis:
     """Interpreter, its width and the system."""
     bits = struct.calcsize("P") * 8
     text = f"Python {platform.python_version()}, {bits} bits, {platform.platform()}"
     if bits != 64:
-        return Finding(
+        return Diagnosis(
             topic="python",
             state="problem",
             text=text,
             remedy="install a 64-bit Python: PicoSDK's library must be as wide",
         )
-    return Finding(topic="python", state="ok", text=text)
+    return Diagnosis(topic="python", state="ok", text=text)
 
 
-def packages() -> Finding:
+def packages() -> Diagnosis:
     """Packages a run needs."""
     missing, versions = [], []
     for name in NEEDED:
@@ -85,30 +85,30 @@ def packages() -> Finding:
         except metadata.PackageNotFoundError:
             missing.append(name)
     if missing:
-        return Finding(
+        return Diagnosis(
             topic="packages",
             state="problem",
             text=f"missing: {', '.join(missing)}",
             remedy="pip install -e .",
         )
-    return Finding(topic="packages", state="ok", text=", ".join(versions))
+    return Diagnosis(topic="packages", state="ok", text=", ".join(versions))
 
 
-def picosdk() -> Finding:
+def picosdk() -> Diagnosis:
     """Whether PicoScope's library is where it is looked for."""
     try:
         library = load()
     except InstrumentError as reason:
-        return Finding(
+        return Diagnosis(
             topic="picosdk",
             state="note",
             text="PicoScope's library ps3000a cannot be used",
             remedy=" ".join(str(reason).split()),
         )
-    return Finding(topic="picosdk", state="ok", text=str(library))
+    return Diagnosis(topic="picosdk", state="ok", text=str(library))
 
 
-def guard() -> Finding:
+def guard() -> Diagnosis:
     """Whether the guard process starts, and how long that takes."""
     row = coil_dialect("kepco-bop")
     one = Guard("/dev/null", row, row.serial)
@@ -118,16 +118,16 @@ def guard() -> Finding:
         took = time.monotonic() - began
         one.stop()
     except (InstrumentError, OSError) as reason:
-        return Finding(
+        return Diagnosis(
             topic="guard",
             state="problem",
             text=f"the guard process does not start: {reason}",
             remedy="without it no current source is energised; look at the message",
         )
-    return Finding(topic="guard", state="ok", text=f"starts in {took:.2f} s")
+    return Diagnosis(topic="guard", state="ok", text=f"starts in {took:.2f} s")
 
 
-def wake_up() -> Finding:
+def wake_up() -> Diagnosis:
     """How late a waiting thread wakes, which sets the jitter of set-points."""
     late = []
     for _ in range(40):
@@ -137,16 +137,16 @@ def wake_up() -> Finding:
     worst = max(late)
     text = f"a waiting thread wakes up to {1e3 * worst:.1f} ms late"
     if worst > LATE:
-        return Finding(
+        return Diagnosis(
             topic="timing",
             state="note",
             text=text,
             remedy="close other programs; set-points will jitter as much",
         )
-    return Finding(topic="timing", state="ok", text=text)
+    return Diagnosis(topic="timing", state="ok", text=text)
 
 
-def disk(folder: Path, needed: float) -> Finding:
+def disk(folder: Path, needed: float) -> Diagnosis:
     """How fast the disk under `folder` takes data, against `needed` bytes/s."""
     there = folder.absolute()
     while not there.exists():
@@ -161,7 +161,7 @@ def disk(folder: Path, needed: float) -> Finding:
             os.fsync(file.fileno())
             rate = DISK_TRIAL / (time.monotonic() - began)
     except OSError as reason:
-        return Finding(
+        return Diagnosis(
             topic="disk",
             state="problem",
             text=f"{there} cannot be written to: {reason}",
@@ -169,20 +169,22 @@ def disk(folder: Path, needed: float) -> Finding:
         )
     text = f"{there} takes {rate / 1e6:.0f} MB/s; a run needs {needed / 1e6:.0f} MB/s"
     if rate < 2 * needed:
-        return Finding(
+        return Diagnosis(
             topic="disk",
             state="problem",
             text=text,
             remedy="store runs on a faster disk (--out), or lower the sample rate",
         )
-    return Finding(topic="disk", state="ok", text=text)
+    return Diagnosis(topic="disk", state="ok", text=text)
 
 
-def ports() -> list[Finding]:
+def ports() -> list[Diagnosis]:
     """Permissions and links of what is attached."""
     found = attached(ask=False)
     findings = [
-        Finding(topic="port", state="problem", text=one["title"], remedy=one["problem"])
+        Diagnosis(
+            topic="port", state="problem", text=one["title"], remedy=one["problem"]
+        )
         for one in found
         if one["problem"]
     ]
@@ -190,5 +192,5 @@ def ports() -> list[Finding]:
     text = f"usable: {', '.join(fine)}" if fine else "no instrument's port is attached"
     return [
         *findings,
-        Finding(topic="ports", state="ok" if fine else "note", text=text),
+        Diagnosis(topic="ports", state="ok" if fine else "note", text=text),
     ]

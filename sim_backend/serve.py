@@ -18,7 +18,7 @@ from sim_backend.teslameter import meter_far_end
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
 from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
-from tactile_lab.instruments.serial_dialect import Wire
+from tactile_lab.instruments.serial_dialect import SerialSettings
 from tactile_lab.magnetics import Magnet
 
 BACKLOG = 1000
@@ -124,7 +124,7 @@ class ServedBench:
         name: str,
         where: str,
         instrument: LineInstrument,
-        wire: Wire,
+        wire: SerialSettings,
         clock: Clock,
         paced: bool,
     ) -> None:

@@ -17,7 +17,7 @@ from typing import Protocol
 from drivers.coil import guard_process
 from drivers.serial_line.port import port_settings
 from tactile_lab.errors import InstrumentError
-from tactile_lab.instruments.serial_dialect import CoilDialect, Wire
+from tactile_lab.instruments.serial_dialect import CoilDialect, SerialSettings
 
 SILENCE = 0.5
 """Time without heartbeat after which an armed guard acts, s."""
@@ -66,7 +66,7 @@ class Guard:
     """
 
     def __init__(
-        self, port: str, row: CoilDialect, wire: Wire, log: Path | None = None
+        self, port: str, row: CoilDialect, wire: SerialSettings, log: Path | None = None
     ) -> None:
         self._log = log or default_log()
         self._settings = guard_settings(port, row, wire, self._log)
@@ -172,7 +172,7 @@ class Guard:
 
 
 def guard_settings(
-    port: str, row: CoilDialect, wire: Wire, log: Path
+    port: str, row: CoilDialect, wire: SerialSettings, log: Path
 ) -> dict[str, object]:
     """Everything the guard process needs to know, as plain data."""
     end = wire.send_end

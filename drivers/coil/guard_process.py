@@ -34,7 +34,7 @@ STALL = 0.2
 """Lateness of the guard's own waking that excuses one silence, s."""
 
 
-class Ears:
+class OwnerPipe:
     """Listens to the owner's bytes in a thread of its own."""
 
     def __init__(self) -> None:
@@ -66,24 +66,24 @@ class Ears:
             self.take_over = True
 
 
-def wait_for_danger(ears: Ears, silence: float) -> str | None:
+def wait_for_danger(owner: OwnerPipe, silence: float) -> str | None:
     """Why the output must be switched off, or None when the owner left in peace."""
-    with ears.changed:
+    with owner.changed:
         while True:
-            if ears.take_over:
+            if owner.take_over:
                 return "the owner could not verify the output off and let go of it"
-            if ears.leave:
+            if owner.leave:
                 return None
-            if ears.ended:
-                return "the owner died" if ears.armed else None
-            left = ears.last + silence - time.monotonic()
-            if ears.armed and left <= 0:
+            if owner.ended:
+                return "the owner died" if owner.armed else None
+            left = owner.last + silence - time.monotonic()
+            if owner.armed and left <= 0:
                 return f"the owner was silent for {silence:g} s"
             asked = time.monotonic()
-            timeout = left if ears.armed else None
-            ears.changed.wait(timeout)
+            timeout = left if owner.armed else None
+            owner.changed.wait(timeout)
             if timeout is not None and time.monotonic() - asked > timeout + STALL:
-                ears.last = time.monotonic()  # it was this process that slept
+                owner.last = time.monotonic()  # it was this process that slept
 
 
 def kill_hung(owner: int) -> bool:
@@ -105,7 +105,7 @@ def prepared(told: dict[str, Any]) -> serial.SerialBase:
     return port
 
 
-def switch_off(told: dict[str, Any], port: serial.SerialBase, log: Log) -> bool:
+def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> bool:
     """Send and verify output-off, again and again while patience lasts."""
     give_up = time.monotonic() + PATIENCE
     reasons: set[str] = set()
@@ -134,7 +134,7 @@ def switch_off(told: dict[str, Any], port: serial.SerialBase, log: Log) -> bool:
     return False
 
 
-class Log:
+class GuardLog:
     """Appends lines to a file and repeats them on standard error.
 
     Args:
@@ -166,12 +166,12 @@ def main() -> int:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     told = json.loads(_first_line())
-    log = Log(told["log"])
+    log = GuardLog(told["log"])
     port = prepared(told)
-    ears = Ears()
-    threading.Thread(target=ears.listen, daemon=True).start()
+    owner = OwnerPipe()
+    threading.Thread(target=owner.listen, daemon=True).start()
     os.write(1, b"ready\n")
-    reason = wait_for_danger(ears, told["silence"])
+    reason = wait_for_danger(owner, told["silence"])
     if reason is None:
         return 0
     begun = time.monotonic()

@@ -22,7 +22,7 @@ from tactile_lab.errors import (
     LinkLostError,
     NoReplyError,
 )
-from tactile_lab.instruments.serial_dialect import Wire
+from tactile_lab.instruments.serial_dialect import SerialSettings
 
 QUIET = 0.05
 """Silence that ends a drain, s."""
@@ -64,7 +64,7 @@ class SerialLink:
     def __init__(
         self,
         port: str,
-        wire: Wire,
+        wire: SerialSettings,
         clock: Clock,
         *,
         what: str,

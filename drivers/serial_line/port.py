@@ -11,7 +11,7 @@ import serial
 from serial.urlhandler import protocol_socket
 
 from tactile_lab.errors import InstrumentError, NotFoundError
-from tactile_lab.instruments.serial_dialect import Wire
+from tactile_lab.instruments.serial_dialect import SerialSettings
 
 TermiosError: type[Exception] = OSError
 with suppress(ImportError):  # Windows has no termios
@@ -27,7 +27,7 @@ CONNECT = 0.5
 """Longest wait for a network port to accept, s; pyserial's own is ten times that."""
 
 
-def port_settings(port: str, wire: Wire) -> dict[str, Any]:
+def port_settings(port: str, wire: SerialSettings) -> dict[str, Any]:
     """Arguments with which pyserial opens `port`; a write timeout is always set."""
     is_url = "://" in port
     # a pseudo-terminal has no frame format; Linux refuses to be asked for one twice
@@ -46,7 +46,7 @@ def port_settings(port: str, wire: Wire) -> dict[str, Any]:
     }
 
 
-def open_port(port: str, wire: Wire, what: str) -> serial.Serial:
+def open_port(port: str, wire: SerialSettings, what: str) -> serial.Serial:
     """The port at `port` (any address pyserial takes), held by this program alone.
 
     Args:

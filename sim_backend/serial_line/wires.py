@@ -26,7 +26,7 @@ from sim_backend.serial_line.faults import (
     spoilt,
 )
 from tactile_lab.clock import Clock
-from tactile_lab.instruments.serial_dialect import Wire
+from tactile_lab.instruments.serial_dialect import SerialSettings
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
@@ -51,7 +51,7 @@ class LineInstrument(Protocol):
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """Bytes that start to come back `delay` s from now."""
 
     delay: float
@@ -75,7 +75,7 @@ class FarEnd:
     """
 
     def __init__(
-        self, instrument: LineInstrument, wire: Wire, clock: Clock, name: str
+        self, instrument: LineInstrument, wire: SerialSettings, clock: Clock, name: str
     ) -> None:
         self.instrument = instrument
         self.wire = wire
@@ -93,7 +93,7 @@ class FarEnd:
         address.far_end = self
         return address
 
-    def take(self, data: bytes) -> list[Answer]:
+    def take(self, data: bytes) -> list[Reply]:
         """Any bytes; the answers of the lines they complete."""
         answers = []
         for byte in data:
@@ -109,17 +109,17 @@ class FarEnd:
                     answers.append(answer)
         return answers
 
-    def _answer(self, line: bytes) -> Answer:
+    def _answer(self, line: bytes) -> Reply:
         clock = self.clock
         if self.faults.strike(line, clock.now(), ("deaf",)):
-            return Answer(0.0, b"")
+            return Reply(0.0, b"")
         clock.sleep_until(clock.now() + self.wire.latency)
         if self.faults.strike(line, clock.now(), ("refused",)):
             answer = REFUSAL if b"?" in line else None
         else:
             answer = self.instrument.line(line)
         faults = self.faults.strike(line, clock.now(), ANSWER_KINDS)
-        return Answer(*spoilt(answer, line, self.instrument.reply_end, faults))
+        return Reply(*spoilt(answer, line, self.instrument.reply_end, faults))
 
 
 _far_ends: WeakValueDictionary[str, FarEnd] = WeakValueDictionary()
@@ -128,7 +128,7 @@ _numbers = itertools.count(1)
 
 def plug_in(
     instrument: LineInstrument,
-    wire: Wire,
+    wire: SerialSettings,
     clock: Clock,
     name: str = "instrument",
     faults: Iterable[SerialFault] = (),
@@ -284,7 +284,7 @@ class SimPort(serial.SerialBase):
             raise serial.PortNotOpenError
         return self._far_end
 
-    def _same_settings(self, wire: Wire) -> bool:
+    def _same_settings(self, wire: SerialSettings) -> bool:
         """With other settings the far end hears only noise."""
         return (self.baudrate, self.bytesize, self.parity) == (
             wire.baud,

@@ -41,7 +41,7 @@ Instrument = TypeVar("Instrument", covariant=True)
 D = TypeVar("D", bound="Driver[Any]")
 
 
-class Table(Interface):
+class InstrumentTable(Interface):
     """An instrument's table of a bench file: `[coil]`, `[scope]` or `[field_meter]`."""
 
     @property
@@ -113,7 +113,7 @@ def driver_names(kind: type[Driver[Any]]) -> tuple[str, ...]:
     return tuple(sorted(name for start, _, name in parts if start == kind.kind))
 
 
-def find_driver(kind: type[D], table: Table) -> D:
+def find_driver(kind: type[D], table: InstrumentTable) -> D:
     """The driver that an instrument's table names.
 
     Raises:
@@ -140,7 +140,7 @@ def find_driver(kind: type[D], table: Table) -> D:
 
 
 def far_end(
-    kind: type[Driver[Instrument]], table: Table
+    kind: type[Driver[Instrument]], table: InstrumentTable
 ) -> Callable[[Any, Any], Instrument]:
     """What makes an instrument with its simulated far end, from its table and world.
 
@@ -160,7 +160,7 @@ def far_end(
     return made
 
 
-def coil_capability(table: Table) -> CoilCapability:
+def coil_capability(table: InstrumentTable) -> CoilCapability:
     """What a source can do, as far as is known before it is opened.
 
     Raises:
@@ -169,7 +169,7 @@ def coil_capability(table: Table) -> CoilCapability:
     return find_driver(CoilDriver, table).capability(table)
 
 
-def scope_capability(table: Table) -> ScopeCapability:
+def scope_capability(table: InstrumentTable) -> ScopeCapability:
     """What a scope can do, as far as is known before it is opened.
 
     Raises:
@@ -178,7 +178,9 @@ def scope_capability(table: Table) -> ScopeCapability:
     return find_driver(ScopeDriver, table).capability(table)
 
 
-def check_scope(table: Table, channels: Sequence[Channel], rate: float) -> float:
+def check_scope(
+    table: InstrumentTable, channels: Sequence[Channel], rate: float
+) -> float:
     """Check that a scope can be set so; the rate it is sure to keep, S/s.
 
     Args:

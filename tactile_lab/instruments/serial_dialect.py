@@ -47,7 +47,7 @@ class Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
-class Wire(Strict):
+class SerialSettings(Strict):
     """Serial settings and framing of a model.
 
     Attributes:
@@ -154,7 +154,7 @@ class SerialDialect(Dialect):
         number: pattern whose group 1 is a numeric answer.
     """
 
-    serial: Wire = Wire()
+    serial: SerialSettings = SerialSettings()
     identify: str = "*IDN?"
     optional: Lines = ()
     init: Lines = ()
