@@ -21,6 +21,9 @@ SMALL = 4096
 PARTS = 4
 """Closer looks kept: that of the lanes, those around the cursors, and the last one."""
 
+WAITING = 1 << 10
+"""Cells of the finest level that may wait to be joined until a coarser one is read."""
+
 ROOM = 1 << 12
 """Cells there is room for at first: zeroing memory for all at once takes a frame."""
 
@@ -51,6 +54,11 @@ class Level:
     def forgotten(self) -> int:
         """Cells that are no longer kept."""
         return self.count - len(self)
+
+    @property
+    def start(self) -> float:
+        """Time of the oldest cell that is kept, s; 0 without one."""
+        return float(self._values[0, self._first]) if len(self) else 0.0
 
     @property
     def end(self) -> float:
@@ -85,7 +93,11 @@ class Level:
         """All cells that are kept."""
         kept = slice(self._first, self._last)
         time, low, high, mean = self._values[:, kept]
-        return Trace(time, low, high, mean, self._gap[kept], self.width)[:]
+        gap = self._gap[kept]
+        if gap.size and not gap[0]:
+            gap = gap.copy()
+            gap[0] = True
+        return Trace(time, low, high, mean, gap, self.width)
 
     def has_gap(self, number: int) -> bool:
         """Whether there is a gap before cell `number`, which is kept."""
@@ -120,6 +132,7 @@ class Pyramid:
     def __init__(self) -> None:
         self._levels = [Level(FINE)]
         self._open: list[int] = [0]
+        self._waiting = 0
         self._parts: tuple[tuple[float, float, Trace], ...] = ()
 
     @classmethod
@@ -132,6 +145,15 @@ class Pyramid:
     def add(self, cells: Trace) -> None:
         """Append cells of the finest level that follow those before."""
         self._levels[0].add(cells)
+        self._waiting += len(cells)
+        if self._waiting >= WAITING:
+            self._join()
+
+    def _join(self) -> None:
+        """Bring all levels up to the finest."""
+        if not self._waiting:
+            return
+        self._waiting = 0
         for above in range(1, len(self._levels)):
             self._carry_up(above)
         while len(self._levels[-1]) > SMALL:
@@ -147,8 +169,7 @@ class Pyramid:
     @property
     def start(self) -> float:
         """Time from which on there are cells, s; 0 without any."""
-        first = self._levels[-1].trace()
-        return 0.0 if first.empty else float(first.time[0])
+        return self._levels[-1].start
 
     @property
     def end(self) -> float:
@@ -165,9 +186,10 @@ class Pyramid:
             return part.around(start, end).thin(count)
         level = self._levels[0]
         for above in self._levels[1:]:
-            known = not level.forgotten or start >= float(level.trace().time[0])
+            known = not level.forgotten or start >= level.start
             if known and end - start < 2 * count * above.width:
                 break
+            self._join()
             level = above
         return level.trace().around(start, end).thin(count)
 

@@ -159,13 +159,15 @@ class Trace:
         if gap.size and not gap[0]:
             gap = gap.copy()
             gap[0] = True
-        return replace(
-            self,
-            time=self.time[cells],
-            low=self.low[cells],
-            high=self.high[cells],
-            mean=self.mean[cells],
-            gap=gap,
+        return Trace(
+            self.time[cells],
+            self.low[cells],
+            self.high[cells],
+            self.mean[cells],
+            gap,
+            self.width,
+            self.signal,
+            self.unit,
         )
 
     def cut(self, start: float, end: float) -> Trace:
