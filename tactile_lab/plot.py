@@ -61,7 +61,7 @@ class Series:
             np.size(self.x),
             (self.x_error, self.y_error, self.low, self.high),
         )
-        y = () if np.size(self.y) == 0 else (self.y,)
+        y = () if self.mark in ("ticks", "range", "band") else (self.y,)
         for values in (*y, *(v for v in others if v is not None)):
             if np.shape(values) != (size,):
                 raise ParameterError(
@@ -156,6 +156,8 @@ class Plot:
     letters: bool = False
 
     def __post_init__(self) -> None:
+        if not self.panels:
+            raise ParameterError(f"plot {self.name!r} has no panel; give one or more.")
         if not re.fullmatch(r"[a-z0-9_]+", self.name):
             raise ParameterError(
                 f"a plot cannot be called {self.name!r}: small letters, digits and _ "

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 from pydantic.fields import FieldInfo
 
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import ParameterError, SceneError, TactileLabError
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
@@ -167,9 +167,10 @@ class Protocol(BaseModel):
         """What went wrong in this protocol, with file and line of its own code.
 
         For the errors of `tactile_lab.errors`, which are raised on purpose, it is
-        their text; for those of other code their kind and text.
+        their text; for those of other code their kind and text. A `ParameterError` is
+        a mistake in the code that asked, too.
         """
-        if isinstance(error, TactileLabError):
+        if isinstance(error, TactileLabError) and not isinstance(error, ParameterError):
             return str(error)
         told = f"{type(error).__name__}: {error}"
         file = inspect.getfile(cls)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tactile_lab import notebook
@@ -52,8 +52,14 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
     pictures = []
     for plot in findings.plots:
         title = ": ".join(part for part in (run.title, plot.title) if part)
-        figure = draw(plot, title, run.subtitle, simulated=run.simulated)
-        pictures.append((plot, save(figure, folder / plot.name, pdf=pdf)[1]))
+        try:
+            figure = draw(plot, title, run.subtitle, simulated=run.simulated)
+            pictures.append((plot, save(figure, folder / plot.name, pdf=pdf)[1]))
+        except (ValueError, TypeError) as error:
+            if plot not in findings.answers:
+                raise
+            said = f"No plot {plot.name!r}: it cannot be drawn ({error})"
+            findings = replace(findings, missing=(*findings.missing, said))
     html = folder / "report.html"
     html.write_text(page(findings, pictures), encoding="utf-8")
     return Report(

@@ -66,6 +66,15 @@ def test_a_protocol_of_ones_own_runs_as_the_how_to_says(tmp_path):
     assert [t["spikes"] > 0 for t in trials] == [False] * (len(trials) - 1) + [True]
     levels = [t["level_N"] for t in trials]
     assert levels[1] - levels[0] == pytest.approx(0.01)
+    found = json.loads((tmp_path / result["run"] / "results.json").read_text())
+    assert found["conclusion"]["answered_N"] == pytest.approx(levels[-1] - 0.005)
+    assert [row[0] for row in found["tables"][0]["rows"]] == [
+        t["label"] for t in trials
+    ]
+    page = (tmp_path / result["run"] / "report.html").read_text(encoding="utf-8")
+    assert found["statements"][0] in page
+    assert found["plots"][0]["caption"] in page
+    assert (tmp_path / result["run"] / "summary.png").exists()
 
 
 def test_the_scene_of_the_how_to_is_one(tmp_path):

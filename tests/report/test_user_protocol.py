@@ -1,0 +1,186 @@
+"""A protocol file of the user's own concludes and draws, or says where it fails."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tactile_lab.cli import cli
+from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import ParameterError, SceneError
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.report.from_run import read
+from tactile_lab.report.write import write
+from tactile_lab.scene.load import load
+
+OWN = """
+from typing import ClassVar
+
+from tactile_lab.conclusion import Conclusion, Table
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.waveform import Waveform
+
+
+class Own(Protocol):
+    name: ClassVar[str] = "own"
+    title: ClassVar[str] = "My own"
+    signals: ClassVar[tuple[str, ...]] = ("force", "V_C1")
+
+    def trials(self) -> Trials:
+        pulse = Waveform.pulse(0.05, ramp=0.1, hold=0.3, rest=0.2)
+        yield Trial(force=pulse, label="50 mN", level=0.05, hold=(0.1, 0.4))
+
+    def conclude(self, run):
+        (trial,) = run.results
+        fall = trial.rest - run.mean("V_C1", *trial.held)
+        table = Table(title="Falls", headings=("Trial", "V"), rows=(("1", f"{fall:.3f}"),))
+        return Conclusion((f"V_C1 falls by {fall:.3f} V.",), {"fall_V": fall}, (), (table,))
+
+    def plots(self, run):
+        trace = run.trace("V_C1")
+        series = Series(x=trace.time, y=trace.mean, colour="V_C1")
+        yield Plot(name="summary", caption="V_C1 alone.", x_label="Time", x_unit="s",
+                   panels=(Panel(label="V_C1", unit="V", series=(series,)),))
+"""
+SLOW = ("record.sample_rate=10 kS/s",)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The run of such a file, which is gone since."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "own.py").write_text(OWN)
+    done = Execution(load(str(folder / "own.py"), SLOW), folder / "runs").run()
+    assert done.exit_code == 0, done.reason
+    (folder / "own.py").unlink()
+    return done.folder
+
+
+def kept(made, folder, old="", new=""):
+    """The run again, its kept protocol with `old` replaced."""
+    shutil.copytree(made, folder / "run")
+    file = folder / "run" / "inputs" / "own.py"
+    assert old in file.read_text()
+    text = file.read_text().replace(old, new)
+    file.unlink()
+    file.write_text(text)
+    return folder / "run"
+
+
+def line_of(text, folder):
+    lines = (folder / "inputs" / "own.py").read_text().splitlines()
+    return 1 + next(i for i, line in enumerate(lines) if text in line)
+
+
+def test_an_old_run_concludes_and_draws_by_the_file_it_keeps(made):
+    report = write(made, read(made))
+    found = json.loads(report.results.read_text())
+    fall = found["conclusion"]["fall_V"]
+    assert 0.05 < fall < 0.5
+    assert found["statements"] == [f"V_C1 falls by {fall:.3f} V."]
+    assert found["tables"][0]["rows"] == [["1", f"{fall:.3f}"]]
+    page = report.html.read_text(encoding="utf-8")
+    assert "V_C1 alone." in page and "<h2>Falls</h2>" in page
+    assert (made / "summary.png").exists() and report.png.exists()
+    said = CliRunner().invoke(cli, ["report", str(made)]).stdout
+    assert found["statements"][0] in said and "Falls" in said
+
+
+def test_the_window_reads_the_same_drawings(made):
+    report = write(made, read(made))
+    (stored,) = json.loads(report.results.read_text())["plots"]
+    plot, asked = Plot.from_dict(stored), report.findings.answers[0]
+    assert plot.x_scale() == asked.x_scale()
+    (series,), (own,) = plot.panels[0].series, asked.panels[0].series
+    assert np.array_equal(series.x, own.x) and np.allclose(series.y, own.y)
+    assert plot.to_dict() == stored
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("(trial,) = run.results", "(trial,) = 1 / 0", "ZeroDivisionError"),
+        ("return Conclusion", "Conclusion", "return a Conclusion"),
+        ('"fall_V": fall', '"fall_V": object()', "TypeError"),
+        ("y=trace.mean,", "y=trace.mean[1:],", "give as many"),
+        ('name="summary"', 'name="../summary"', "small letters"),
+        ("run.trace(", "run.signal(", "AttributeError"),
+    ],
+)
+def test_an_error_of_its_code_names_file_and_line_and_costs_nothing_else(
+    made, tmp_path, old, new, says
+):
+    folder = kept(made, tmp_path, old, new)
+    report = write(folder, read(folder))
+    (said,) = report.findings.missing
+    assert "own.py" in said and says in said
+    if new not in ("Conclusion", '"fall_V": object()', 'name="../summary"'):
+        assert f"own.py, line {line_of(new, folder)}: " in said
+    found = json.loads(report.results.read_text())
+    assert found["missing"] == [said] and len(found["trials"]) == 1
+    assert bool(found["statements"]) != bool(found["plots"]), "the other one is kept"
+    assert report.png.exists() and "own.py" in report.html.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("when", ["first", "later"])
+def test_trials_that_raise_are_refused_with_file_and_line(tmp_path, when):
+    bad = {"first": "        int('x')\n        pulse =", "later": "        pulse ="}[
+        when
+    ]
+    after = "" if when == "first" else "\n        int('x')"
+    hold = "hold=(0.1, 0.4))"
+    text = OWN.replace("        pulse =", bad, 1).replace(hold, hold + after, 1)
+    (tmp_path / "own.py").write_text(text)
+    line = 1 + text[: text.index("int('x')")].count("\n")
+    with pytest.raises(SceneError, match=rf"own.py, line {line}: ValueError"):
+        Execution(load(str(tmp_path / "own.py"), SLOW), tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_trials_that_raise_on_the_bench_keep_the_run(tmp_path):
+    """The plan's outcome is the model's: what is measured may still surprise."""
+    text = OWN.replace("        yield Trial", "        seen = yield Trial").replace(
+        "hold=(0.1, 0.4))",
+        "hold=(0.1, 0.4))\n        seen.codes['V_C1'] if seen.codes else None\n"
+        "        seen.codes and [][3]",
+    )
+    (tmp_path / "own.py").write_text(text)
+    done = Execution(load(str(tmp_path / "own.py"), SLOW), tmp_path / "runs").run()
+    line = 1 + text[: text.index("[][3]")].count("\n")
+    assert done.off.verified
+    assert f"own.py, line {line}: IndexError" in done.reason
+    assert len(read(done.folder).trials) == 1
+
+
+def test_a_series_needs_as_many_values_each():
+    with pytest.raises(ParameterError, match=r"2 values of x.*\(3,\)"):
+        Series(x=[1, 2], y=[1, 2], low=[0, 0, 0], high=[1, 1, 1])
+    with pytest.raises(ParameterError, match="no panel"):
+        Plot(name="a", caption="", x_label="", panels=())
+    Panel(label="", series=(Series(x=[1.0], mark="ticks"),))
+
+
+def test_nothing_above_the_protocols_knows_one_by_its_name():
+    """What a protocol means and how it is drawn stands with it, and nowhere else."""
+    import ast
+
+    from tactile_lab.plugins import protocol_names
+
+    root = Path(__file__).parents[2]
+    allowed = {  # the verb's own scene, a mode of a waveform, names of icons and words
+        ("commands", "monitor"), ("gui", "monitor"), ("gui", "repeat"), ("gui", "hold"),
+        ("gui", "waveform"), ("commands", "hold"), ("engine", "monitor"),
+    }  # fmt: skip
+    found = []
+    for room in ("tactile_lab/report", "tactile_lab/analysis", "tactile_lab/commands",
+                 "tactile_lab/engine", "gui"):  # fmt: skip
+        for file in (root / room).rglob("*.py"):
+            tree = ast.parse(file.read_text(encoding="utf-8"))
+            for node in ast.walk(tree):
+                if isinstance(node, ast.Constant) and node.value in protocol_names():
+                    found.append((Path(room).name, node.value, file.name))
+    assert not [f for f in found if f[:2] not in allowed]
