@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from typing import ClassVar
 
 from pydantic import Field
 
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.measurement import Measurement
-from tactile_lab.plot import Guide, Plot
 from tactile_lab.quantity import Duration, show
-from tactile_lab.report.overview import overview
 from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -54,20 +50,3 @@ class Monitor(Protocol):
             f"{'is silent' if distance > 0 else 'fires'} at rest."
         )
         return Conclusion((said,), {"distance_to_threshold_V": distance})
-
-    def plots(self, run: Measurement) -> Iterator[Plot]:
-        """The general plot with the V_C1 below which the sensor fires."""
-        if run.circuit is None:
-            return
-        critical, general = run.circuit.critical_V_C1, overview(run)
-        said = f"fires below {show(critical, 'V')}"
-        line = Guide(at=critical, along="x", text=said, colour="V_C1")
-        yield replace(
-            general,
-            panels=tuple(
-                replace(panel, guides=(*panel.guides, line))
-                if panel.label == "Voltage"
-                else panel
-                for panel in general.panels
-            ),
-        )

@@ -123,6 +123,15 @@ def ships(kind: type) -> bool:
     return kind.__module__ in _protocols().values()
 
 
+def protocol_checking(what: str) -> str:
+    """Name of the protocol that ships, and of its scene, that checks that of a bench.
+
+    Args:
+        what: as `Protocol.checks` has it: "wiring", "field" or "force".
+    """
+    return next(n for n in protocol_names() if protocol_class(n).checks == what)
+
+
 def protocol_from_file(path: Path) -> type[Protocol]:
     """The protocol in a Python file of the user's own.
 

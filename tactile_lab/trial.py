@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 from pydantic.fields import FieldInfo
 
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.errors import ParameterError, SceneError, TactileLabError
+from tactile_lab.errors import ParameterError, TactileLabError
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:

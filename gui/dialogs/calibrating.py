@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
 from gui.dialogs.bench_text import Choice
 from gui.look.theme import Theme
 from gui.parts import column, label, line, push
-from gui.review.conclusion import Conclusion
-from gui.review.loop import LoopPlot
+from gui.review.conclusion import Concluded
+from gui.review.live_plots import loop_plot
+from gui.review.plot_view import PlotView
 from tactile_lab.trace import FloatArray
 
 MAGNET = (
@@ -41,7 +42,7 @@ class Calibrating(QWidget):
         self.named = label("", "muted", wrap=True)
         self.field = push("Calibrate the field", "primary")
         self.progress = label("", "muted", wrap=True)
-        self.loop = LoopPlot(theme)
+        self.loop = PlotView(theme)
         self.loop.setFixedHeight(TALL)
         self.loop.hide()
         self.findings = label("", "", wrap=True)
@@ -82,10 +83,10 @@ class Calibrating(QWidget):
 
     def show_loop(self, loop: FloatArray) -> None:
         """Show the readings so far, shape (n, 2): A and T."""
-        self.loop.show_loop(loop)
+        self.loop.show_plot(loop_plot(loop))
         self.loop.setVisible(loop.shape[0] > 2)
 
-    def show_conclusion(self, found: Conclusion) -> None:
+    def show_conclusion(self, found: Concluded) -> None:
         """Show slope, loop and uncertainty, and offer the file."""
         self._file = found.calibration
         self.loop.setFixedHeight(LOW)  # the words need the room; Results has it large

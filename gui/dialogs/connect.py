@@ -32,6 +32,7 @@ from gui.session.session import Session
 from gui.state import State, minutes
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.errors import TactileLabError
+from tactile_lab.plugins import protocol_checking
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 
@@ -39,8 +40,6 @@ if TYPE_CHECKING:
     from gui.screen.panels import Panels
     from gui.screen.screen import Screen
     from tactile_lab.acquisition.ending import Executed
-
-WIRING, FIELD = "wiring_check", "calibrate_field"
 
 PAGE = 540
 """Height of a page where the window is high enough, px."""
@@ -66,7 +65,8 @@ class Connect(Overlay):
         self._choice = start_choice()
         self._shown: BenchSpec | None = None
         self._running = ""
-        self._ended = {WIRING: "", FIELD: ""}
+        self._wiring, self._field = (protocol_checking(w) for w in ("wiring", "field"))
+        self._ended = {self._wiring: "", self._field: ""}
         self.instruments = Instruments(self._choice, theme)
         self.wiring = Wiring(self._choice, theme)
         self.calibration = Calibrating(self._choice, theme)
@@ -87,8 +87,8 @@ class Connect(Overlay):
         self.save.clicked.connect(self._ask_and_save)
         self.open_file.clicked.connect(self._ask_and_open)
         self.close_button.clicked.connect(self.hide)
-        self.wiring.check_asked.connect(lambda: self._run(WIRING))
-        self.calibration.field_asked.connect(lambda: self._run(FIELD))
+        self.wiring.check_asked.connect(lambda: self._run(self._wiring))
+        self.calibration.field_asked.connect(lambda: self._run(self._field))
         self.calibration.force_asked.connect(self._prepare_force)
         self.calibration.use_asked.connect(self._ask_and_use)
         session.status.changed.connect(self._follow)
@@ -162,7 +162,7 @@ class Connect(Overlay):
 
     def _trial_ended(self, outcome: object) -> None:
         source = self.session.source
-        if self._running == FIELD and source is not None:
+        if self._running == self._field and source is not None:
             self.calibration.show_loop(source.loop)
 
     def _run_ended(self, done: Executed) -> None:
@@ -181,9 +181,9 @@ class Connect(Overlay):
             if self._running:
                 self._end(str(error))
             return
-        if found.protocol == WIRING:
+        if found.protocol == self._wiring:
             self.wiring.show_conclusion(found)
-        elif found.protocol == FIELD:
+        elif found.protocol == self._field:
             self.calibration.show_conclusion(found)
         if found.protocol == self._running:
             self._end(f"Kept as {folder.name}")
@@ -214,15 +214,15 @@ class Connect(Overlay):
         if session.manual.alive:
             reason = "The coil is driven by hand; switch it off first."
         for page, button, ended in (
-            (self.wiring, self.wiring.check, self._ended[WIRING]),
-            (self.calibration, self.calibration.field, self._ended[FIELD]),
+            (self.wiring, self.wiring.check, self._ended[self._wiring]),
+            (self.calibration, self.calibration.field, self._ended[self._field]),
         ):
             button.setEnabled(not reason)
             button.setToolTip(reason)
             page.progress.setText(reason or ended)
 
     def _say_progress(self, text: str, *, busy: bool) -> None:
-        page = self.wiring if self._running == WIRING else self.calibration
+        page = self.wiring if self._running == self._wiring else self.calibration
         page.show_progress(text, busy=busy)
         for other in (self.wiring.check, self.calibration.field):
             other.setEnabled(not busy)
@@ -261,7 +261,7 @@ class Connect(Overlay):
 
     def _prepare_force(self) -> None:
         self.hide()
-        self.prepare_asked.emit("force_check")
+        self.prepare_asked.emit(protocol_checking("force"))
 
     def _say(self, problem: str) -> None:
         self.problem.setText(problem)

@@ -17,7 +17,7 @@ from gui.dialogs.bench_text import Choice
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import column, empty, label, push, set_role
-from gui.review.conclusion import Conclusion
+from gui.review.conclusion import Concluded
 
 COLUMNS = ("Input", "Signal", "Range", "Offset", "Shunt")
 ROW = 28
@@ -31,7 +31,7 @@ class Wiring(QWidget):
     def __init__(self, choice: Choice, theme: Theme) -> None:
         super().__init__()
         self._choice, self._theme = choice, theme
-        self._concluded: Conclusion | None = None
+        self._concluded: Concluded | None = None
         self.table = QTableWidget(0, len(COLUMNS))
         self.table.setAccessibleName("Oscilloscope inputs")
         self.table.setHorizontalHeaderLabels(list(COLUMNS))
@@ -84,7 +84,7 @@ class Wiring(QWidget):
             self._concluded = None
             self._show_verdicts()
 
-    def show_conclusion(self, found: Conclusion) -> None:
+    def show_conclusion(self, found: Concluded) -> None:
         """Show what the check found."""
         self._concluded = found
         self._show_verdicts()

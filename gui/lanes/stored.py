@@ -12,6 +12,7 @@ from gui.lanes.expected import Hold, settled
 from gui.lanes.source import Source
 from gui.lanes.twin import MARGIN, Look, Twin
 from tactile_lab.engine.events import ModelPart
+from tactile_lab.errors import SceneError
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.run import Run
@@ -39,6 +40,8 @@ class RunSource(Source):
         signals: what the run stored, force and spikes included.
         model: the twin, once it has come.
         fetched: set each time samples asked for have arrived.
+        moves_probes: its protocol put the probes elsewhere for a while: there is
+            nothing to compare with the model.
     """
 
     spikes: FloatArray = np.empty(0)
@@ -55,6 +58,7 @@ class RunSource(Source):
         self.trials = run.trials
         self._holds = [_hold(trial) for trial in self.trials]
         self.simulated = run.simulated
+        self.moves_probes = _moves_probes(run)
         self._gain = float(run.attributes.get("newtons_per_ampere", 1.0)) or 1.0
         self._slow = _slow(run, self._gain)
         slow = (name for name, (time, _) in self._slow.items() if time.size)
@@ -214,3 +218,11 @@ def _hold(trial: Any) -> Hold:
     begin, stop = float(trial["hold_start"]), float(trial["hold_end"])
     held = None if begin != begin else (start + begin, start + stop)
     return Hold(start, end, label, bool(trial["pause"]), held)
+
+
+def _moves_probes(run: Run) -> bool:
+    """What its protocol says; no where that cannot be read any more."""
+    try:
+        return run.scene.protocol.moves_probes
+    except SceneError:
+        return False

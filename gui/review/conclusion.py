@@ -7,26 +7,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tactile_lab.analysis.wiring import Verdict
+from tactile_lab.conclusion import Table
 from tactile_lab.errors import RunFolderError
+from tactile_lab.plot import Plot
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """The wiring check on one channel."""
-
-    signal: str
-    ok: bool
-    text: str
-
-
-@dataclass(frozen=True)
-class Conclusion:
+class Concluded:
     """The parts of results.json that the window shows.
 
     Attributes:
         protocol: name.
         statements: what the run says as a whole, one sentence each.
         verdicts: of a wiring check, one per channel.
+        tables: for people.
+        plots: the protocol's own.
         calibration: file a field calibration wrote; None if there is none.
         twin: results.json's table of the model beside the run; empty without one.
     """
@@ -34,11 +30,13 @@ class Conclusion:
     protocol: str
     statements: tuple[str, ...]
     verdicts: tuple[Verdict, ...]
+    tables: tuple[Table, ...]
+    plots: tuple[Plot, ...]
     calibration: Path | None
     twin: dict[str, Any]
 
 
-def conclusion_of(folder: Path) -> Conclusion:
+def conclusion_of(folder: Path) -> Concluded:
     """What the report in a run's folder concluded.
 
     Raises:
@@ -49,13 +47,15 @@ def conclusion_of(folder: Path) -> Conclusion:
         found = json.loads(file.read_text(encoding="utf-8"))
         values = found["conclusion"] or {}
         made = folder / "calibration.csv"
-        return Conclusion(
+        return Concluded(
             protocol=found["protocol"],
             statements=tuple(found.get("statements", ())),
             verdicts=tuple(
                 Verdict(signal, bool(one["ok"]), str(one["text"]))
                 for signal, one in values.get("channels", {}).items()
             ),
+            tables=tuple(_table(table) for table in found.get("tables", ())),
+            plots=tuple(Plot.from_dict(plot) for plot in found.get("plots", ())),
             calibration=made if made.is_file() else None,
             twin=found.get("twin") or {},
         )
@@ -64,3 +64,13 @@ def conclusion_of(folder: Path) -> Conclusion:
             f"{file} cannot be read ({type(error).__name__}: {error}). Write the "
             f"report again: tactile-lab report {folder}"
         ) from error
+
+
+def _table(data: dict[str, Any]) -> Table:
+    rows = tuple(tuple(str(cell) for cell in row) for row in data["rows"])
+    return Table(
+        title=str(data["title"]),
+        headings=tuple(data["headings"]),
+        rows=rows,
+        note=str(data["note"]),
+    )

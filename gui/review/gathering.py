@@ -92,7 +92,7 @@ class Gathering(QObject):
         """A run from disk is on screen."""
         self.findings, self.folder = of_run(source), source.path
         self._whole = source.info.get("status") == "complete"
-        self._elsewhere = source.info.get("protocol") == "wiring_check"
+        self._elsewhere = source.moves_probes
         self._view.show_kind(fires="spikes" in source.signals)
         self._show(running=False)
         self._fit(source)
@@ -131,7 +131,8 @@ class Gathering(QObject):
 
     def _conclude(self, folder: Path) -> None:
         try:
-            self._view.show_statements(conclusion_of(folder).statements)
+            found = conclusion_of(folder)
+            self._view.show_statements(found.statements, found.tables, found.plots)
         except RunFolderError:
             self._view.show_statements(())  # reports of former versions have none
 

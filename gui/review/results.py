@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QTableWidget,
     QTableWidgetItem,
+    QVBoxLayout,
     QWidget,
 )
 
@@ -28,11 +30,13 @@ from gui.parts import (
     with_gutter,
 )
 from gui.review.fit_view import FitCards, TwinBars
-from gui.review.loop import LoopPlot
-from gui.review.rate_plot import RatePlot
+from gui.review.live_plots import loop_plot, rate_plot
+from gui.review.plot_view import PlotView
 from gui.review.wording import unbroken
 from gui.session.finding import Finding
 from gui.session.fit import Fit
+from tactile_lab.conclusion import Table
+from tactile_lab.plot import Plot
 from tactile_lab.trace import FloatArray
 
 HEAD, ROW, MOST = 52, 26, 12
@@ -52,13 +56,22 @@ class ResultsView(QWidget):
         self._mark = label("", "pill")
         self._mark.hide()
         self._mark.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.plot = RatePlot(theme)
-        self.loop = LoopPlot(theme)
+        self._theme = theme
+        self.plot = PlotView(theme)
+        self.loop = PlotView(theme)
         self.loop.hide()
+        self.answers: list[PlotView] = []
+        """Of the report: the protocol's own plots."""
+        self._findings: Sequence[Finding] = ()
+        self._model: tuple[tuple[float, float], ...] = ()
+        self._show_rates()
         self.cards = FitCards()
         self.bars = TwinBars(theme)
         self.statements = label("", "", wrap=True)
         self.statements.hide()
+        self.tables = label("", "", wrap=True)
+        self.tables.setTextFormat(Qt.TextFormat.RichText)
+        self.tables.hide()
         self._fires, self._loops = True, False
         self.table = QTableWidget(0, len(HEADINGS))
         self._facts = panel("card")
@@ -79,8 +92,11 @@ class ResultsView(QWidget):
         middle.addWidget(self.cards)
         middle.addWidget(self.plot, 2)
         middle.addWidget(self.loop, 2)
+        self._drawn = QVBoxLayout()
+        middle.addLayout(self._drawn, 2)
         middle.addWidget(self.table, 3)
         middle.addWidget(self.statements)
+        middle.addWidget(self.tables)
         middle.addStretch(1)
         middle.addWidget(self.bars)
         middle.addWidget(self._facts)
@@ -97,12 +113,8 @@ class ResultsView(QWidget):
         self, findings: Sequence[Finding], *, total: int, running: bool, whole: bool
     ) -> None:
         """Show what the steps so far gave; `whole` is whether the run was completed."""
-        points = [
-            (f.level * 1e3, f.peak_rate or 0.0, f.final_rate or 0.0)
-            for f in findings
-            if f.level is not None
-        ]
-        self.plot.show_points(points)
+        self._findings, self._model = tuple(findings), ()
+        self._show_rates()
         self._fill(findings)
         self._arrange()
         self._mark.setVisible(bool(findings) or running)
@@ -123,7 +135,8 @@ class ResultsView(QWidget):
         rates = self._fires and not self._loops
         self.cards.show_cards(found.cards if found and rates else ())
         self.bars.show_bars(() if found is None else found.bars)
-        self.plot.show_model(() if found is None else found.model)
+        self._model = () if found is None else found.model
+        self._show_rates()
 
     def show_kind(self, *, fires: bool) -> None:
         """Say whether spikes are looked for: without them there are no rates."""
@@ -133,27 +146,56 @@ class ResultsView(QWidget):
     def show_loop(self, loop: FloatArray) -> None:
         """Show the field against the current where a calibration reads it."""
         steps = np.unique(np.round(loop[:, 0], 2)).size
-        self._loops = steps > 4 and not self.plot.has_points
-        self.loop.show_loop(loop)
+        self._loops = steps > 4 and not self._levelled
+        self.loop.show_plot(loop_plot(loop))
         self._arrange()
 
-    def show_statements(self, statements: Sequence[str]) -> None:
-        """Show what the report concludes."""
+    def show_statements(
+        self,
+        statements: Sequence[str],
+        tables: Sequence[Table] = (),
+        plots: Sequence[Plot] = (),
+    ) -> None:
+        """Show what the report concludes, its tables, and the protocol's own plots."""
         self.statements.setText(unbroken("\n".join(statements)))
         self.statements.setVisible(bool(statements))
+        self.tables.setText("".join(_html(table) for table in tables))
+        self.tables.setVisible(bool(tables))
+        for old in self.answers:
+            old.setParent(None)
+            old.deleteLater()
+        self.answers = [PlotView(self._theme) for _ in plots]
+        for view, plot in zip(self.answers, plots, strict=True):
+            view.show_plot(plot)
+            self._drawn.addWidget(view)
+        self._arrange()
+
+    def _show_rates(self) -> None:
+        self.plot.nothing = (
+            "No step has fired."
+            if self._levelled
+            else "No steps yet. Rate, onset, slope and adaptation\n"
+            "are told here, step by step, as a run goes on."
+        )
+        self.plot.show_plot(rate_plot(self._findings, self._model))
+
+    @property
+    def _levelled(self) -> bool:
+        """Whether a step so far has a force it is filed under."""
+        return any(f.level is not None for f in self._findings)
 
     def _arrange(self) -> None:
         rates = self._fires and not self._loops
-        self.loop.setVisible(self._loops)
-        self.plot.setVisible(rates)
-        self.table.setVisible(rates and self.plot.has_points)
+        self.loop.setVisible(self._loops and not self.answers)
+        self.plot.setVisible(rates and not self.answers)
+        self.table.setVisible(rates and self._levelled)
         if not rates:
             self.cards.hide()
         self._title.setText(
             "Field against current"
-            if self._loops
+            if self._loops and not self.answers
             else "Rate against force"
-            if rates
+            if rates and not self.answers
             else "Results"
         )
 
@@ -208,3 +250,14 @@ class ResultsView(QWidget):
             first.setTextAlignment(
                 Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
             )
+
+
+def _html(table: Table) -> str:
+    """A table as rich text."""
+    rows = [
+        "".join(f"<td>{escape(cell)}&nbsp;&nbsp;</td>" for cell in row)
+        for row in (table.headings, *table.rows)
+    ]
+    cells = "".join(f"<tr>{row}</tr>" for row in rows)
+    title, note = escape(table.title), escape(table.note)
+    return f"<p><b>{title}</b></p><table>{cells}</table>{note}"

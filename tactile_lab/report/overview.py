@@ -33,7 +33,7 @@ def overview(run: Measurement) -> Plot:
     said = ["Force"]
     voltages = [t for name in ("V_C1", "V_C2") if (t := run.trace(name))]
     if voltages:
-        panels.append(_voltages(voltages, run.trace("V_C1", model=True), axis))
+        panels.append(_voltages(run, voltages, axis))
         said.append(
             "Voltages: mean and, shaded, the extremes within each bin; dotted: the "
             "model driven by the applied current"
@@ -106,8 +106,14 @@ def _force(run: Measurement, axis: ClosedTime) -> Panel:
 
 
 def _voltages(
-    signals: list[RecordedSignal], model: RecordedSignal | None, axis: ClosedTime
+    run: Measurement, signals: list[RecordedSignal], axis: ClosedTime
 ) -> Panel:
+    model, guides = run.trace("V_C1", model=True), []
+    if run.circuit is not None and not run.force.value.any():
+        # without force, what matters is how far the sensor is from firing
+        at = run.circuit.critical_V_C1
+        text = f"fires below {show(at, 'V')}"
+        guides.append(Guide(at=at, along="x", text=text, colour="V_C1"))
     series = [_series(s, axis, name=s.signal) for s in signals]
     if model is not None:
         time, mean = axis.spliced(model.time, model.mean)
@@ -119,6 +125,7 @@ def _voltages(
         label="Voltage",
         unit="V",
         series=tuple(series),
+        guides=tuple(guides),
         limits=(floor, None),
         height=1.9,
     )

@@ -37,8 +37,10 @@ class Own(Protocol):
     def conclude(self, run):
         (trial,) = run.results
         fall = trial.rest - run.mean("V_C1", *trial.held)
-        table = Table(title="Falls", headings=("Trial", "V"), rows=(("1", f"{fall:.3f}"),))
-        return Conclusion((f"V_C1 falls by {fall:.3f} V.",), {"fall_V": fall}, (), (table,))
+        rows = (("1", f"{fall:.3f}"),)
+        table = Table(title="Falls", headings=("Trial", "V"), rows=rows)
+        said = (f"V_C1 falls by {fall:.3f} V.",)
+        return Conclusion(said, {"fall_V": fall}, tables=(table,))
 
     def plots(self, run):
         trace = run.trace("V_C1")

@@ -1,0 +1,81 @@
+"""Plots of a run that goes on: rates against force, and the loop of a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gui.session.finding import Finding
+from tactile_lab.plot import Panel, Plot, Series
+
+FloatArray = NDArray[np.float64]
+
+
+def rate_plot(
+    findings: Sequence[Finding], model: Sequence[tuple[float, float]] = ()
+) -> Plot | None:
+    """Peak and final rate of each step against its force; None before one fired.
+
+    Args:
+        findings: the steps so far.
+        model: force, N, and peak rate, Hz, of the model's steps.
+    """
+    steps = [
+        (f.level, f.peak_rate or 0.0, f.final_rate or 0.0)
+        for f in findings
+        if f.level is not None
+    ]
+    if not any(peak for _, peak, _ in steps):
+        return None
+    force, peak, final = np.array(sorted(steps)).T
+    series = [
+        Series(x=force, y=peak, name="peak", mark="joined"),
+        Series(x=force, y=final, name="final", mark="joined", colour="force"),
+    ]
+    if model:
+        at, rate = np.array(sorted(model)).T
+        series.append(Series(x=at, y=rate, name="model", colour="model"))
+    return Plot(
+        name="rates",
+        caption="Highest and final rate of each step against its force.",
+        x_label="force",
+        x_unit="N",
+        x_prefix="m",
+        panels=(
+            Panel(
+                label="rate",
+                unit="Hz",
+                prefix="",
+                series=tuple(series),
+                limits=(0.0, None),
+            ),
+        ),
+    )
+
+
+def loop_plot(loop: FloatArray) -> Plot | None:
+    """The field against the current, and what it differs from a straight line.
+
+    The loop is a few percent of the field: only the difference shows its shape.
+
+    Args:
+        loop: readings, shape (n, 2): A and T.
+    """
+    current, field = loop.T
+    if current.size < 3 or np.ptp(current) == 0:
+        return None
+    rest = field - np.polyval(np.polyfit(current, field, 1), current)
+    panels = []
+    for label, values in (("field", field), ("field less a straight line", rest)):
+        line = Series(x=current, y=values, colour="force")
+        newest = Series(x=current[-1:], y=values[-1:], mark="points", colour="V_C1")
+        panels.append(Panel(label=label, unit="T", series=(line, newest), height=1.6))
+    return Plot(
+        name="loop",
+        caption="Both branches of the field against the current.",
+        x_label="coil current",
+        x_unit="A",
+        panels=tuple(panels),
+    )
