@@ -96,7 +96,8 @@ def _conclusion(run: RunData) -> Conclusion:
         try:
             own = run.protocol.conclude(run)
             if not isinstance(own, Conclusion):
-                raise TypeError(f"conclude gave {own!r}; return a Conclusion")
+                kind = type(run.protocol).__name__
+                raise TypeError(f"{kind}.conclude gave {own!r}; return a Conclusion")
             own.plain  # noqa: B018 - what cannot be stored is no conclusion
         except Exception as error:  # whatever a user's protocol raises
             own = Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
