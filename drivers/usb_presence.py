@@ -100,38 +100,6 @@ def present(backend: Any = None, *, vendor: int | None = None) -> tuple[Present,
     return tuple(sorted(seen, key=lambda one: (one.bus, one.address)))
 
 
-class Watch:
-    """Tells what was plugged in or pulled out since it was last asked.
-
-    Args:
-        backend: pyusb backend; None for libusb.
-        vendor: only this maker's devices.
-    """
-
-    def __init__(self, backend: Any = None, *, vendor: int | None = None) -> None:
-        self._backend = backend
-        self._vendor = vendor
-        self._known = self._look()
-
-    def changes(self) -> tuple[tuple[Present, ...], tuple[Present, ...]]:
-        """Devices that arrived, and devices that left.
-
-        Raises:
-            NotFoundError: libusb is not installed.
-        """
-        now, before = self._look(), self._known
-        self._known = now
-        arrived = tuple(now[key] for key in now if key not in before)
-        left = tuple(before[key] for key in before if key not in now)
-        return arrived, left
-
-    def _look(self) -> dict[tuple[int, int, int, int], Present]:
-        return {
-            (one.bus, one.address, one.vendor, one.product): one
-            for one in present(self._backend, vendor=self._vendor)
-        }
-
-
 def _seen(device: Any) -> Present | None:
     try:
         title, serial, readable = _strings(device)

@@ -98,11 +98,6 @@ class CoilSource:
         return self._setpoint
 
     @property
-    def energised(self) -> bool:
-        """Whether the output is on, as far as this program knows."""
-        return self._energised
-
-    @property
     def tripped(self) -> str | None:
         """Why the interlock latched, or None."""
         return self._interlock.tripped

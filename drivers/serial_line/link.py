@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import serial
@@ -32,16 +31,6 @@ LONGEST_DRAIN = 1.0
 
 Spy = Callable[[str, bytes, float], None]
 """Told of each (direction ">" or "<", bytes, clock time s)."""
-
-
-@dataclass
-class Tally:
-    """What a link has been through since it was made."""
-
-    exchanges: int = 0
-    timeouts: int = 0
-    bad_replies: int = 0
-    resynchronised: int = 0
 
 
 class SerialLink:
@@ -74,7 +63,6 @@ class SerialLink:
     ) -> None:
         self.port = port
         self.wire = wire
-        self.tally = Tally()
         self.identity: str | None = None
         self._clock = clock
         self._what = what
@@ -91,11 +79,6 @@ class SerialLink:
     def is_open(self) -> bool:
         """Whether the port is held."""
         return self._serial is not None
-
-    @property
-    def doubtful(self) -> bool:
-        """Whether the next query must resynchronise first."""
-        return self._doubtful
 
     def open(self) -> None:
         """Take the port and identify the instrument.
@@ -193,7 +176,6 @@ class SerialLink:
             NoReplyError: it does not answer.
             BadReplyError: it keeps talking, or answers with another name.
         """
-        self.tally.resynchronised += 1
         self.drain()
         self._send_preamble()
         answer = ""
@@ -253,13 +235,11 @@ class SerialLink:
                 raise self._bad(line, repeated.encode())
         answer = self._receive(line)
         if answer == line:
-            self.tally.bad_replies += 1
             raise BadReplyError(
                 f"The {self._what} at {self.port} echoes what it is sent. Switch its "
                 "echo off, or set echo = true in its dialect row."
             )
         self._doubtful = False
-        self.tally.exchanges += 1
         return answer
 
     def _send_preamble(self) -> None:
@@ -295,7 +275,6 @@ class SerialLink:
             if line:
                 self._tell("<", line)
             if not line.endswith(end):
-                self.tally.timeouts += 1
                 got = f"only {line!r}" if line else "nothing"
                 raise NoReplyError(
                     f"The {self._what} at {self.port} answered {got} to {asked!r} "
@@ -311,7 +290,6 @@ class SerialLink:
 
     def _bad(self, asked: str, line: bytes) -> BadReplyError:
         self._doubtful = True
-        self.tally.bad_replies += 1
         return BadReplyError(
             f"The {self._what} at {self.port} answered {line!r} to {asked!r}, which is "
             "no text of its dialect. Check baud rate, parity and cable."
@@ -326,7 +304,6 @@ class SerialLink:
             yield self._serial
         except serial.SerialTimeoutException as reason:
             self._doubtful = True
-            self.tally.timeouts += 1
             raise NoReplyError(
                 f"The {self._what} at {self.port} takes no more characters; it hangs, "
                 "or holds the line by flow control."

@@ -31,7 +31,6 @@ class Frames(QObject):
         self._panels, self._screen = panels, screen
         self.frozen = False
         self.costs: list[float] = []
-        self.paints: list[float] = []
         self._numbers = 0.0
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)

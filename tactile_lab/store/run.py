@@ -192,10 +192,6 @@ class Run:
         """A table as the file holds it, unread."""
         return self._file[name]
 
-    def table_attributes(self, name: str) -> dict[str, Any]:
-        """Units and settings stored with a table."""
-        return dict(self._file[name].attrs)
-
     @property
     def spikes(self) -> Records:
         """Detected spikes: sample, time (s), amplitude (SI), width (s)."""

@@ -69,7 +69,7 @@ def test_a_threshold_from_the_noise_is_found_told_and_kept(run_scene, short):
         # 20 mV of noise and 39 mV of code step are 23 mV: 7 of them
         assert found["from"] == "noise"
         assert 0.10 < found["threshold_V"] < 0.25
-        attrs = run.table_attributes("spikes")
+        attrs = run.table("spikes").attrs
         volts = attrs["threshold"] * attrs["gain"] + attrs["offset"]
         assert volts == pytest.approx(found["threshold_V"])
         assert run.records("gaps").size == 0

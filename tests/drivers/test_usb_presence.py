@@ -6,7 +6,7 @@ import pytest
 import usb.core
 import usb.util
 
-from drivers.usb_presence import PICO, Watch, present
+from drivers.usb_presence import PICO, present
 from sim_backend.usbtmc.bus import SimulatedBus
 from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault
@@ -67,19 +67,6 @@ def test_a_device_that_vanishes_meanwhile_is_left_out() -> None:
 def test_a_device_without_strings_is_no_problem() -> None:
     (bare,) = present(SimulatedBus([SimulatedDevice(vendor=PICO, product=1, speed=4)]))
     assert bare.readable and bare.problem is None and bare.title == ""
-
-
-def test_hot_plugging() -> None:
-    device = picoscope()
-    bus = SimulatedBus([device, rigol()])
-    watch = Watch(bus)
-    assert watch.changes() == ((), ())
-    device.unplug()
-    arrived, left = watch.changes()
-    assert arrived == () and [one.vendor for one in left] == [PICO]
-    device.replug()
-    arrived, left = watch.changes()
-    assert [one.serial for one in arrived] == ["AB1/1"] and left == ()
 
 
 def test_nothing_is_left_open() -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from gui.look.tokens import DARK, LIGHT, Tokens, contrast
+from gui.look.tokens import DARK, LIGHT, Tokens
 from gui.state import (
     STALE,
     CoilView,
@@ -14,6 +14,22 @@ from gui.state import (
     stop_text,
     truth,
 )
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of "#rrggbb", 0 to 1 (WCAG 2)."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [
+        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts
+    ]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast ratio of two colours, 1 to 21 (WCAG 2)."""
+    high, low = sorted((luminance(one), luminance(other)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
 
 LIVE = CoilView(True, 0.374, 0.374, limit=2.0)
 
