@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from tactile_lab.quantity import show
+from tactile_lab.quantity import printed, show
 
 STALE = 1.5
 """Seconds without a word from a live coil's source after which its state is unknown."""
@@ -163,7 +163,7 @@ def milliamperes(current: float | None) -> str:
     if current is None:
         return "not read"
     number = round(current * 1e3)
-    return f"{number} mA".replace("-", "−")
+    return printed(f"{number} mA")
 
 
 def stop_text(state: State, coil: CoilView | None) -> StopText:

@@ -19,7 +19,7 @@ from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Pause, show
+from tactile_lab.quantity import Duration, Pause, printed, show
 from tactile_lab.stimulus.demagnetise import demagnetising
 from tactile_lab.stimulus.force import PushCurrent
 from tactile_lab.trial import Protocol, Trial, Trials
@@ -101,7 +101,7 @@ class CalibrateField(Protocol):
         return Trial(
             force=Waveform.constant(0.0),
             current=Waveform.through([(0.0, last), (RAMP, level), (end, level)]),
-            label=f"{branch} {level * 1e3:.0f} mA".replace("-", "−"),
+            label=printed(f"{branch} {level * 1e3:.0f} mA"),
             hold=(begin, end),
         )
 

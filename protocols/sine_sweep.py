@@ -14,7 +14,7 @@ from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.errors import NotIdentifiableError, QuantityError
 from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Force, Pause, Unit, parse
+from tactile_lab.quantity import Force, Pause, Unit, parse, printed
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
@@ -103,7 +103,7 @@ class SineSweep(ForceProtocol):
             f"{_degrees(g.phase):.0f}°"
             for g, u in known
         )
-        said = [f"V_C1 answers force with {told} (95 %).".replace("-", "−")]
+        said = [printed(f"V_C1 answers force with {told} (95 %).")]
         if run.force_uncertainty is None:
             said.append(NOT_STATED)
         if len(expected) == len(found):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from tactile_lab.quantity import printed
+
 
 def step_of(span: float, at_most: int) -> float:
     """The 1-2-5 step that gives no more than `at_most` intervals over `span`."""
@@ -37,7 +39,7 @@ def number(value: float, places: int) -> str:
     text = f"{value:.{places}f}"
     if float(text) == 0:
         text = text.replace("-", "")
-    return text.replace("-", "−")
+    return printed(text)
 
 
 def signed(value: float, places: int) -> str:

@@ -12,7 +12,7 @@ from gui.setup.parameter import toml
 from tactile_lab.bench import Channel
 from tactile_lab.errors import QuantityError, SceneError
 from tactile_lab.instruments.registry import scope_capability
-from tactile_lab.quantity import exact, parse, show
+from tactile_lab.quantity import exact, parse, printed, show, typed
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.table import dumped
 
@@ -65,8 +65,8 @@ class InputCard(QFrame):
             QuantityError: the offset is no voltage.
         """
         made = dumped(self._table)
-        made["range"] = exact(float(self.range.currentData()), "V").replace("−", "-")
-        made["offset"] = exact(parse(self.offset.text(), "V"), "V").replace("−", "-")
+        made["range"] = typed(exact(float(self.range.currentData()), "V"))
+        made["offset"] = typed(exact(parse(self.offset.text(), "V"), "V"))
         made["coupling"] = self.coupling.currentText()
         return made
 
@@ -76,7 +76,7 @@ class InputCard(QFrame):
             middle = -parse(self.offset.text(), "V")
             low, high = (round(middle + sign * full, 9) for sign in (-1, 1))
             code = show(2 * full / 2**self._bits, "V", 2)
-            span = f"{low:.4g} to {high:.4g} V".replace("-", "−")
+            span = printed(f"{low:.4g} to {high:.4g} V")
             self._sees.setText(f"{span} · {code} a code")
         except QuantityError as error:
             self._sees.setText("offset?")

@@ -7,6 +7,7 @@ import numpy as np
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import TactileLabError
+from tactile_lab.quantity import printed
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome
 
@@ -81,4 +82,4 @@ def _spikes(outcome: Outcome, predicted: np.ndarray) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.2g}".replace("-", "−")
+    return printed(f"{value:+.2g}")

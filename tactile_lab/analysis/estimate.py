@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from tactile_lab.quantity import printed
+
 _Z95 = 1.959963984540054
 
 
@@ -56,7 +58,7 @@ class Estimate:
 
 
 def _plain(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
+    return printed(f"{value:.3g}")
 
 
 def student_95(freedom: int) -> float:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_lab.quantity import printed
+
 FloatArray = NDArray[np.float64]
 
 WITHIN = 0.5
@@ -60,11 +62,11 @@ class Matched:
         if self.missed:
             text += f", {self.missed} predicted ones missing"
         if self.offsets.size:
-            middle = f"{np.median(self.offsets) * 1e3:.2g}".replace("-", "−")
+            middle = printed(f"{np.median(self.offsets) * 1e3:.2g}")
             largest = np.max(np.abs(self.offsets)) * 1e3
             text += f", offset {middle} ms (median), {largest:.2g} ms at most"
         if self.rate_error.size:
-            middle = f"{np.median(self.rate_error) * 100:.2g}".replace("-", "−")
+            middle = printed(f"{np.median(self.rate_error) * 100:.2g}")
             text += f", rate error {middle} % (median)"
         return text
 

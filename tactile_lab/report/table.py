@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
-from tactile_lab.quantity import show
+from tactile_lab.quantity import printed, show
 
 NONE = "–"
 
@@ -102,4 +102,4 @@ def _shown(value: float | None, unit: str, digits: int = 3) -> str:
 
 
 def _true(value: float) -> str:
-    return f"{value:.4g}".replace("-", "−")
+    return printed(f"{value:.4g}")

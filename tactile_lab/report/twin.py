@@ -11,6 +11,7 @@ from tactile_lab.analysis.spike_pairs import PART, Matched
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
 from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.quantity import printed
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.waveform import Waveform
@@ -89,7 +90,7 @@ def sentences(run: Measurement, found: Twin) -> tuple[str, ...]:
             else ""
         )
         # adding 0 makes a rounded -0 plain
-        offset = f"{round(residual.offset * 1e3, 1) + 0.0:+.1f}".replace("-", "−")
+        offset = printed(f"{round(residual.offset * 1e3, 1) + 0.0:+.1f}")
         said.append(
             f"{residual.signal}: measured less model is {offset} mV on average, "
             f"{residual.rms * 1e3:.1f} mV rms, within {residual.band * 1e3:.1f} mV for "
