@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -102,25 +100,19 @@ def certify(run: Run) -> Certificate:
     rows = run.records("gaps")["missing"]
     missing = int(rows.sum())
     lost = missing if run.gapless else 0
-    produced: int | None = 0
-    written = 0
-    for name in run.signals:
-        delivered = (counters.get(name) or {}).get("produced")
-        if delivered is None or produced is None:
-            produced = None
-        else:
-            produced += delivered + lost
-        written += run.stored(name)
+    told = [(counters.get(name) or {}).get("produced") for name in run.signals]
+    delivered = [count + lost for count in told if count is not None]
     online = run.records("spikes")["sample"]
-    offline = None if not searched_is_stored(run) else redetect(run)["sample"]
+    found = redetect(run)
+    offline = None if found is None else found["sample"]
     covered = streamed = None
     if run.signals and not run.gapless:
         interval = float(run.attributes["interval"])
         covered = run.samples * interval
         streamed = covered + missing * interval
     return Certificate(
-        produced=produced,
-        written=written,
+        produced=sum(delivered) if len(delivered) == len(told) else None,
+        written=sum(run.stored(name) for name in run.signals),
         gaps=missing,
         covered=covered,
         streamed=streamed,
@@ -144,37 +136,27 @@ def write_certificate(path: Path) -> Certificate:
     return certificate
 
 
-def searched_is_stored(run: Run) -> bool:
-    """Whether the channel that spikes were searched on is stored."""
-    return run.detection is not None and run.detection.signal in run.signals
-
-
-def redetect(run: Run) -> NDArray[Any]:
+def redetect(run: Run) -> NDArray[Any] | None:
     """Spikes found again in the stored samples, dtype `spikes.detector.SPIKE`.
 
-    Each stretch without a gap is searched by itself, as on line.
+    Each stretch without a gap is searched by itself, as on line. None where the channel
+    is not stored, or none was searched.
     """
+    detection = run.detection
+    if detection is None or detection.signal not in run.signals:
+        return None
     # compiled code is loaded only where it is needed
     from tactile_lab.spikes.detector import SPIKE, detector_of
 
     found = [np.empty(0, SPIKE)]
-    if run.detection is not None and searched_is_stored(run):
-        signal = run.signal(run.detection.signal)
-        for start, stop in stretches(run):
-            detector = detector_of(run.detection)
-            for at in range(start, stop, PIECE):
-                codes = signal.scope_codes(at, min(at + PIECE, stop))
-                found.append(detector.feed(at, codes))
-            found.append(detector.flush())
+    signal = run.signal(detection.signal)
+    for start, stop in run.axis.stretches(0, run.samples):
+        detector = detector_of(detection)
+        for at in range(start, stop, PIECE):
+            codes = signal.scope_codes(at, min(at + PIECE, stop))
+            found.append(detector.feed(at, codes))
+        found.append(detector.flush())
     return np.concatenate(found)
-
-
-def stretches(run: Run) -> Iterator[tuple[int, int]]:
-    """(first, one past last) stored sample of each stretch without a gap."""
-    end = run.samples
-    for start, stop in pairwise([*run.axis.first.tolist(), end]):
-        if start < min(stop, end):
-            yield start, min(stop, end)
 
 
 def unmatched(

@@ -8,7 +8,8 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Literal
@@ -64,28 +65,22 @@ class RunFolder:
         Raises:
             RecordingError: the disk lacks room, or the folder cannot be written.
         """
-        now = datetime.now().astimezone()
-        try:
+        began = datetime.now()
+        lost = f"No run folder can be made under {root}"
+        with _refused(lost, "Choose a writable folder with --out."):
             root.mkdir(parents=True, exist_ok=True)
             check_space(root, needed + reserve)
-            path = _unique(root, f"{now:%Y-%m-%d_%H%M%S}_{_plain(name)}")
+            path = _unique(root, f"{began:%Y-%m-%d_%H%M%S}_{_plain(name)}")
             content = {
                 "schema": SCHEMA,
                 "status": "running",
-                "started": now.isoformat(timespec="milliseconds"),
+                "started": _iso(began),
                 "ended": None,
                 "process": os.getpid(),
                 **info,
             }
             write_json(path / INFO, content)
             log = (path / LOG).open("a", encoding="utf-8")
-        except OSError as error:
-            if isinstance(error, RecordingError):
-                raise
-            raise RecordingError(
-                f"No run folder can be made under {root}: {error.strerror or error}. "
-                "Choose a writable folder with --out."
-            ) from error
         _lock(log)
         return cls(path, content, log)
 
@@ -96,15 +91,10 @@ class RunFolder:
 
     def log(self, kind: str, text: str, **entries: Any) -> None:
         """Append one line to the log."""
-        now = datetime.now().astimezone().isoformat(timespec="milliseconds")
-        line = {"at": now, "kind": kind, "text": text, **entries}
-        try:
+        line = {"at": _iso(datetime.now()), "kind": kind, "text": text, **entries}
+        with _refused(f"{self.path / LOG} cannot be written"):
             self._log.write(json.dumps(line, ensure_ascii=False, default=str) + "\n")
             self._log.flush()
-        except OSError as error:
-            raise RecordingError(
-                f"{self.path / LOG} cannot be written: {error.strerror}."
-            ) from error
 
     def write_text(self, name: str, text: str) -> Path:
         """Put a text file into the folder, such as "inputs/calibration.csv".
@@ -113,22 +103,17 @@ class RunFolder:
         """
         path = self.path / name
         data = text.encode()
-        try:
+        with _refused(f"{path} cannot be written"):
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(data)
-        except OSError as error:
-            raise RecordingError(
-                f"{path} cannot be written: {error.strerror}."
-            ) from error
         files = {**self.info.get("files", {}), name: digest(data)}
         self.update(files=files)
         return path
 
     def finish(self, status: Status, **entries: Any) -> None:
         """Patch `run.json` for the last time and let go of the folder."""
-        ended = datetime.now().astimezone().isoformat(timespec="milliseconds")
         try:
-            self.update(status=status, ended=ended, **entries)
+            self.update(status=status, ended=_iso(datetime.now()), **entries)
         finally:
             self._log.close()
 
@@ -145,17 +130,13 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
         RecordingError: the folder cannot be written.
     """
     new = path.with_suffix(".new")
-    try:
+    with _refused(f"{path} cannot be written", "The old one stays."):
         with new.open("w", encoding="utf-8") as file:
             json.dump(content, file, indent=2, ensure_ascii=False, default=str)
             file.write("\n")
             file.flush()
             os.fsync(file.fileno())
         new.replace(path)
-    except OSError as error:
-        raise RecordingError(
-            f"{path} cannot be written: {error.strerror}; the old one stays."
-        ) from error
 
 
 def read_info(path: Path) -> dict[str, Any]:
@@ -206,6 +187,23 @@ def is_live(path: Path) -> bool:
     except PermissionError:
         # another user's run, or a read-only archive: nobody here can be its writer
         return False
+
+
+@contextmanager
+def _refused(what: str, advice: str = "") -> Iterator[None]:
+    """Say of an error of the disk `what` could not be done, and what to do about it."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(
+            f"{what}: {error.strerror or error}. {advice}".rstrip()
+        ) from error
+
+
+def _iso(time: datetime) -> str:
+    return time.astimezone().isoformat(timespec="milliseconds")
 
 
 def _unique(root: Path, name: str) -> Path:

@@ -37,61 +37,28 @@ CHUNK_TIME = 0.25
 """Length of one chunk, s: what a crash can cost at most."""
 
 CHECK = np.dtype([("samples", "u4"), ("crc32", "u4")])
-COLUMNS: dict[str, dict[str, tuple[str, str]]] = {
-    "segments": {
-        "first": ("i8", "sample"),
-        "time": ("f8", "s"),
-        "interval": ("f8", "s"),
-        "host": ("f8", "s"),
-        "drift": ("f8", "s/s"),
-        "uncertainty": ("f8", "s"),
-    },
-    "gaps": {
-        "sample": ("i8", "sample"),
-        "missing": ("i8", "sample"),
-        "time": ("f8", "s"),
-    },
-    "overrange": {
-        "sample": ("i8", "sample"),
-        "samples": ("i8", "sample"),
-        "channels": ("u4", "bit per row"),
-    },
-    "spikes": {
-        "sample": ("f8", "sample"),
-        "time": ("f8", "s"),
-        "amplitude": ("i2", "code"),
-        "width": ("f4", "sample"),
-    },
-    "current": {
-        "time": ("f8", "s"),
-        "setpoint": ("f8", "A"),
-        "measured": ("f8", "A"),
-        "resistance_ratio": ("f8", "1"),
-    },
-    "field": {"time": ("f8", "s"), "field": ("f8", "T")},
-    "trials": {
-        "index": ("u4", ""),
-        "start": ("f8", "s"),
-        "end": ("f8", "s"),
-        "level": ("f8", "N"),
-        "hold_start": ("f8", "s"),
-        "hold_end": ("f8", "s"),
-        "spikes": ("u4", ""),
-        "skipped": ("u4", ""),
-        "pause": ("u1", ""),
-        "label": ("S48", ""),
-        "rest_V_C1": ("f8", "V"),
-        "drift_V_C1": ("f8", "V"),
-    },
-    "pauses": {"start": ("f8", "s"), "end": ("f8", "s")},
-    "events": {"time": ("f8", "s"), "kind": ("S16", ""), "text": ("S160", "")},
+TABLES = {
+    "segments": "first i8 sample, time f8 s, interval f8 s, host f8 s, drift f8 s/s, "
+    "uncertainty f8 s",
+    "gaps": "sample i8 sample, missing i8 sample, time f8 s",
+    "overrange": "sample i8 sample, samples i8 sample, channels u4 bit per row",
+    "spikes": "sample f8 sample, time f8 s, amplitude i2 code, width f4 sample",
+    "current": "time f8 s, setpoint f8 A, measured f8 A, resistance_ratio f8 1",
+    "field": "time f8 s, field f8 T",
+    "trials": "index u4, start f8 s, end f8 s, level f8 N, hold_start f8 s, "
+    "hold_end f8 s, spikes u4, skipped u4, pause u1, label S48, rest_V_C1 f8 V, "
+    "drift_V_C1 f8 V",
+    "pauses": "start f8 s, end f8 s",
+    "events": "time f8 s, kind S16, text S160",
 }
-"""Type and unit of each column of each table."""
+"""Columns of each table: name, numpy's type, unit."""
 
 RECORDS = {
-    table: np.dtype([(name, kind) for name, (kind, _) in columns.items()])
-    for table, columns in COLUMNS.items()
+    table: np.dtype([tuple(column.split(" ")[:2]) for column in columns.split(", ")])
+    for table, columns in TABLES.items()
 }
+"""Type of each table's rows."""
+
 PYRAMID_CHUNK = 8192
 """Entries in one chunk of the pyramid: few reads for a view of a whole run."""
 
@@ -152,7 +119,8 @@ def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
     """
     file.attrs.update(schema=SCHEMA, simulated=layout.simulated, **layout.attributes)
     for name, record in RECORDS.items():
-        units = [f"{column}: {u}" for column, (_, u) in COLUMNS[name].items() if u]
+        columns = [column.split(" ", 2) for column in TABLES[name].split(", ")]
+        units = [f"{one[0]}: {one[2]}" for one in columns if len(one) > 2]
         create_table(file, name, record).attrs["units"] = ", ".join(units)
     spikes = file["spikes"].attrs
     if layout.detection is not None:

@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError, RunFolderError
-from tactile_lab.store.certificate import (
-    redetect,
-    searched_is_stored,
-    write_certificate,
-)
+from tactile_lab.store.certificate import redetect, write_certificate
 from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.folder import (
     DATA,
@@ -193,8 +189,8 @@ class _Chunks:
 def _derive(path: Path, samples: int, dropped: int) -> Recovered:
     """Find the spikes again, count, and patch `run.json`."""
     with Run.load(path) as run:
-        if searched_is_stored(run):
-            found = redetect(run)
+        found = redetect(run)
+        if found is not None:
             rows = np.empty(found.size, RECORDS["spikes"])
             for column in ("sample", "amplitude", "width"):
                 rows[column] = found[column]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import h5py
@@ -33,6 +34,11 @@ class Axis:
     first: NDArray[np.int64]
     time: FloatArray
     step: FloatArray
+
+    def stretches(self, start: int, stop: int) -> list[tuple[int, int]]:
+        """(first, one past last) of samples start to stop in each stretch."""
+        edges = np.clip([*self.first.tolist(), stop], start, stop).tolist()
+        return [(first, last) for first, last in pairwise(edges) if first < last]
 
     def time_of(self, sample: NDArray[Any] | float) -> FloatArray:
         """Run time of (fractional) stored sample indices, any shape, s."""

@@ -220,7 +220,10 @@ def _counters(run: Run) -> Iterator[Damage]:
 
 def _spikes(run: Run) -> Iterator[Damage]:
     """Spikes that are stored but not in the samples, or the other way round."""
-    odd = unmatched(run.records("spikes")["sample"], redetect(run)["sample"])
+    found = redetect(run)
+    if found is None:
+        return
+    odd = unmatched(run.records("spikes")["sample"], found["sample"])
     for sample in odd[:10]:
         yield Damage(
             f"{DATA} /spikes",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -89,13 +88,7 @@ class Selection:
         if not names or not run.samples:
             return []
         chosen = run.signal(names[0]).between(self.start, self.end)
-        edges = [*run.axis.first.tolist(), run.samples]
-        spans = []
-        for first, last in pairwise(edges):
-            first, last = max(first, chosen.start), min(last, chosen.stop)
-            if first < last:
-                spans.append((first, last))
-        return spans
+        return run.axis.stretches(chosen.start, chosen.stop)
 
     def rows(self, table: NDArray[Any]) -> NDArray[Any]:
         """Rows of a table whose time, or stretch of time, lies in the part."""
