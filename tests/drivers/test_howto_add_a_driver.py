@@ -124,6 +124,25 @@ def test_on_a_real_bench_it_is_made_by_itself(desk: Path) -> None:
         open_bench(scene, needs(scene))
 
 
+def test_a_meter_in_a_users_folder_needs_no_port(desk: Path) -> None:
+    parts = [text for text in blocks("python") if "UsbTeslameter" in text]
+    code = [text for text in parts if "def test_" not in text]
+    (desk / "gm1.py").write_text("\n".join(code), encoding="utf-8")
+    (desk / "meter.toml").write_text(
+        'name = "desk 5"\n[coil]\nport = "/dev/ttyUSB7"\n'
+        '[field_meter]\ndriver = "gm1.py"\n[magnet]\nr = "6 mm"\n',
+        encoding="utf-8",
+    )
+    field = 'record.signals=["force", "field"]'
+    scene = load("demo", (field,), "meter.toml")
+    bench = open_bench(scene, needs(scene))
+    assert type(bench.field_meter).__name__ == "UsbTeslameter"
+    assert bench.scope is None and not bench.simulated
+    scene = load("demo", (field, "bench.simulated=true"), "meter.toml")
+    with pytest.raises(SceneError, match=r"gm1\.py.* has no simulated far end"):
+        open_bench(scene, needs(scene))
+
+
 def test_an_installed_distribution_brings_a_driver(desk: Path) -> None:
     """An entry point of another distribution, in a process of its own."""
     metadata = desk / "acme_lab-1.0.dist-info"
