@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.source import Source
 from gui.session.finding import Finding
-from gui.session.fit import Fit, FitInput, FitSteps, fit_input
+from gui.session.fit import Fit, FitInput, fit_input, fit_steps
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 
@@ -55,7 +55,7 @@ class Fitting(QObject):
         self._busy = True
         serial = self._serial
         self._session.desk.ask(
-            FitSteps(steps, seen), lambda reply: self._take(serial, reply)
+            lambda reply: self._take(serial, reply), fit_steps, steps, seen
         )
 
     def _take(self, serial: int, reply: Reply[Fit]) -> None:

@@ -15,7 +15,7 @@ from gui.review.entries import Entry
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.events import ModelPart
-from tactile_lab.engine.jobs import ModelOfRun
+from tactile_lab.engine.jobs import model_of_run
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 
@@ -118,7 +118,7 @@ class Records(QObject):
             return
         folder = source.path
         desk = self._session.desk
-        desk.ask(ModelOfRun(folder), lambda reply: self._modelled(folder, reply))
+        desk.ask(lambda reply: self._modelled(folder, reply), model_of_run, folder)
 
     def _modelled(self, folder: Path, reply: Reply[ModelPart]) -> None:
         ended = self._ended
@@ -144,7 +144,7 @@ class Records(QObject):
             if shown is not None and reply.value is not None:
                 shown.add_twin_part(reply.value)
 
-        self._session.desk.ask(ModelOfRun(folder, start, end, count), seen)
+        self._session.desk.ask(seen, model_of_run, folder, start, end, count)
 
     def _shown(self, folder: Path) -> RunSource | None:
         """The run on screen, if it is that in `folder`."""

@@ -10,7 +10,7 @@ from gui.session.log import Level, Log
 from gui.session.status import Status
 from gui.state import State
 from tactile_lab.engine.engine import Reply
-from tactile_lab.engine.jobs import CheckBench, Checked, ReadField
+from tactile_lab.engine.jobs import Checked, check_bench, read_field
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request, bench_request
 from tactile_lab.errors import TactileLabError
@@ -71,7 +71,7 @@ class ConnectedBench(QObject):
         """Ask the instruments who they are, and have the coil verified off."""
         if self.request is not None:
             self._status.enter(State.CONNECTING)
-            self._link.ask(CheckBench(self.request), self._checked)
+            self._link.ask(self._checked, check_bench, self.request)
 
     def let_go(self) -> None:
         """No bench any more."""
@@ -106,7 +106,7 @@ class ConnectedBench(QObject):
         """Read the field; `task`: manual control that has the bench, if any."""
         if self.request is not None and not self.reading:
             self.reading = True
-            self._link.ask(ReadField(self.request, task), self._field_read)
+            self._link.ask(self._field_read, read_field, self.request, task)
             self._status.changed.emit()
 
     def note_field(self, field: float) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gui.lanes.expected import Hold, Preview
-from tactile_lab.engine.engine import Job
 from tactile_lab.engine.request import Request
 
 if TYPE_CHECKING:
@@ -49,16 +48,9 @@ class Expectation:
     assumptions: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class PlanRequest(Job[Expectation]):
-    """Plan a request and have the model run it."""
-
-    name = "plan"
-    request: Request
-
-    def work(self, engine: Engine) -> Expectation:
-        """What it will do."""
-        return expect(self.request.load())
+def plan_request(engine: Engine, request: Request) -> Expectation:
+    """Plan a request and have the model run it; in the engine."""
+    return expect(request.load())
 
 
 def expect(scene: Scene) -> Expectation:

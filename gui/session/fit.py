@@ -19,7 +19,6 @@ from gui.session.finding import Finding, finding
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match
-from tactile_lab.engine.engine import Job
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.trace import FloatArray, Trace
 
@@ -113,17 +112,9 @@ def fit_input(source: Source) -> FitInput:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class FitSteps(Job[Fit]):
-    """Fit steps, and compare what was seen with the model."""
-
-    name = "fit"
-    steps: tuple[Finding, ...]
-    seen: FitInput
-
-    def work(self, engine: Engine) -> Fit:
-        """The fit."""
-        return fit(self.steps, self.seen)
+def fit_steps(engine: Engine, steps: tuple[Finding, ...], seen: FitInput) -> Fit:
+    """Fit steps, and compare what was seen with the model; in the engine."""
+    return fit(steps, seen)
 
 
 def fit(findings: Sequence[Finding], seen: FitInput) -> Fit:

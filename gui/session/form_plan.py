@@ -44,10 +44,10 @@ class FormPlan(QObject):
 
     def make(self, request: Request) -> None:
         """Have a request planned; `arrived` tells the result."""
-        from gui.session.expectation import PlanRequest
+        from gui.session.expectation import plan_request
 
         self._newest = request
-        self._link.ask(PlanRequest(request), lambda reply: self._take(request, reply))
+        self._link.ask(lambda reply: self._take(request, reply), plan_request, request)
 
     def _take(self, request: Request, reply: Reply[Expectation]) -> None:
         if request is self._newest:

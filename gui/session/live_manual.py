@@ -7,7 +7,7 @@ from gui.session.log import Level, Log
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import CoilCurrent, RunState, StateChanged
-from tactile_lab.engine.commands import BeginManual, Hold, Renew
+from tactile_lab.engine.commands import begin_manual, hold, renew
 from tactile_lab.engine.events import Samples, TaskEvent
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
@@ -29,14 +29,14 @@ class LiveManual(LiveTask):
     def start(self, request: Request) -> None:
         """Open the coil source of a request's bench; the output stays off."""
         self.current, self.opened = 0.0, False
-        self._begin(BeginManual(request))
+        self._begin(begin_manual, request)
         self._log.add(Level.WARNING, "coil", "Manual control on", safety=True)
 
     def hold(self, current: float) -> None:
         """Go to `current`, A, as fast as the slew limit lets it, and stay."""
         if self.task is not None:
             self.current = current
-            self.send(Hold(current))
+            self.say(hold, current)
 
     def hear(self, event: TaskEvent) -> None:
         """Note what the coil does; each word is answered by renewing the lease."""
@@ -46,7 +46,7 @@ class LiveManual(LiveTask):
             read = event.measured is not None
             self._status.coil.sign_of_life(read_back=read)
         elif isinstance(event, Samples):
-            self.send(Renew())
+            self.say(renew)
 
     def has_ended(self, ending: Ending) -> None:
         """Tell how the coil was left."""

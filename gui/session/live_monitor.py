@@ -17,10 +17,10 @@ from gui.session.log import Level, Log
 from gui.session.status import Status
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
-from tactile_lab.engine.commands import BeginMonitor
+from tactile_lab.engine.commands import begin_monitor
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.events import Begun, Samples, TaskEvent
-from tactile_lab.engine.jobs import Record
+from tactile_lab.engine.jobs import record
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
@@ -49,13 +49,15 @@ class LiveMonitor(LiveTask):
     def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Monitor the sensor on a bench ("sim" or a bench file)."""
         self.source, self.recording = None, False
-        self._begin(BeginMonitor(Request("monitor", (*ENDLESS, *overrides), bench)))
+        wanted = Request("monitor", (*ENDLESS, *overrides), bench)
+        self._begin(begin_monitor, wanted)
 
     def record(self, out: Path, notes: Mapping[str, str]) -> None:
         """Keep the last minute as a run; `recorded` tells its folder."""
         if self.task is not None and not self.recording:
             self.recording = True
-            self._link.ask(Record(self.task.number, out, dict(notes)), self._recorded)
+            number = self.task.number
+            self._link.ask(self._recorded, record, number, out, dict(notes))
 
     def hear(self, event: TaskEvent) -> None:
         """Note what is seen."""

@@ -17,7 +17,7 @@ from gui.session.status import Status
 from gui.state import State, milliamperes
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending, Executed
-from tactile_lab.engine.commands import Answer, BeginRun, Note
+from tactile_lab.engine.commands import answer, begin_run, note
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.events import (
     Begun,
@@ -26,7 +26,7 @@ from tactile_lab.engine.events import (
     Samples,
     TaskEvent,
 )
-from tactile_lab.engine.jobs import WriteReport
+from tactile_lab.engine.jobs import write_report
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.quantity import show
@@ -102,11 +102,11 @@ class LiveRun(LiveTask):
         self.elapsed, self.expected, self.asked = 0.0, None, None
         self.request, self.expectation = request, expectation
         self.title = self.name = title
-        self._begin(BeginRun(request, self._out, dict(self.notes)))
+        self._begin(begin_run, request, self._out, dict(self.notes))
 
     def note(self, text: str) -> None:
         """Put a note into the run's log, stamped with its time."""
-        self.send(Note(text, self.elapsed))
+        self.say(note, text, self.elapsed)
 
     def stop(self, reason: str) -> None:
         """Switch the coil off and end; nobody is asked any more."""
@@ -123,7 +123,7 @@ class LiveRun(LiveTask):
             said = f"Typed {text.replace('-', '−')} at {at}"
         self._log.add(Level.INFO, "runner", said)
         self.asked = None
-        self.send(Answer(text))
+        self.say(answer, text)
         self._status.changed.emit()
 
     def hear(self, event: TaskEvent) -> None:
@@ -194,7 +194,7 @@ class LiveRun(LiveTask):
         self._log.add(Level.INFO, "store", words)
         if self.reports:
             self._link.ask(
-                WriteReport(folder), lambda reply: self._report(folder, reply)
+                lambda reply: self._report(folder, reply), write_report, folder
             )
         self.ended.emit(done)
         if not off.verified:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 
 from PySide6.QtCore import QObject
 
 from gui.session.log import Log
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import CoilState, Ending
-from tactile_lab.engine.engine import Begin, Command
+from tactile_lab.engine.engine import ServedTask
 from tactile_lab.engine.events import Ended, Samples, TaskEvent
 from tactile_lab.engine.link import Link, RemoteTask
+
+if TYPE_CHECKING:
+    from tactile_lab.engine.task import Task
+
+P = ParamSpec("P")
 
 
 class LiveTask(QObject):
@@ -43,10 +50,15 @@ class LiveTask(QObject):
         if self.task is not None:
             self.task.stop(reason)
 
-    def send(self, command: Command) -> None:
-        """Say something to the task, if there is one."""
+    def say(
+        self,
+        act: Callable[Concatenate[ServedTask, P], None],
+        *arguments: P.args,
+        **named: P.kwargs,
+    ) -> None:
+        """Have one of `engine.commands` done to the task, if there is one."""
         if self.task is not None:
-            self.task.send(command)
+            self.task.say(act, *arguments, **named)
 
     def wait_for_end(self, timeout: float) -> None:
         """Block until it has ended, at most `timeout` s."""
@@ -63,9 +75,14 @@ class LiveTask(QObject):
             self.coil = event.coil
         self.hear(event)
 
-    def _begin(self, asked: Begin) -> None:
+    def _begin(
+        self,
+        act: Callable[Concatenate[ServedTask, P], Task[Any]],
+        *arguments: P.args,
+        **named: P.kwargs,
+    ) -> None:
         self.coil = None
-        self.task = self._link.begin(asked, self.take)
+        self.task = self._link.begin(self.take, act, *arguments, **named)
 
     @abstractmethod
     def hear(self, event: TaskEvent) -> None:

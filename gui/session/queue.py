@@ -64,13 +64,13 @@ class Queue(QObject):
 
     def add(self, item: Queued) -> None:
         """Have a run follow those before it; it starts at once if none is running."""
-        from gui.session.expectation import PlanRequest
+        from gui.session.expectation import plan_request
 
         self.items.append(item)
         if item.expectation is None:
             asked = item.request
             self._link.ask(
-                PlanRequest(asked), lambda reply: self._planned(item, asked, reply)
+                lambda reply: self._planned(item, asked, reply), plan_request, asked
             )
         self.resume()
 

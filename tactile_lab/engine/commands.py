@@ -1,148 +1,88 @@
-"""What is said to tasks in the engine: small classes that carry their own act.
+"""What a window, a script or a notebook asks of tasks; carried out in the engine.
 
-A new command is a new class here, or wherever it belongs: the pipe takes any that can
-be pickled.
+`Link.begin` takes the functions that make a task, `RemoteTask.say` those that do
+something to one. A new one is a function here, or wherever it belongs: it need only be
+importable in the engine, and its arguments be pickled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tactile_lab.engine.engine import Begin, Command, Engine, ServedTask, ToTask
+from tactile_lab.engine.engine import ServedTask
+from tactile_lab.engine.request import Request
 
 if TYPE_CHECKING:
     from tactile_lab.engine.execution import Execution
     from tactile_lab.engine.manual import ManualControl
-    from tactile_lab.engine.task import Task
+    from tactile_lab.engine.monitor import Monitor
 
-FOLLOWED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
+MODELLED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
 """Signals beside which the model runs."""
 
 
-class Leave(Command):
-    """Whoever looked closes: end all tasks, then the process."""
+def begin_run(
+    served: ServedTask, request: Request, out: Path, notes: Mapping[str, str]
+) -> Execution:
+    """Run a request into a folder in `out`; the model follows it. Notes are kept."""
+    from tactile_lab.acquisition.asked_field import AskedField
+    from tactile_lab.engine.execution import Execution
 
-    def do(self, engine: Engine, number: int) -> None:
-        """Serve no more."""
-        engine.leaving = True
+    scene = request.load()
+    magnet = scene.bench.magnet
+    if MODELLED & set(scene.record.signals):
+        from tactile_lab.engine.model_parts import LiveParts
 
-
-@dataclass(frozen=True)
-class BeginRun(Begin):
-    """Run a request.
-
-    Attributes:
-        out: folder for run folders.
-        notes: kept with the run.
-    """
-
-    name = "run"
-    out: Path
-    notes: Mapping[str, str] = field(default_factory=dict)
-
-    def make(self, served: ServedTask) -> Execution:
-        """The run; the model follows it where its signals are recorded."""
-        from tactile_lab.acquisition.asked_field import AskedField
-        from tactile_lab.engine.execution import Execution
-
-        scene = self.request.load()
-        magnet = scene.bench.magnet
-        if FOLLOWED & set(scene.record.signals):
-            from tactile_lab.engine.model_parts import LiveParts
-
-            served.model = LiveParts(scene)
-        return Execution(
-            scene,
-            self.out,
-            realtime=served.realtime,
-            emit=served.emit,
-            notes=self.notes,
-            ask=served.ask,
-            asked_field=AskedField(
-                served.ask_field, lambda current: float(magnet.field(current))
-            ),
-        )
+        served.model = LiveParts(scene)
+    return Execution(
+        scene,
+        out,
+        realtime=served.realtime,
+        emit=served.emit,
+        notes=notes,
+        ask=served.ask,
+        asked_field=AskedField(
+            served.ask_field, lambda current: float(magnet.field(current))
+        ),
+    )
 
 
-@dataclass(frozen=True)
-class BeginMonitor(Begin):
-    """Monitor a request that asks for no force; nothing is kept but by `Record`."""
+def begin_monitor(served: ServedTask, request: Request) -> Monitor:
+    """Monitor a request that asks for no force; only `jobs.record` keeps anything."""
+    from tactile_lab.engine.monitor import Monitor
 
-    name = "monitor"
-
-    def make(self, served: ServedTask) -> Task[Any]:
-        """The monitor."""
-        from tactile_lab.engine.monitor import Monitor
-
-        return Monitor(self.request.load(), realtime=True, emit=served.emit)
+    return Monitor(request.load(), realtime=True, emit=served.emit)
 
 
-@dataclass(frozen=True)
-class BeginManual(Begin):
+def begin_manual(served: ServedTask, request: Request) -> ManualControl:
     """Open the coil source of a request's bench to drive it by hand; it stays off."""
+    from tactile_lab.engine.manual import ManualControl
 
-    name = "manual control"
-
-    def make(self, served: ServedTask) -> Task[Any]:
-        """The manual control."""
-        from tactile_lab.engine.manual import ManualControl
-
-        return ManualControl(self.request.load(), realtime=True, emit=served.emit)
+    return ManualControl(request.load(), realtime=True, emit=served.emit)
 
 
-@dataclass(frozen=True)
-class Stop(ToTask["Task[Any]"]):
-    """Switch the coil off and end a task; why."""
-
-    reason: str
-
-    def act(self, task: Task[Any]) -> None:
-        """Straight to the coil's thread."""
-        task.stop(self.reason)
+def stop(served: ServedTask, reason: str) -> None:
+    """Switch the coil off and end a task; goes straight to the coil's thread."""
+    served.stop(reason)
 
 
-@dataclass(frozen=True)
-class Note(ToTask["Execution"]):
+def note(served: ServedTask, text: str, time: float) -> None:
     """Put a note of the user into a run's log, stamped with its time, s."""
-
-    text: str
-    time: float
-
-    def act(self, task: Execution) -> None:
-        """Log it."""
-        task.note(self.text, self.time)
+    served.to_task(lambda run: run.note(text, time))
 
 
-@dataclass(frozen=True)
-class Hold(ToTask["ManualControl"]):
-    """Have the coil go to `current`, A, and stay."""
-
-    current: float
-
-    def act(self, task: ManualControl) -> None:
-        """Set it."""
-        task.hold(self.current)
-
-
-@dataclass(frozen=True)
-class Renew(ToTask["ManualControl"]):
-    """Whoever drives the coil lives: it may stay on for another 2 s."""
-
-    def act(self, task: ManualControl) -> None:
-        """Renew the lease."""
-        task.renew()
-
-
-@dataclass(frozen=True)
-class Answer(Command):
+def answer(served: ServedTask, text: str) -> None:
     """The person has done what a run waits for; `text` is what was typed."""
+    served.answers.put(text)
 
-    text: str = ""
 
-    def do(self, engine: Engine, number: int) -> None:
-        """Let the run go on."""
-        if number in engine.tasks:
-            engine.tasks[number].answers.put(self.text)
+def hold(served: ServedTask, current: float) -> None:
+    """Have the coil driven by hand go to `current`, A, and stay."""
+    served.to_task(lambda control: control.hold(current))
+
+
+def renew(served: ServedTask) -> None:
+    """Whoever drives the coil by hand lives: it may stay on for another 2 s."""
+    served.to_task(lambda control: control.renew())

@@ -5,9 +5,9 @@ its own nothing the engine does takes time from a frame, and a window that dies 
 no run with it: when the pipe's other end is gone, each task is stopped, its coil
 verified off and its record completed, before the process ends.
 
-A task is begun by a `Begin`, and spoken to by a `ToTask`; a `Job` is worked out beside
-and answered once. Commands are never waited on: a STOP is read at once and goes
-straight to the coil.
+What is asked is a function with its arguments, carried out here: to begin a task, to
+say something to it, or to answer a question. Nothing asked is waited on: a STOP is read
+at once and goes straight to the coil.
 """
 
 from __future__ import annotations
@@ -15,18 +15,17 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import CoilCurrent, Event, RunState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine.events import Begun, Ended, PersonAsked, Samples, TaskEvent
-from tactile_lab.engine.request import Request
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RefusedError, TactileLabError
 
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from tactile_lab.engine.task import Task
 
 T = TypeVar("T")
+Act = Callable[..., Any]
 
 LEAVE = 60.0
 """Longest wait for tasks to end after the pipe's other end has gone, s."""
@@ -48,54 +48,9 @@ SLICE, BEHIND = 0.3, 0.15
 samples, s: the host hears of a set-point only after the samples that it moved."""
 
 
-class Command(ABC):
-    """One thing asked of the engine."""
-
-    @abstractmethod
-    def do(self, engine: Engine, number: int) -> None:
-        """Carry it out in the engine, at once; `number` tells which task or job."""
-
-
-@dataclass(frozen=True)
-class Begin(Command):
-    """Begin a task.
-
-    Attributes:
-        request: names the scene and its bench.
-    """
-
-    name: ClassVar[str]
-    request: Request
-
-    def do(self, engine: Engine, number: int) -> None:
-        """Begin it in a thread of its own."""
-        engine.begin(number, self)
-
-    @abstractmethod
-    def make(self, served: ServedTask) -> Task[Any]:
-        """The task; what it tells goes through `served`.
-
-        Raises:
-            TactileLabError, OSError: it is refused.
-        """
-
-
-class ToTask(Command, Generic[T]):
-    """Something said to a task: now, or as soon as it is made."""
-
-    def do(self, engine: Engine, number: int) -> None:
-        """Say it; one that has ended hears nothing."""
-        if number in engine.tasks:
-            engine.tasks[number].to_task(self.act)
-
-    @abstractmethod
-    def act(self, task: T) -> None:
-        """Do it to the task; returns at once."""
-
-
 @dataclass(frozen=True, eq=False)
 class Reply(Generic[T]):
-    """The answer to a job.
+    """The answer to a question.
 
     Attributes:
         value: what came of it; None where nothing did.
@@ -108,35 +63,12 @@ class Reply(Generic[T]):
     lost: bool = False
 
 
-class Job(Command, Generic[T]):
-    """A question: worked on in a thread of its own, answered by one `Reply`."""
-
-    name: ClassVar[str]
-
-    def do(self, engine: Engine, number: int) -> None:
-        """Have it worked out beside everything else."""
-        start(lambda: engine.tell(number, self._reply(engine)), self.name)
-
-    @abstractmethod
-    def work(self, engine: Engine) -> T:
-        """What was asked for.
-
-        Raises:
-            TactileLabError, OSError: there is no answer; the words are the problem.
-        """
-
-    def _reply(self, engine: Engine) -> Reply[T]:
-        try:
-            return Reply(self.work(engine))
-        except (TactileLabError, OSError) as error:
-            return Reply(None, str(error))
-        except Exception as error:  # code of the user's own may raise anything
-            what = f"The {self.name} broke: {type(error).__name__}: {error}"
-            return Reply(None, what)
-
-
 class Engine:
     """Serves one pipe.
+
+    What comes through it is (number, how, act, arguments, named ones): `act` is a
+    function, `how` is `begin`, `say` or `ask`, and all that is told of it carries its
+    number. None means that the other end goes.
 
     Args:
         pipe: to whoever looks.
@@ -144,21 +76,19 @@ class Engine:
 
     Attributes:
         tasks: by number; those that have ended go when another begins.
-        leaving: the other end has said that it goes.
     """
 
     def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
         self._pipe, self.realtime = pipe, realtime
         self._sending = threading.Lock()
         self.tasks: dict[int, ServedTask] = {}
-        self.leaving = False
 
     def serve(self) -> None:
         """Do what is asked until the other end has gone; then leave every coil off."""
         try:
-            while not self.leaving:
-                number, command = self._pipe.recv()
-                command.do(self, number)
+            while (asked := self._pipe.recv()) is not None:
+                number, how, act, arguments, named = asked
+                how(self, number, act, *arguments, **named)
         except (EOFError, OSError):
             pass
         finally:
@@ -168,12 +98,24 @@ class Engine:
                 task.thread.join(LEAVE)
             self._pipe.close()
 
-    def begin(self, number: int, asked: Begin) -> None:
-        """Begin a task; all it tells carries its number."""
+    def begin(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
+        """Have `act(served, ...)` make a task, and run it in a thread of its own."""
         self.tasks = {n: t for n, t in self.tasks.items() if t.thread.is_alive()}
         self.tasks[number] = ServedTask(
-            asked, lambda told: self.tell(number, told), realtime=self.realtime
+            lambda served: act(served, *arguments, **named),
+            lambda told: self.tell(number, told),
+            realtime=self.realtime,
         )
+
+    def say(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
+        """Do `act(served, ...)` to a task at once; one that has ended hears nothing."""
+        if number in self.tasks:
+            act(self.tasks[number], *arguments, **named)
+
+    def ask(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
+        """Have `act(engine, ...)` worked out beside everything else, and reply."""
+        work = partial(act, self, *arguments, **named)
+        start(lambda: self.tell(number, _reply(work)), act.__name__)
 
     def tell(self, number: int, told: TaskEvent | Reply[Any]) -> None:
         """Tell the other end; one that has gone hears nothing."""
@@ -188,7 +130,7 @@ class ServedTask:
     """A task in a thread of its own, told through the pipe from `Begun` to `Ended`.
 
     Args:
-        asked: makes the task.
+        make: makes the task, or raises because it is refused.
         tell: tells the other end, from any thread.
         realtime: pace a simulated bench by the wall clock.
 
@@ -199,15 +141,19 @@ class ServedTask:
     """
 
     def __init__(
-        self, asked: Begin, tell: Callable[[TaskEvent], None], *, realtime: bool
+        self,
+        make: Callable[[ServedTask], Task[Any]],
+        tell: Callable[[TaskEvent], None],
+        *,
+        realtime: bool,
     ) -> None:
-        self._asked, self._tell, self.realtime = asked, tell, realtime
+        self._make, self._tell, self.realtime = make, tell, realtime
         self.task: Task[Any] | None = None
         self.model: LiveParts | None = None
         self.answers: SimpleQueue[str] = SimpleQueue()
         self._said: list[Callable[[Any], None]] = []
         self._lock = threading.Lock()
-        self.thread = start(self._main, asked.name)
+        self.thread = start(self._main, "task")
 
     def to_task(self, act: Callable[[Any], None]) -> None:
         """Have something done to the task: now, or as soon as it is made."""
@@ -262,7 +208,7 @@ class ServedTask:
 
     def _carry_out(self) -> Ending:
         try:
-            task = self._asked.make(self)
+            task = self._make(self)
         except (TactileLabError, OSError) as error:
             return Ending.refused(str(error))
         except Exception as error:  # a protocol of the user's own may raise anything
@@ -328,6 +274,15 @@ class ServedTask:
             part = model.until(task.live.reach - (0.0 if ended else BEHIND))
             if part is not None:
                 self._tell(part)
+
+
+def _reply(work: Callable[[], T]) -> Reply[T]:
+    try:
+        return Reply(work())
+    except (TactileLabError, OSError) as error:
+        return Reply(None, str(error))
+    except Exception as error:  # code of the user's own may raise anything
+        return Reply(None, f"It broke. {type(error).__name__}: {error}")
 
 
 def main(pipe: Connection, realtime: bool = True) -> None:

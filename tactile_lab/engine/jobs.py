@@ -1,4 +1,7 @@
-"""Questions to the engine that need a bench or a run: who is there, field, record."""
+"""Questions to the engine: who is on a bench, the field, a record, a report, a model.
+
+`Link.ask` takes these functions, and any other whose first argument is the engine.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,12 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactile_lab.engine.engine import Engine, Job
+from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import RecordingError, TactileLabError
@@ -56,20 +59,9 @@ class Checked:
     off: OffReport | None
 
 
-@dataclass(frozen=True)
-class CheckBench(Job[Checked]):
+def check_bench(engine: Engine, request: Request) -> Checked:
     """Ask every instrument of a request's bench who it is; make the coil safe."""
-
-    name = "check of the bench"
-    request: Request
-
-    def work(self, engine: Engine) -> Checked:
-        """Who answers.
-
-        Raises:
-            SceneError: the bench cannot be used.
-        """
-        return check(_open(self.request.load(), realtime=engine.realtime))
+    return check(_open(request.load(), realtime=engine.realtime))
 
 
 def check(bench: Bench) -> Checked:
@@ -93,78 +85,69 @@ def check(bench: Bench) -> Checked:
     return Checked(tuple(found), off)
 
 
-@dataclass(frozen=True)
-class ReadField(Job["FieldReading"]):
-    """Read the field a few times.
+def read_field(engine: Engine, request: Request, task: int) -> FieldReading:
+    """Read the field of a request's bench; `task`: manual control that has it, or 0."""
+    from tactile_lab.engine import manual
 
-    Attributes:
-        request: names the bench.
-        task: manual control whose bench it is; 0 if there is none.
-    """
-
-    name = "reading of the field"
-    request: Request
-    task: int = 0
-
-    def work(self, engine: Engine) -> FieldReading:
-        """What the teslameter showed."""
-        from tactile_lab.engine.manual import read_field
-
-        held = engine.tasks.get(self.task)
-        if held is not None and held.task is not None:
-            return read_field(held.task.bench)
-        return read_field(_open(self.request.load(), realtime=True))
+    held = engine.tasks.get(task)
+    if held is not None and held.task is not None:
+        return manual.read_field(held.task.bench)
+    return manual.read_field(_open(request.load(), realtime=True))
 
 
-@dataclass(frozen=True)
-class Record(Job[Path]):
+def record(engine: Engine, task: int, out: Path, notes: Mapping[str, str]) -> Path:
     """Keep what the monitor `task` holds, the last minute, as a run in `out`."""
+    from tactile_lab.engine.monitor import Monitor
 
-    name = "record of the monitor"
-    task: int
-    out: Path
-    notes: Mapping[str, str] = field(default_factory=dict)
-
-    def work(self, engine: Engine) -> Path:
-        """The run's folder."""
-        from tactile_lab.engine.monitor import Monitor
-
-        held = engine.tasks.get(self.task)
-        monitor = None if held is None else held.task
-        if not isinstance(monitor, Monitor):
-            raise RecordingError("Nothing has been seen yet.")
-        return monitor.record(self.out, self.notes)
+    held = engine.tasks.get(task)
+    monitor = None if held is None else held.task
+    if not isinstance(monitor, Monitor):
+        raise RecordingError("Nothing has been seen yet.")
+    return monitor.record(out, notes)
 
 
-@dataclass(frozen=True)
-class WriteReport(Job[None]):
+def write_report(engine: Engine, folder: Path) -> None:
     """Write figures, results and report into a finished run's folder.
 
     In a process of its own, behind the window and a next run.
+
+    Raises:
+        RecordingError: it could not be written.
     """
+    asked = [sys.executable, "-m", "tactile_lab", "report", str(folder)]
+    try:
+        writing = subprocess.Popen(
+            asked, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        if hasattr(os, "setpriority"):
+            os.setpriority(os.PRIO_PROCESS, writing.pid, 10)
+        _, said = writing.communicate(timeout=LONGEST)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise RecordingError(f"The report was not written: {error}") from error
+    if writing.returncode:
+        last = (said.strip().splitlines() or ["no message"])[-1]
+        raise RecordingError(f"The report was not written: {last}")
 
-    name = "report"
-    folder: Path
 
-    def work(self, engine: Engine) -> None:
-        """Write it.
+def model_of_run(
+    engine: Engine,
+    folder: Path,
+    start: float = 0.0,
+    end: float = math.inf,
+    count: int | None = None,
+) -> ModelPart:
+    """Solve the model beside a finished run, unless it was the last, and sample it.
 
-        Raises:
-            RecordingError: it could not be written.
-        """
-        asked = [sys.executable, "-m", "tactile_lab", "report", str(self.folder)]
-        try:
-            writing = subprocess.Popen(
-                asked, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-            )
-            if hasattr(os, "setpriority"):
-                os.setpriority(os.PRIO_PROCESS, writing.pid, 10)
-            _, said = writing.communicate(timeout=LONGEST)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise RecordingError(f"The report was not written: {error}") from error
-        if writing.returncode:
-            last = (said.strip().splitlines() or ["no message"])[-1]
-            raise RecordingError(f"The report was not written: {last}")
+    Args:
+        engine: where.
+        folder: of the run.
+        start: on the run's time axis, s.
+        end: likewise.
+        count: of bins; None: of a millisecond, if that is not too many.
+    """
+    with _SOLVING:
+        stored = _stored(folder)
+    return stored.part(start, end, count)
 
 
 _SOLVING = threading.Lock()
@@ -175,29 +158,6 @@ def _stored(folder: Path) -> StoredParts:
     from tactile_lab.engine.model_parts import StoredParts
 
     return StoredParts(folder)
-
-
-@dataclass(frozen=True)
-class ModelOfRun(Job[ModelPart]):
-    """Solve the model beside a finished run, unless it was the last, and sample it.
-
-    Attributes:
-        folder: of the run.
-        start, end: on the run's time axis, s.
-        count: of bins; None: of a millisecond, if that is not too many.
-    """
-
-    name = "model"
-    folder: Path
-    start: float = 0.0
-    end: float = math.inf
-    count: int | None = None
-
-    def work(self, engine: Engine) -> ModelPart:
-        """The part asked for."""
-        with _SOLVING:
-            stored = _stored(self.folder)
-        return stored.part(self.start, self.end, self.count)
 
 
 def _open(scene: Scene, *, realtime: bool) -> Bench:

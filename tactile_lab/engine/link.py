@@ -1,11 +1,11 @@
 """The pipe to the engine, from the side of a window, a script or a notebook.
 
-from tactile_lab.engine.commands import BeginRun
+from tactile_lab.engine.commands import begin_run
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 
 with Link() as link:
-    for event in link.begin(BeginRun(Request("demo"), Path("runs"))):
+    for event in link.follow(begin_run, Request("demo"), Path("runs"), {}):
         print(event)                     # Begun, Samples, ... to Ended
 """
 
@@ -14,22 +14,26 @@ from __future__ import annotations
 import multiprocessing
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.bench import OffReport
-from tactile_lab.engine.commands import Leave, Stop
-from tactile_lab.engine.engine import Begin, Command, Job, Reply
+from tactile_lab.engine import commands
+from tactile_lab.engine.engine import Act, Engine, Reply, ServedTask, main
 from tactile_lab.engine.events import Ended, TaskEvent
 from tactile_lab.engine.threads import start
 
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
+    from tactile_lab.engine.task import Task
+
 T = TypeVar("T")
+P = ParamSpec("P")
 Hear = Callable[[TaskEvent], None]
 
 
@@ -38,20 +42,29 @@ class RemoteTask:
 
     Args:
         number: names it in the engine.
-        send: sends a command to it.
+        send: sends an act with its arguments to it.
         hear: takes its events when the link is polled; None: they are iterated over.
     """
 
     def __init__(
-        self, number: int, send: Callable[[Command], None], hear: Hear | None = None
+        self, number: int, send: Callable[..., None], hear: Hear | None = None
     ) -> None:
-        self.number, self.send, self.hear = number, send, hear
+        self.number, self._send, self.hear = number, send, hear
         self._events: SimpleQueue[TaskEvent] = SimpleQueue()
         self._ended = threading.Event()
 
+    def say(
+        self,
+        act: Callable[Concatenate[ServedTask, P], None],
+        *arguments: P.args,
+        **named: P.kwargs,
+    ) -> None:
+        """Have one of `engine.commands` done to it; returns at once."""
+        self._send(act, *arguments, **named)
+
     def stop(self, reason: str) -> None:
         """Switch the coil off and end; returns at once."""
-        self.send(Stop(reason))
+        self.say(commands.stop, reason)
 
     @property
     def alive(self) -> bool:
@@ -105,27 +118,50 @@ class Link:
         self._lock = threading.Lock()
         self._closing = False
 
-    def begin(self, asked: Begin, hear: Hear | None = None) -> RemoteTask:
+    def begin(
+        self,
+        hear: Hear | None,
+        act: Callable[Concatenate[ServedTask, P], Task[Any]],
+        *arguments: P.args,
+        **named: P.kwargs,
+    ) -> RemoteTask:
         """Begin a task.
 
         Args:
-            asked: what.
             hear: takes its events when the link is polled; None: they are iterated
                 over.
+            act: one of `engine.commands` that makes a task.
+            *arguments: of that.
+            **named: of that, too.
         """
         with self._lock:
             number = self._number()
-            task = RemoteTask(number, lambda said: self._send(number, said), hear)
+            task = RemoteTask(number, partial(self._say, number), hear)
             self._tasks[number] = task
-            self._write(number, asked)
+            self._write((number, Engine.begin, act, arguments, named))
         return task
 
-    def ask(self, job: Job[T], then: Callable[[Reply[T]], None]) -> None:
-        """Have a job done; `then` takes the reply when the link is polled."""
+    def follow(
+        self,
+        act: Callable[Concatenate[ServedTask, P], Task[Any]],
+        *arguments: P.args,
+        **named: P.kwargs,
+    ) -> RemoteTask:
+        """Begin a task whose events are iterated over."""
+        return self.begin(None, act, *arguments, **named)
+
+    def ask(
+        self,
+        then: Callable[[Reply[T]], None],
+        act: Callable[Concatenate[Engine, P], T],
+        *arguments: P.args,
+        **named: P.kwargs,
+    ) -> None:
+        """Have one of `engine.jobs` answered; `then` takes the reply when polled."""
         with self._lock:
             number = self._number()
             self._asked[number] = then
-            self._write(number, job)
+            self._write((number, Engine.ask, act, arguments, named))
 
     def poll(self) -> None:
         """Hand over all that came since; in the calling thread."""
@@ -154,7 +190,8 @@ class Link:
     def close(self, timeout: float = 10.0) -> None:
         """Let the engine end and wait for that, at most `timeout` s."""
         self._closing = True
-        self._send(0, Leave())
+        with self._lock:
+            self._write(None)
         if self._process is not None:
             self._process.join(timeout)
 
@@ -171,31 +208,29 @@ class Link:
         self._last += 1
         return self._last
 
-    def _send(self, number: int, command: Command) -> None:
+    def _say(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         with self._lock:
-            self._write(number, command)
+            self._write((number, Engine.say, act, arguments, named))
 
-    def _write(self, number: int, command: Command) -> None:
+    def _write(self, asked: object) -> None:
         try:
             if self._pipe is not None:
-                self._pipe.send((number, command))
+                self._pipe.send(asked)
         except OSError:
             pass  # the reading thread sees the end of the pipe too, and tells
 
     def _open(self) -> None:
-        from tactile_lab.engine import engine
-
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         if self._separate:
             self._process = context.Process(
-                target=engine.main, args=(theirs, self._realtime), daemon=True
+                target=main, args=(theirs, self._realtime), daemon=True
             )
             # daemonic: a window that ends without `close` still sends it SIGTERM
             self._process.start()
             theirs.close()
         else:
-            served = engine.Engine(theirs, realtime=self._realtime)
+            served = Engine(theirs, realtime=self._realtime)
             self._process = start(served.serve, "engine")
         ours = self._pipe
         start(lambda: self._read(ours), "link")

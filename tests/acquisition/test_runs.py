@@ -280,6 +280,18 @@ def test_a_disk_that_fails_at_the_very_end_is_no_complete_run(
     assert ran.stored().info["status"] == "faulted"
 
 
+def test_a_mistake_after_the_run_does_not_hide_how_the_coil_was_left(
+    run_scene, short, monkeypatch
+):
+    def mistaken(folder):
+        raise ValueError("a certificate with a bug")
+
+    monkeypatch.setattr("tactile_lab.engine.execution.write_certificate", mistaken)
+    ran = run_scene(*short)
+    assert ran.done.exit_code == 3 and ran.done.off.verified
+    assert "a certificate with a bug" in ran.done.reason
+
+
 def test_a_force_beyond_the_coil_is_refused_before_anything_exists(tmp_path):
     scene = load("demo", ['protocol.levels=["900 mN"]'])
     with pytest.raises(LimitError, match="reachable"):

@@ -2,13 +2,12 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 from tactile_lab.acquisition.events import RunState, SpikesSeen
-from tactile_lab.engine.commands import BeginMonitor, BeginRun
-from tactile_lab.engine.engine import Job, Reply
+from tactile_lab.engine.commands import begin_monitor, begin_run
+from tactile_lab.engine.engine import Engine, Reply
 from tactile_lab.engine.events import Begun, Ended, Samples
-from tactile_lab.engine.jobs import CheckBench
+from tactile_lab.engine.jobs import check_bench
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.store.run import Run
@@ -18,7 +17,7 @@ SHORT = ('protocol.levels=["200 mN"]', "protocol.hold=0.8 s", "protocol.rest=0.3
 SCRIPT = """
 import sys
 from pathlib import Path
-from tactile_lab.engine.commands import BeginRun
+from tactile_lab.engine.commands import begin_run
 from tactile_lab.engine.events import Begun, Ended, Samples
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
@@ -26,7 +25,7 @@ from tactile_lab.engine.request import Request
 if __name__ == "__main__":
     kinds, bins = set(), 0
     with Link(realtime=False) as link:
-        run = link.begin(BeginRun(Request("demo", %r), Path(sys.argv[1])))
+        run = link.follow(begin_run, Request("demo", %r), Path(sys.argv[1]), {})
         for event in run:
             kinds.add(type(event).__name__)
             if isinstance(event, Samples) and "V_C1" in event.bins:
@@ -54,7 +53,7 @@ def test_a_script_drives_a_run_through_a_process_of_its_own(tmp_path):
 
 def test_a_stop_said_before_anything_is_made_ends_the_run_with_the_coil_off(tmp_path):
     with Link(separate=False, realtime=False) as link:
-        run = link.begin(BeginRun(Request("demo"), tmp_path))
+        run = link.follow(begin_run, Request("demo"), tmp_path, {})
         run.stop("at once")
         told = list(run)
     ending = told[-1].ending
@@ -65,8 +64,8 @@ def test_a_stop_said_before_anything_is_made_ends_the_run_with_the_coil_off(tmp_
 def test_a_refused_task_only_ends_and_says_why(tmp_path):
     with Link(separate=False, realtime=False) as link:
         strong = Request("demo", ('protocol.levels=["900 mN"]',))
-        (told,) = link.begin(BeginRun(strong, tmp_path))
-        (other,) = link.begin(BeginMonitor(Request("demo")))
+        (told,) = link.follow(begin_run, strong, tmp_path, {})
+        (other,) = link.follow(begin_monitor, Request("demo"))
     assert isinstance(told, Ended) and told.ending.state is RunState.REFUSED
     assert "reachable" in told.ending.reason and told.ending.exit_code == 2
     assert "asks for a force" in other.ending.reason
@@ -76,7 +75,7 @@ def test_a_refused_task_only_ends_and_says_why(tmp_path):
 def test_a_monitor_is_told_like_a_run(tmp_path):
     scene = ("sensor.V_GS=1.65 V", "record.sample_rate=0.1 MS/s")
     with Link(separate=False) as link:
-        monitor = link.begin(BeginMonitor(Request("monitor", scene)))
+        monitor = link.follow(begin_monitor, Request("monitor", scene))
         kinds = set()
         for event in monitor:
             kinds.add(type(event))
@@ -86,29 +85,25 @@ def test_a_monitor_is_told_like_a_run(tmp_path):
     assert event.ending.state is RunState.ABORTED
 
 
-class Break(Job[None]):
-    """A job of somebody's own, with a mistake in it."""
-
-    name = "test"
-
-    def work(self, engine):
-        raise KeyError("nothing")
+def breaks(engine: Engine) -> None:
+    """A question of somebody's own, with a mistake in it."""
+    raise KeyError("nothing")
 
 
-def polled(link: Link, job: Job) -> Reply:
-    """The reply to a job."""
+def polled(link: Link, act, *arguments) -> Reply:
+    """The reply to a question."""
     replies = []
-    link.ask(job, replies.append)
+    link.ask(replies.append, act, *arguments)
     while not replies:
         link.poll()
     return replies[0]
 
 
-def test_a_job_is_answered_even_where_it_breaks(tmp_path):
+def test_a_question_is_answered_even_where_it_breaks(tmp_path):
     with Link(separate=False, realtime=False) as link:
-        found = polled(link, CheckBench(Request("demo"))).value
+        found = polled(link, check_bench, Request("demo")).value
         assert [one.role for one in found.found if not one.problem] == ["coil", "scope"]
         assert found.off.verified
-        assert "The test broke: KeyError" in polled(link, Break()).problem
-        gone = polled(link, CheckBench(Request(str(Path("gone.toml")))))
+        assert "KeyError: 'nothing'" in polled(link, breaks).problem
+        gone = polled(link, check_bench, Request("gone.toml"))
         assert gone.value is None and "gone.toml" in gone.problem

@@ -25,7 +25,7 @@ from gui.review.conclusion import conclusion_of
 from gui.state import Fault, State
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.ending import Ending
-from tactile_lab.engine.commands import Answer
+from tactile_lab.engine.commands import answer
 from tactile_lab.engine.events import Ended, PersonAsked
 from tactile_lab.engine.link import RemoteTask
 from tactile_lab.engine.request import Request
@@ -182,14 +182,14 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
 def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     window, session = lab.window, lab.session
     done: list[object] = []
-    session.run.task = RemoteTask(0, done.append)
+    session.run.task = RemoteTask(0, lambda *said: done.append(said))
     session.status.enter(State.RUNNING)
     session.run.take(PersonAsked("Put the probes on 0 V."))
     lab.until(window.question.isVisible)
     assert "0 V" in window.question.text.text()
     assert window.question.entry.isHidden(), "there is nothing to type"
     window.question.done.click()
-    assert done == [Answer("")] and not window.question.isVisible()
+    assert done == [(answer, "")] and not window.question.isVisible()
     session.run.take(PersonAsked("Put them on V_S."))
     lab.until(window.question.isVisible)
     session.run.take(Ended(Ending.refused("stopped at the bench")))

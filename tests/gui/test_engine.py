@@ -18,10 +18,10 @@ from gui.session.session import Session
 from gui.state import State, Truth, truth
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.engine.commands import BeginManual, BeginRun, Hold, Renew, Stop
+from tactile_lab.engine.commands import begin_manual, begin_run, hold, renew, stop
 from tactile_lab.engine.engine import Engine, Reply
 from tactile_lab.engine.events import Ended, Samples
-from tactile_lab.engine.jobs import ReadField
+from tactile_lab.engine.jobs import read_field
 from tactile_lab.engine.request import Request
 from tactile_lab.engine.threads import start
 
@@ -55,7 +55,7 @@ def test_window_that_has_gone_leaves_coil_off_and_record_complete(
 ) -> None:
     ours, theirs = Pipe()
     serving = start(Engine(theirs, realtime=False).serve, "engine")
-    ours.send((1, BeginRun(request_, tmp_path / "runs")))
+    ours.send((1, Engine.begin, begin_run, (request_, tmp_path / "runs", {}), {}))
     live = False
     while not live:
         assert ours.poll(LONGEST), "the engine tells nothing"
@@ -161,7 +161,7 @@ def hears(
         if wanted(told):
             return told
         if lives and isinstance(told, Samples):
-            pipe.send((number, Renew()))
+            pipe.send((number, Engine.say, renew, (), {}))
 
 
 def flows(told: object) -> bool:
@@ -182,8 +182,8 @@ def pipe() -> Iterator[Connection]:
 def test_window_that_hangs_loses_the_coil_by_hand(
     pipe: Connection, source: Source
 ) -> None:
-    pipe.send((1, BeginManual(source.request)))
-    pipe.send((1, Hold(0.1)))
+    pipe.send((1, Engine.begin, begin_manual, (source.request,), {}))
+    pipe.send((1, Engine.say, hold, (0.1,), {}))
     ended = hears(pipe, lambda told: isinstance(told, Ended), lives=False).ending
     assert ended.state is RunState.FAULTED
     assert ended.off.verified and "sign of life" in ended.reason
@@ -192,14 +192,14 @@ def test_window_that_hangs_loses_the_coil_by_hand(
 
 def test_stop_by_hand_is_verified_and_field_is_read(pipe: Connection) -> None:
     request = Request("demo", ('record.signals=["force", "field"]',), "sim")
-    pipe.send((1, BeginManual(request)))
-    pipe.send((1, Hold(0.1)))
+    pipe.send((1, Engine.begin, begin_manual, (request,), {}))
+    pipe.send((1, Engine.say, hold, (0.1,), {}))
     hears(pipe, flows)
-    pipe.send((1, Stop("enough")))
+    pipe.send((1, Engine.say, stop, ("enough",), {}))
     ended = hears(pipe, lambda told: isinstance(told, Ended)).ending
     assert ended.state is RunState.ABORTED and ended.reason == "enough"
     assert ended.off.verified
-    pipe.send((2, ReadField(request)))
+    pipe.send((2, Engine.ask, read_field, (request, 0), {}))
     read = hears(pipe, lambda told: isinstance(told, Reply)).value
     assert abs(read.mean) < 1e-4
 
@@ -207,8 +207,8 @@ def test_stop_by_hand_is_verified_and_field_is_read(pipe: Connection) -> None:
 def test_window_that_has_gone_leaves_the_coil_by_hand_off(source: Source) -> None:
     ours, theirs = Pipe()
     serving = start(Engine(theirs).serve, "engine")
-    ours.send((1, BeginManual(source.request)))
-    ours.send((1, Hold(0.1)))
+    ours.send((1, Engine.begin, begin_manual, (source.request,), {}))
+    ours.send((1, Engine.say, hold, (0.1,), {}))
     hears(ours, flows)
     assert source.output
     ours.close()

@@ -6,7 +6,7 @@ from gui.state import State, Truth, truth
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.events import CoilCurrent, RunState
 from tactile_lab.bench import OffReport
-from tactile_lab.engine.commands import Renew
+from tactile_lab.engine.commands import renew
 from tactile_lab.engine.events import Ended, Samples
 from tactile_lab.engine.link import RemoteTask
 
@@ -92,12 +92,12 @@ def test_stop_counts_while_the_source_opens(lab) -> None:
 def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
     session = lab.session
     said: list[object] = []
-    session.manual.task = RemoteTask(0, said.append)
+    session.manual.task = RemoteTask(0, lambda *what: said.append(what))
     state = CoilState(live=True, setpoint=0.1, measured=0.1, off=None)
     for time in range(3):
         session.manual.take(CoilCurrent(float(time), 0.1, 0.1))
         session.manual.take(Samples({}, state))
-    assert said == [Renew()] * 3
+    assert said == [(renew,)] * 3
     assert session.coil_view().current == 0.1
     off = OffReport(False, None, "nobody knows")
     why = "The coil's thread ended without a word."
