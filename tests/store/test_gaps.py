@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactile_lab.store.certificate import certify
+from tactile_lab.store.export import csv, mat, nwb
+from tactile_lab.store.export.selection import Selection
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
@@ -72,3 +75,35 @@ def test_every_cell_holds_the_samples_of_its_own_time(bench, records, unseen, ce
             assert int(gaps["missing"].sum()) == missing
             assert gaps["end"] - gaps["start"] == pytest.approx(gaps["missing"] * 1e-3)
         assert verify(path).sound
+
+
+def test_exports_keep_the_gaps(bench, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    path, _, kept = write(bench, tmp_path, [(700, 30), (600, 100), (900, 4)], 50)
+    time = 2.0 + np.flatnonzero(kept) * 1e-3
+    with Run.load(path) as run:
+        ends = run.gaps["end"]
+        mat.export(run, tmp_path / "run.mat", Selection())
+        nwb.export(run, tmp_path / "run.nwb", Selection())
+        csv.export(run, tmp_path / "csv", Selection(start=2.5, end=3.0))
+        frame = run.to_xarray()
+    np.testing.assert_allclose(frame["time"], time, atol=1e-9)
+
+    table = np.loadtxt(tmp_path / "csv" / "signals.csv", delimiter=",", skiprows=1)
+    inside = time[(time > 2.4999) & (time < 2.9999)]
+    np.testing.assert_allclose(table[:, 0], inside, atol=1e-9)
+    gaps = np.loadtxt(tmp_path / "csv" / "gaps.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(gaps, [2.73, 2.83])
+
+    read = scipy.io.loadmat(tmp_path / "run.mat", simplify_cells=True)
+    np.testing.assert_allclose(read["time"], time, atol=1e-9)
+    np.testing.assert_allclose(read["gaps"]["end"], ends)
+
+    with pynwb.NWBHDF5IO(str(tmp_path / "run.nwb"), "r") as file:
+        session = file.read()
+        assert set(session.acquisition) >= {"V_C1", "V_K"}
+        series = session.acquisition["V_K"]
+        np.testing.assert_allclose(series.timestamps[:], time, atol=1e-9)
+        assert series.data.shape == time.shape
+        invalid = session.invalid_times.to_dataframe()
+        np.testing.assert_allclose(invalid["stop_time"], ends)
