@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from benches import WITH_GAPS
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.events import RunState
@@ -12,6 +13,7 @@ from tactile_lab.errors import RecordingError, SceneError
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
+from tactile_lab.store.certificate import certify
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
@@ -114,3 +116,22 @@ def test_the_ring_forgets_what_is_older_than_its_length():
     ring.segment(stream, 9.0)
     with pytest.raises(RecordingError):
         ring.held()
+
+
+def test_a_scope_that_polls_is_watched_and_kept_with_its_gaps(tmp_path):
+    bench = tmp_path / "bench.toml"
+    bench.write_text(WITH_GAPS)
+    overrides = (
+        "protocol.duration=3 s",
+        'record.signals=["V_C1"]',
+        "record.sample_rate=0.2 MS/s",
+    )
+    monitor = Monitor(load("monitor", overrides, str(bench)), keep=1.0)
+    assert monitor.run().state is RunState.COMPLETE
+    folder = monitor.record(tmp_path / "runs")
+    with Run.load(folder) as run:
+        proof = certify(run)
+        assert proof.clean and proof.produced == proof.written
+        assert 0.2 < proof.covered < 0.99 * proof.streamed
+        assert proof.streamed == pytest.approx(run.duration, abs=0.01)
+    assert verify(folder).sound
