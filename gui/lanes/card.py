@@ -110,9 +110,8 @@ class LaneCard(QFrame):
         if asked == self._runs:
             return
         self._runs = asked
-        texts = [
-            f"{m} {' '.join(t)}" for m, t in zip(MARKS, self._lines(), strict=False)
-        ]
+        lines = self._lines(values, changes, self.lane.places)
+        texts = [f"{m} {' '.join(t)}" for m, t in zip(MARKS, lines, strict=False)]
         first = f"{self.lane.plain}, {self.lane.unit}".rstrip(", ")
         self.setToolTip("\n".join([f"{first} {where or 'at the right'}", *texts]))
         for one in (self._value, self._unit):
@@ -123,8 +122,7 @@ class LaneCard(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Say as much as there is room for."""
         super().resizeEvent(event)
-        if self._runs is not None:
-            self._lay_out_runs()
+        self._lay_out_runs()
 
     def tint(self, *, grey: bool) -> None:
         """Colour the swatch; `grey` where colour means something else."""
@@ -133,8 +131,7 @@ class LaneCard(QFrame):
         picture.fill(tokens.border_strong if grey else tokens.trace(self.lane.key))
         picture.setDevicePixelRatio(2)
         self._swatch.setPixmap(picture)
-        if self._runs is not None:
-            self._lay_out_runs()
+        self._lay_out_runs()
 
     def _one(self) -> None:
         """Back to the number of one run."""
@@ -143,10 +140,10 @@ class LaneCard(QFrame):
             self.setToolTip("")
             self._more.setText("")
 
-    def _lines(self, places: int | None = None) -> list[tuple[str, ...]]:
+    def _lines(
+        self, values: Values, changes: Values | None, places: int
+    ) -> list[tuple[str, ...]]:
         """Value and change of each run."""
-        assert self._runs is not None
-        values, changes, _ = self._runs
         texts = [self._text(value, places) for value in values]
         if changes is None:
             return [(text,) for text in texts]
@@ -158,7 +155,8 @@ class LaneCard(QFrame):
 
         With as many decimals as there is room for.
         """
-        assert self._runs is not None
+        if self._runs is None:
+            return
         values, changes, where = self._runs
         tall = self.height() >= TITLE + LINE * len(values)
         told = tall or changes is None
@@ -166,7 +164,7 @@ class LaneCard(QFrame):
         self._beside.setText(unit.strip())
         self._more.setVisible(self.height() >= TITLE + LINE - 3)
         for places in range(self.lane.places, -1, -1):
-            lines = self._lines(places)
+            lines = self._lines(values, changes, places)
             if not tall:
                 lines = [(line[-1].removeprefix("Δ "),) for line in lines]
             self._more.setText(self._table(lines, tall))

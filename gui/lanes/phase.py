@@ -79,8 +79,8 @@ def _intervals(planned: FloatArray, first: np.ndarray) -> FloatArray:
     """Each spike's interval before it; for the first of a train, the one after, s."""
     before = np.diff(planned, prepend=-np.inf)
     after = np.append(np.where(first[1:], np.inf, np.diff(planned)), np.inf)
-    alone = np.maximum(np.minimum(before, np.diff(planned, append=np.inf)) / SILENCE,
-                       LEAST_SILENCE / SILENCE)  # fmt: skip
+    beside = np.minimum(before, np.diff(planned, append=np.inf))
+    alone = np.maximum(beside, LEAST_SILENCE) / SILENCE
     begun = np.where(np.isinf(after), alone, np.minimum(after, before / 2))
     own: FloatArray = np.where(first, begun, before)
     return np.where(np.isinf(own), LEAST_SILENCE / SILENCE, own)

@@ -156,7 +156,7 @@ class LaneRow(QFrame):
         else:
             known = None if source.running else self._values(source, edge)[0]
             card.show_value(newest(lane, source) if source.running else known)
-            card.show_more("" if view.cursors is None else self._at_cursors(source))
+            card.show_more(self._at_cursors(source))
 
     def _show_spikes(self, source: Source, edge: float) -> None:
         spikes, steps, view = source.spikes, starts(source.holds), self._view
@@ -187,9 +187,10 @@ class LaneRow(QFrame):
             self.card.show_runs(a, changes, f"{less} at A".strip())
 
     def _at_cursors(self, source: Source) -> str:
-        """Values at A and B and their difference."""
+        """Values at A and B and their difference; "" without cursors."""
         cursors, tokens = self._view.cursors, self._theme.tokens
-        assert cursors is not None
+        if cursors is None:
+            return ""
         a, b = (self._values(source, time)[0] for time in cursors)
         change, places = _change(a, b), min(self.lane.places, 2)
         delta = "—" if change is None else signed(change, places)

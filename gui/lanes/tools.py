@@ -194,17 +194,13 @@ class Tools(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 7, 10, 7)
         row.setSpacing(5)
-        for widget in (
-            self.follow, self.freeze, self.widths, self.fit, self.zoom, self.cursors,
-            self.twin, self.residual,
-        ):  # fmt: skip
+        views = (self.follow, self.freeze, self.widths, self.fit, self.zoom)
+        for widget in (*views, self.cursors, self.twin, self.residual):
             row.addWidget(widget)
         row.addSpacing(8)
         row.addWidget(self._readout, 1)
-        row.addWidget(self.monitor)
-        row.addWidget(self.lanes)
-        row.addWidget(self.export)
-        row.addWidget(self.help)
+        for widget in (self.monitor, self.lanes, self.export, self.help):
+            row.addWidget(widget)
         self._readout.setSizePolicy(
             QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed
         )

@@ -41,8 +41,8 @@ class CompareBar(QFrame):
             self.layout_.group.button(number).setToolTip(words)
         self._names = QHBoxLayout()
         self._names.setSpacing(14)
-        self._words = [label("COMPARE", "section"), label("Align", "muted"),
-                       label("Layout", "muted")]  # fmt: skip
+        parts = (("COMPARE", "section"), ("Align", "muted"), ("Layout", "muted"))
+        self._words = [label(text, role) for text, role in parts]
         close = IconButton(theme, "close", "End the comparison")
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 4, 8, 4)

@@ -52,36 +52,35 @@ class Frames(QObject):
         panels, session = self._panels, self._panels.session
         moved = session.poll()
         now = time.monotonic()
-        live = session.source is not None and self._screen.run is None
-        if live and not self.frozen and not panels.centre.window().isMinimized():
-            source = session.source
-            assert source is not None
-            view = panels.centre.view
+        source, seen = self._screen.live, not panels.centre.window().isMinimized()
+        if source is not None and seen and not self.frozen:
             if source.running or moved:
-                view.set_now(source.reach, source.length)
+                panels.centre.view.set_now(source.reach, source.length)
                 panels.centre.stack.refresh()
         self._screen.take_fetched()
         if now - self._numbers >= NUMBERS:
             self._numbers = now
-            self._show_numbers(live)
+            self._show_numbers()
         self._keep_budget(time.perf_counter() - begun)
 
-    def _show_numbers(self, live: bool) -> None:
+    def _show_numbers(self) -> None:
         panels, session = self._panels, self._panels.session
         snapshot = session.snapshot()
         self.told.emit(snapshot)
         self._show_monitor()
-        source = session.source
-        if source is not None and live:
+        source = self._screen.live
+        if source is not None:
             if not self.frozen:
                 panels.centre.stack.show_values()
             planned = source.preview.holds if source.preview else []
             holds = planned if source.running and planned else source.holds
+            ending = self._screen.ending
+            if session.monitor.alive:
+                ending = "Monitor: only Record keeps what is seen"
+            trial = session.run.trial
             panels.centre.progress.show_run(
-                snapshot, holds, source.length, source.reach, session.run.trial,
-                "Monitor: only Record keeps what is seen" if session.monitor.alive
-                else self._screen.ending,
-            )  # fmt: skip
+                snapshot, holds, source.length, source.reach, trial, ending
+            )
             running = session.state in (State.RUNNING, State.ABORTING)
             panels.setup.show_head(source.reach if running else None)
 

@@ -80,6 +80,11 @@ class Screen(QObject):
         """A run from disk, or some compared; None while plan or live run are shown."""
         return self._records.shown
 
+    @property
+    def live(self) -> LiveSource | None:
+        """The run in progress, the last one or the monitor, while that is shown."""
+        return self._panels.session.source if self.run is None else None
+
     # --- asked by the user
 
     @property
