@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -138,3 +139,11 @@ def test_the_how_to_analyse_a_run_is_true(tmp_path, monkeypatch, capsys):
     assert "time constant of" in said
     exec("\n".join(blocks(page, "python")), {})
     assert re.search(r"V_C1: [\d.]+ mV rms, \d+%", capsys.readouterr().out)
+
+
+def test_the_page_of_the_architecture_draws_the_layers_that_are_checked() -> None:
+    settings = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    (layers,) = [c["layers"] for c in contracts if "containers" in c]
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    assert "\n".join(layers) in page
