@@ -74,7 +74,7 @@ class DataFile:
         self._file.flush()
 
     def close(self, *, failed: bool) -> None:
-        """Close and sync; the ledger stays where writing had `failed`."""
+        """Close and sync, as far as that goes where writing has `failed` before."""
         try:
             self._file.close()
         finally:
@@ -83,8 +83,10 @@ class DataFile:
                 # a failure has been told already
                 with suppress(*(OSError,) if failed else ()):
                     self._durable.close()
-        if not failed:
-            self._path.unlink()
+
+    def drop_ledger(self) -> None:
+        """Nobody will have to recover the run."""
+        self._path.unlink()
 
     def _write(self, table: str, first: int, rows: list[tuple[Any, ...]]) -> None:
         values = np.array(rows, RECORDS[table])

@@ -199,6 +199,8 @@ class Recorder:
         )
         if failure is not None:
             raise failure
+        if self._file is not None:
+            self._file.drop_ledger()
 
     @property
     def _columns(self) -> list[SampleColumn]:

@@ -85,6 +85,22 @@ def test_a_run_that_ended_well_needs_no_ledger(cut_runs, bench, folder):
     assert not (folder.path / LEDGER).exists()
 
 
+def test_a_run_killed_before_it_was_called_complete_is_recovered(bench, folder):
+    layout = Layout(signals=bench.SIGNALS, detection=bench.DETECTION, simulated=True)
+    recorder = Recorder(folder, layout, reserve=0)
+    bench.play(recorder, bench.codes(4000), 500)
+
+    def killed(*_, **__):
+        folder._log.close()  # what the kernel does when the process dies
+        raise KeyboardInterrupt
+
+    folder.finish = killed
+    with pytest.raises(KeyboardInterrupt):
+        recorder.close("complete", 4000)
+    assert recover(folder.path).samples == 4000
+    assert verify(folder.path).sound
+
+
 def broken_index(data):
     """HDF5's index of chunks is gone; the chunks are not."""
     at, blocks = data.find(b"EADB"), 0  # an extensible array's data blocks
