@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from drivers.opened import Opened
@@ -22,6 +23,29 @@ GUARANTEED = (31.25e6, 15.625e6, 7.8125e6, 7.8125e6)
 """Streaming rate for 1 to 4 inputs that Pico guarantees on any USB port, S/s."""
 
 _MOST_PARTS = 8
+
+
+@dataclass
+class _Running:
+    """A stream that runs.
+
+    Attributes:
+        stream: how it is scaled.
+        ring: memory the library writes into.
+        count: of samples, against the clock.
+        data_at: clock time of the newest samples, s.
+        failure: what the next poll raises, once all samples are taken.
+        asked: clock time of the last question for samples, s.
+        drained: whether the library had no more to deliver then.
+    """
+
+    stream: Stream
+    ring: StreamRing
+    count: SampleCount
+    data_at: float
+    failure: BaseException | None = None
+    asked: float = 0.0
+    drained: bool = False
 
 
 class PicoScope(Opened):
@@ -64,12 +88,7 @@ class PicoScope(Opened):
         self._lag_tolerance = lag_tolerance
         self._ring: StreamRing | None = None
         self._stream: Stream | None = None
-        self._running = False
-        self._count = SampleCount(started=0.0, interval=1.0, depth=1, tolerance=0.0)
-        self._data_at = 0.0
-        self._drained = False
-        self._asked = 0.0
-        self._failure: BaseException | None = None
+        self._running: _Running | None = None
 
     @property
     def identity(self) -> str:
@@ -145,10 +164,10 @@ class PicoScope(Opened):
             started=(before + after) / 2,
             uncertainty=(after - before) / 2,
         )
-        self._count = SampleCount.of(
+        count = SampleCount.of(
             self._stream, samples, self._lag_tolerance, simulated=self._clock.simulated
         )
-        self._running, self._failure, self._data_at = True, None, after
+        self._running = _Running(self._stream, ring, count, after)
         return self._stream
 
     def poll(self) -> Block | None:
@@ -162,26 +181,26 @@ class PicoScope(Opened):
             SamplesLostError: samples are missing.
             RefusedError: not streaming, or the scope stopped because its power changed.
         """
-        ring = self._ring
-        if not self._running or ring is None:
+        running = self._running
+        if running is None:
             raise RefusedError("The scope is not streaming; start it first.")
-        if self._failure is None:
-            self._failure = self._fetch(ring)
+        if running.failure is None:
+            running.failure = self._fetch(running)
         received = self._clock.now()
-        taken = ring.take()
+        taken = running.ring.take()
         if taken is None:
-            if self._failure is not None:
-                raise self._failure
-            self._watch(received)
-            self._count.poll(self._asked, 0)
+            if running.failure is not None:
+                raise running.failure
+            self._watch(running, received)
+            running.count.poll(running.asked, 0)
             return None
         codes, overrange = taken
-        block = Block(self._count.received, codes, overrange, received)
-        self._data_at = received
+        block = Block(running.count.received, codes, overrange, received)
+        running.data_at = received
         try:
-            self._count.poll(self._asked, block.samples, self._drained, received)
+            running.count.poll(running.asked, block.samples, running.drained, received)
         except SamplesLostError as error:
-            self._failure = error
+            running.failure = error
         return block
 
     def _ring_for(self, bits: list[int], samples: int) -> StreamRing:
@@ -192,14 +211,14 @@ class PicoScope(Opened):
         ring.clear()
         return ring
 
-    def _fetch(self, ring: StreamRing) -> BaseException | None:
+    def _fetch(self, running: _Running) -> BaseException | None:
         """Have the library deliver what it has; return what went wrong."""
-        self._drained = False
+        running.drained, ring = False, running.ring
         for _ in range(_MOST_PARTS):
             ring.at_end = False
             # samples are counted against the time they were asked for, because
             # delivering them takes time as well
-            self._asked = self._clock.now()
+            running.asked = self._clock.now()
             code = self._unit.call(
                 "ps3000aGetStreamingLatestValues", ring.callback, None
             )
@@ -209,7 +228,7 @@ class PicoScope(Opened):
             if code not in status.AGAIN | {status.OK}:
                 return self._explain(code)
             if code != status.OK or not ring.at_end:
-                self._drained = code == status.OK
+                running.drained = code == status.OK
                 break
         return None
 
@@ -219,19 +238,18 @@ class PicoScope(Opened):
             code = status.NOT_RESPONDING
         return status.failure(code, doing)
 
-    def _watch(self, now: float) -> None:
-        assert self._stream is not None
-        silent = now - self._data_at
-        if silent <= max(self._watchdog, 20 * self._stream.interval):
+    def _watch(self, running: _Running, now: float) -> None:
+        silent = now - running.data_at
+        if silent <= max(self._watchdog, 20 * running.stream.interval):
             return
         if self._unit.answers():
             text = "it answers a ping but sends no data; start again"
         else:
             text = "it does not answer: unplugged or without power; check its cable"
-        self._failure = LinkLostError(
+        running.failure = LinkLostError(
             f"{self.identity} has sent nothing for {silent:.3g} s: {text}."
         )
-        raise self._failure
+        raise running.failure
 
     def stop(self) -> None:
         """Stop streaming; idempotent.
@@ -240,14 +258,14 @@ class PicoScope(Opened):
             SamplesLostError: samples are missing at the end of the stream.
             TactileLabError: the scope is there but did not stop.
         """
-        if not self._running:
+        running, self._running = self._running, None
+        if running is None:
             return
-        self._running = False
         code = self._unit.call("ps3000aStop")
-        if self._failure is None:
+        if running.failure is None:
             if code not in (status.OK, *status.DEAD):
                 raise status.failure(code, "Stopping the scope")
-            self._count.finish()
+            running.count.finish()
 
     def settings(self) -> dict[str, str]:
         """Settings in force, for the run's record."""
