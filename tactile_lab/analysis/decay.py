@@ -91,52 +91,54 @@ def fit_decay(
             f"a hold of {length:.3g} s does not determine tau, about {tau:.2g} s: "
             f"{needed:g} tau are needed"
         )
-    return _decay(theta, t, y, free=rest is None)
+    return _decay(theta, t, y)
 
 
 def _fit(t: FloatArray, y: FloatArray, length: float, *, free: bool) -> FloatArray:
-    """(ln tau, amplitude, offset): a grid on tau, then Gauss-Newton."""
-    best, least = np.zeros(3), np.inf
-    for tau in _GRID * length:
-        linear = _linear(t, y, tau, free=free)
-        residual = y - linear[0] * np.exp(-t / tau) - linear[1]
-        cost = float(np.sum(residual**2))
-        if cost < least:
-            best, least = np.array([np.log(tau), *linear]), cost
-    theta = best
-    for _ in range(50):
-        jacobian = _jacobian(theta, t, free=free)
-        residual = y - theta[1] * np.exp(-t / np.exp(theta[0])) - theta[2]
-        step = np.linalg.lstsq(jacobian, residual, rcond=1e-12)[0]
-        step = step * min(1.0, 0.5 / max(abs(step[0]), 1e-300))
-        theta = theta + (step if free else np.append(step, 0.0))
-        if np.max(np.abs(step)) < 1e-12:
-            break
-    return theta
+    """(ln tau, amplitude, offset): the best tau of a grid, then least squares.
+
+    Without `free` the offset is 0 and left out.
+    """
+    from scipy.optimize import least_squares
+
+    grid = _GRID * length
+    starts = [_linear(t, y, tau, free=free) for tau in grid]
+    costs = [
+        float(np.sum(_residual(np.array([np.log(tau), *linear]), t, y) ** 2))
+        for tau, linear in zip(grid, starts, strict=True)
+    ]
+    best = int(np.argmin(costs))
+    solved = least_squares(
+        _residual, [np.log(grid[best]), *starts[best]], _slopes, method="lm",
+        xtol=1e-12, ftol=1e-15, gtol=1e-15, args=(t, y),
+    )  # fmt: skip
+    return np.asarray(solved.x, dtype=np.float64)
 
 
 def _linear(t: FloatArray, y: FloatArray, tau: float, *, free: bool) -> FloatArray:
+    """Amplitude, and offset if it is free, of the best decay with that tau."""
     shape = np.exp(-t / tau)
-    if not free:
-        return np.array([np.sum(shape * y) / np.sum(shape**2), 0.0])
-    design = np.column_stack([shape, np.ones_like(t)])
+    design = np.column_stack([shape, np.ones_like(t)]) if free else shape[:, None]
     solved: FloatArray = np.linalg.lstsq(design, y, rcond=None)[0]
     return solved
 
 
-def _jacobian(theta: FloatArray, t: FloatArray, *, free: bool) -> FloatArray:
+def _residual(theta: FloatArray, t: FloatArray, y: FloatArray) -> FloatArray:
+    left: FloatArray = theta[1] * np.exp(-t / np.exp(theta[0])) + sum(theta[2:]) - y
+    return left
+
+
+def _slopes(theta: FloatArray, t: FloatArray, y: FloatArray) -> FloatArray:
+    """Of the residual by each of `theta`, shape (n, 2 or 3)."""
     scaled = t / np.exp(theta[0])
     shape = np.exp(-scaled)
-    columns = [theta[1] * scaled * shape, shape]
-    if free:
-        columns.append(np.ones_like(t))
-    return np.column_stack(columns)
+    columns = [theta[1] * scaled * shape, shape, np.ones_like(t)]
+    return np.column_stack(columns[: theta.size])
 
 
-def _decay(theta: FloatArray, t: FloatArray, y: FloatArray, *, free: bool) -> Decay:
-    jacobian = _jacobian(theta, t, free=free)
-    freedom = t.size - jacobian.shape[1]
-    residual = y - theta[1] * np.exp(-t / np.exp(theta[0])) - theta[2]
+def _decay(theta: FloatArray, t: FloatArray, y: FloatArray) -> Decay:
+    jacobian, residual = _slopes(theta, t, y), _residual(theta, t, y)
+    freedom = t.size - theta.size
     scatter = float(np.sqrt(np.sum(residual**2) / freedom))
     covariance = scatter**2 * np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     log_error = float(np.sqrt(covariance[0, 0]))
