@@ -12,7 +12,7 @@ from pydantic import Field
 from tactile_lab.analysis.wiring import (
     NODES,
     ChannelCalibration,
-    Levels,
+    SignalLevels,
     calibrate_channel,
     explaining_V_GS,
     hum,
@@ -83,7 +83,7 @@ class WiringCheck(Protocol):
         calibrations, faults = _calibrated(run, run.circuit, windows)
         rest, push = (_found(run, windows[w], calibrations) for w in ("rest", "push"))
         expected = _expected(run, run.circuit, windows)
-        verdicts = judge(Levels(rest, push), expected, faults)
+        verdicts = judge(SignalLevels(rest, push), expected, faults)
         channels: dict[str, dict[str, Any]] = {}
         sentences = []
         for verdict in verdicts:
@@ -175,7 +175,7 @@ def _found(
 
 def _expected(
     run: Measurement, circuit: Circuit, windows: Mapping[str, Window]
-) -> Levels:
+) -> SignalLevels:
     """Rest and push by the model, and by what was set."""
     from tactile_lab.model.simulate import simulate
 
@@ -197,7 +197,7 @@ def _expected(
                 "field": amperes * (run.field_per_ampere or 0.0),
             }
         )
-    return Levels(*levels)
+    return SignalLevels(*levels)
 
 
 def _gate(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tactile_lab.analysis.wiring import Verdict
+from tactile_lab.analysis.wiring import ChannelVerdict
 from tactile_lab.conclusion import Table
 from tactile_lab.errors import RunFolderError
 from tactile_lab.plot import Plot
@@ -29,7 +29,7 @@ class Concluded:
 
     protocol: str
     statements: tuple[str, ...]
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[ChannelVerdict, ...]
     tables: tuple[Table, ...]
     plots: tuple[Plot, ...]
     calibration: Path | None
@@ -51,7 +51,7 @@ def conclusion_of(folder: Path) -> Concluded:
             protocol=found["protocol"],
             statements=tuple(found.get("statements", ())),
             verdicts=tuple(
-                Verdict(signal, bool(one["ok"]), str(one["text"]))
+                ChannelVerdict(signal, bool(one["ok"]), str(one["text"]))
                 for signal, one in values.get("channels", {}).items()
             ),
             tables=tuple(_table(table) for table in found.get("tables", ())),

@@ -29,7 +29,7 @@ LEAK = 0.3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ChannelVerdict:
     """On one channel.
 
     Attributes:
@@ -44,7 +44,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Levels:
+class SignalLevels:
     """Mean of each signal at rest and during the push, by name, SI."""
 
     rest: Mapping[str, float]
@@ -108,8 +108,8 @@ def calibrate_channel(
 
 
 def judge(
-    found: Levels, expected: Levels, faults: Mapping[str, str] | None = None
-) -> tuple[Verdict, ...]:
+    found: SignalLevels, expected: SignalLevels, faults: Mapping[str, str] | None = None
+) -> tuple[ChannelVerdict, ...]:
     """One verdict per measured signal.
 
     Args:
@@ -121,7 +121,7 @@ def judge(
     verdicts = []
     for signal in found.rest:
         if signal in faults:
-            verdicts.append(Verdict(signal, False, faults[signal]))
+            verdicts.append(ChannelVerdict(signal, False, faults[signal]))
         elif signal in NODES and signal in expected.rest:
             verdicts.append(_voltage(signal, found, expected))
         elif signal in ("coil_current", "field") and expected.push.get(signal):
@@ -129,18 +129,20 @@ def judge(
     return tuple(verdicts)
 
 
-def _voltage(signal: str, found: Levels, expected: Levels) -> Verdict:
+def _voltage(
+    signal: str, found: SignalLevels, expected: SignalLevels
+) -> ChannelVerdict:
     rest, should = found.rest[signal], expected.rest[signal]
     change = found.push[signal] - rest
     wanted = expected.push[signal] - should
     says = f"{show(rest, 'V', 3)} at rest, {_signed(change)} by the push"
 
-    def wrong(text: str) -> Verdict:
-        return Verdict(signal, False, f"{says}{text}")
+    def wrong(text: str) -> ChannelVerdict:
+        return ChannelVerdict(signal, False, f"{says}{text}")
 
     alike = change * wanted > 0 and _similar(change, wanted)
     if _near(rest, should) and (alike or max(abs(change), abs(wanted)) < SLACK / 5):
-        return Verdict(signal, True, says)
+        return ChannelVerdict(signal, True, says)
     for other in NODES:
         if other != signal and _swapped(signal, other, found, expected):
             return wrong(f": swapped with {other}")
@@ -160,7 +162,7 @@ def _voltage(signal: str, found: Levels, expected: Levels) -> Verdict:
     return wrong(f", {show(should, 'V', 3)} expected: check V_GS and V_S")
 
 
-def _swapped(one: str, other: str, found: Levels, expected: Levels) -> bool:
+def _swapped(one: str, other: str, found: SignalLevels, expected: SignalLevels) -> bool:
     """Whether each of the two shows what the other should."""
     if other not in found.rest or other not in expected.rest:
         return False
@@ -180,12 +182,12 @@ def _attenuated(factor: float) -> str:
     return f"{much}: check the probe's attenuation against `scale`"
 
 
-def _drive(signal: str, found: Levels, expected: Levels) -> Verdict:
+def _drive(signal: str, found: SignalLevels, expected: SignalLevels) -> ChannelVerdict:
     unit = "A" if signal == "coil_current" else "T"
     change = found.push[signal] - found.rest[signal]
     wanted = expected.push[signal] - expected.rest[signal]
     if signal == "coil_current" and abs(found.rest[signal]) > LEAK:
-        return Verdict(
+        return ChannelVerdict(
             signal, False, f"{show(found.rest[signal], unit, 3)} although none flows: "
             "another signal's probe lies on its input",
         )  # fmt: skip
@@ -193,15 +195,17 @@ def _drive(signal: str, found: Levels, expected: Levels) -> Verdict:
     ratio = change / wanted if wanted else math.nan
     # a shunt read by 8 bits and an uncalibrated field are rough
     if 0.5 < ratio < 2:
-        return Verdict(signal, True, says)
+        return ChannelVerdict(signal, True, says)
     if abs(ratio) < DEAD * 5:
-        return Verdict(signal, False, f"{says}: not connected, or no current flows")
+        return ChannelVerdict(
+            signal, False, f"{says}: not connected, or no current flows"
+        )
     if -2 < ratio < -0.5:
-        return Verdict(signal, False, f"{says}: reversed")
+        return ChannelVerdict(signal, False, f"{says}: reversed")
     for factor in FACTORS:
         if 0.5 < ratio / factor < 2:
-            return Verdict(signal, False, f"{says}: {_attenuated(factor)}")
-    return Verdict(signal, False, f"{says}: check wiring and scale")
+            return ChannelVerdict(signal, False, f"{says}: {_attenuated(factor)}")
+    return ChannelVerdict(signal, False, f"{says}: check wiring and scale")
 
 
 def _near(value: float, should: float) -> bool:

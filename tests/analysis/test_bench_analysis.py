@@ -8,7 +8,7 @@ from tactile_lab.analysis.field_calibration import (
     calibration_text,
     fit_field,
 )
-from tactile_lab.analysis.wiring import Levels, explaining_V_GS, hum, judge
+from tactile_lab.analysis.wiring import SignalLevels, explaining_V_GS, hum, judge
 from tactile_lab.calibration import read_calibration
 from tactile_lab.errors import LimitError, NotIdentifiableError, SceneError
 from tactile_lab.model.circuit import Circuit
@@ -111,7 +111,7 @@ def test_the_file_is_dated_and_hashed(tmp_path):
         changed.check(beyond_date=True, other_coil=True)
 
 
-EXPECTED = Levels(
+EXPECTED = SignalLevels(
     rest={"V_C1": 4.347, "V_C2": 1.448, "coil_current": 0.0, "field": 0.0},
     push={"V_C1": 4.21, "V_C2": 2.05, "coil_current": 0.25, "field": 2.75e-3},
 )
@@ -121,7 +121,7 @@ def found(**changes):
     rest, push = dict(EXPECTED.rest), dict(EXPECTED.push)
     for name, (at_rest, pushed) in changes.items():
         rest[name], push[name] = at_rest, pushed
-    return judge(Levels(rest, push), EXPECTED)
+    return judge(SignalLevels(rest, push), EXPECTED)
 
 
 def verdict(signal, **changes):
