@@ -36,6 +36,8 @@ TABLES = (
 DEMO = "demo"
 SIMULATED = "sim"
 """Name of the built-in simulated bench."""
+DEAD = {"field_meter": ("interval",)}
+"""Keys of a bench that nobody ever read; runs and bench files of before have them."""
 
 
 def load(
@@ -250,7 +252,7 @@ def _protocol(
 
 def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
     """The bench file (or the built-in bench) with the scene's own keys over it."""
-    inline = {key: value for key, value in table.items() if key != "file"}
+    inline = {key: v for key, v in _living(table).items() if key != "file"}
     file = table.get("file")
     if file is None:
         if inline.get("simulated") is False:
@@ -272,7 +274,7 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
         if "file" in under:
             raise SceneError(f'{path}: a bench file has no key "file".')
         _refuse_not_finite(under, _blame(str(path), {}))
-        whole = _lists_to_tuples(under)
+        whole = under = _living(_lists_to_tuples(under))
         validated(BenchSpec, whole, (), _blame(str(path), {}), None)
         if inline.get("simulated") is False and under.get("simulated") is True:
             raise complaint(
@@ -282,6 +284,16 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
     if path is not None:
         folder, merged["file"] = path.parent, str(path)
     return validated(BenchSpec, merged, ("bench",), blame, folder)
+
+
+def _living(bench: dict[str, Any]) -> dict[str, Any]:
+    """A bench's tables without the keys that former versions wrote into each run."""
+    return {
+        name: {key: v for key, v in table.items() if key not in DEAD.get(name, ())}
+        if isinstance(table, dict)
+        else table
+        for name, table in bench.items()
+    }
 
 
 def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -258,3 +258,11 @@ def test_a_start_table_survives_in_the_resolved_scene(scene_file):
     scene = load(scene_file(PULSES + cold))
     again = resolve(tomllib.loads(scene.to_toml()), Path("x.toml"))
     assert again.start == scene.start
+
+
+def test_a_key_that_former_versions_wrote_into_every_run_is_passed_over(tmp_path):
+    table, kept = "[bench.field_meter]\n", tmp_path / "scene.toml"
+    text = load("demo").to_toml()
+    assert text.count(table) == 1
+    kept.write_text(text.replace(table, f'{table}interval = "0.2 s"\n'))
+    assert load(str(kept)).bench.field_meter == load("demo").bench.field_meter
