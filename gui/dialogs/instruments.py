@@ -16,9 +16,11 @@ from gui.parts import column, label, line, push, set_role
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.instruments.dialects import dialect_ids
+from tactile_lab.instruments.registry import ScopeDriver, driver_names
 from tactile_lab.quantity import show
 
-SCOPES = (("ps3000a", "PicoScope 3000"), ("usbtmc", "USBTMC (SCPI)"), ("", "none"))
+SCOPES = {"ps3000a": "PicoScope 3000", "usbtmc": "USBTMC (SCPI)"}
+"""Titles of drivers that ship; any other bears its name."""
 
 
 class Instruments(QWidget):
@@ -44,8 +46,9 @@ class Instruments(QWidget):
         self.coil_row.addItems(dialect_ids("coil"))
         self.meter_row.addItems([*dialect_ids("field meter"), BY_PERSON])
         self.scope = QComboBox()
-        for driver, title in SCOPES:
-            self.scope.addItem(title, driver)
+        for driver in driver_names(ScopeDriver):
+            self.scope.addItem(SCOPES.get(driver, driver), driver)
+        self.scope.addItem("none", "")
         self.serial = QLineEdit()
         self.serial.setPlaceholderText("serial number, if several")
         self.library = QLineEdit()
@@ -77,7 +80,9 @@ class Instruments(QWidget):
             if row.findText(dialect) < 0:  # a row of the user's own
                 row.addItem(dialect)
             row.setCurrentText(dialect)
-        self.scope.setCurrentIndex(max(self.scope.findData(choice.scope), 0))
+        if self.scope.findData(choice.scope) < 0:  # a driver of the user's own
+            self.scope.addItem(choice.scope, choice.scope)
+        self.scope.setCurrentIndex(self.scope.findData(choice.scope))
         self.serial.setText(choice.scope_serial)
         self.library.setText(choice.scope_library)
 

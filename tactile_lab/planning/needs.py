@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from tactile_lab.bench import Channel
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.registry import check_scope, scope_capability
+from tactile_lab.instruments.registry import BY_PERSON, check_scope, scope_capability
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import SIGNALS
@@ -85,7 +85,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
             f"{scene.name} records the field, but bench {scene.bench.name} has "
             "neither [field_meter] nor a scope channel with the signal field."
         )
-    by_hand = meter is not None and meter.driver == "manual"
+    by_hand = meter is not None and meter.driver == BY_PERSON
     channels, rate, gapless = _as_the_scope_can(scene, channels, detect_on)
     return Needs(
         coil=drive.drives,

@@ -254,6 +254,16 @@ def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> 
     page.deleteLater()
 
 
+def test_the_dialog_offers_registered_scopes_and_keeps_ones_own(lab) -> None:
+    choice = start_choice()
+    choice.scope = "/lab/my_scope.py"
+    page = Instruments(choice, lab.window.theme)
+    offered = [page.scope.itemData(k) for k in range(page.scope.count())]
+    assert offered == ["ps3000a", "usbtmc", "", "/lab/my_scope.py"]
+    assert page.take().scope == "/lab/my_scope.py"
+    page.deleteLater()
+
+
 def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     window, session = lab.window, lab.session
     window.actions_.connect_dialog()
