@@ -185,11 +185,13 @@ class Pyramid:
         if self.coarse(start, end, count) and (part := self._part(start, end)):
             return part.around(start, end).thin(count)
         level = self._levels[0]
+        known = not level.forgotten or start >= level.start
+        if not known or end - start >= 2 * count * BRANCH * level.width:
+            self._join()
         for above in self._levels[1:]:
             known = not level.forgotten or start >= level.start
             if known and end - start < 2 * count * above.width:
                 break
-            self._join()
             level = above
         return level.trace().around(start, end).thin(count)
 

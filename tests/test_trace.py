@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tactile_lab.pyramid import FINE, Pyramid
@@ -151,6 +151,7 @@ def test_a_pyramid_is_what_it_was_fed_at_any_zoom(
 
 
 @settings(max_examples=15)
+@example([1, 1, 3072, 1023])
 @given(st.lists(st.integers(1, 9000), min_size=3, max_size=12))
 def test_coarser_levels_do_not_depend_on_the_blocks(sizes: list[int]) -> None:
     size = sum(sizes)
