@@ -41,6 +41,10 @@ _UNKNOWN = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 _TAGS = frozenset({"word", "table"})
 
 
+_adapters: dict[type, TypeAdapter[Any]] = {}
+"""Built once: building the schema takes ten times as long as using it."""
+
+
 def validated(
     kind: type[M],
     table: Mapping[str, Any],
@@ -62,7 +66,9 @@ def validated(
     """
     try:
         context = {"text_only": True, "folder": folder}
-        return TypeAdapter(kind).validate_python(table, context=context)
+        if kind not in _adapters:
+            _adapters[kind] = TypeAdapter(kind)
+        made: M = _adapters[kind].validate_python(table, context=context)
     except ValidationError as wrong:
         found = wrong.errors()
         inside = {error["loc"][:-1] for error in found}
@@ -72,6 +78,7 @@ def validated(
             if not (error["type"] == "too_short" and error["loc"] in inside)
         ]
         raise SceneError("\n".join(dict.fromkeys(lines))) from wrong
+    return made
 
 
 def complaint(at: tuple[str, ...], message: str, blame: Blame) -> SceneError:
