@@ -100,7 +100,7 @@ def test_blocks_are_owned_and_contiguous() -> None:
         assert np.array_equal(first.codes, kept)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     ring=st.integers(50, 3000),
     longest=st.one_of(st.none(), st.integers(7, 500)),

@@ -18,7 +18,7 @@ def counter() -> SampleCount:
     )
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     latencies=st.lists(st.floats(0, 0.03), min_size=20, max_size=200),
     drift=st.floats(-8e-5, 8e-5),
@@ -34,7 +34,7 @@ def test_latency_and_drift_are_no_loss(latencies: list[float], drift: float) -> 
     assert count.received > 0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(lost=st.integers(20_000, 10**6), at=st.integers(10, 50))
 def test_loss_is_found_within_a_few_polls(lost: int, at: int) -> None:
     count = counter()

@@ -63,7 +63,7 @@ def session(clock, coil):
         return
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(schedule=st.lists(faults(), max_size=4))
 def test_no_report_is_wrong_and_no_limit_broken(schedule):
     row = coil_dialect("kepco-bop")

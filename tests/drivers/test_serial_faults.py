@@ -252,7 +252,6 @@ def test_another_instrument_on_the_port_is_refused(serial_bench):
 
 @settings(
     max_examples=25,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(cuts=st.lists(st.integers(0, 60), max_size=8))

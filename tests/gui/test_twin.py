@@ -27,7 +27,7 @@ def in_one_piece() -> ModelPart:
     return part
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.floats(0.01, 1.45), max_size=6))
 def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
     whole = in_one_piece()

@@ -141,7 +141,7 @@ def test_far_from_saturation_it_is_the_cascade_with_a_base_current():
     assert with_junction.spike_times == pytest.approx(without.spike_times, rel=1e-6)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     st.sampled_from(CIRCUITS),
     st.lists(st.floats(0, 0.4), max_size=8),

@@ -36,7 +36,7 @@ def sliced(circuit, cuts, end, known_until_now=False, through_pickle=False):
     return state, np.array(spikes)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.sampled_from(CIRCUITS),
     st.lists(st.floats(0, 1.2), max_size=12),

@@ -56,7 +56,7 @@ values = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.dictionaries(words, values, max_size=3))
 @example({"protocol": {"name": "pulses", "levels": [["50 mN"]]}})
 @example({"protocol": {"name": "pulses"}, "bench": {"scope": {"channels": "A"}}})
@@ -73,7 +73,7 @@ def test_any_tables_are_a_scene_or_a_refusal(data):
         assert again.to_toml() == scene.to_toml()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_a_damaged_demo_is_a_scene_or_a_refusal(tmp_path_factory, data):
     text = bytearray(DEMO.encode())

@@ -24,7 +24,7 @@ from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     sizes=st.lists(st.integers(1, 30_000), min_size=1, max_size=40),
     seed=st.integers(0, 5),

@@ -64,7 +64,7 @@ def reference(
     return (np.clip(np.rint(x), -LIMIT, LIMIT) * (1 << SHIFT)).astype(np.int16)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     knots=st.lists(
         st.tuples(st.floats(0, 1e-2), st.floats(-150, 150)), min_size=1, max_size=12

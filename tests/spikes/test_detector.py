@@ -71,7 +71,7 @@ walks = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(
     walks,
     st.integers(-8, 8),
@@ -94,7 +94,7 @@ def test_any_slicing_gives_the_definition(
     same(in_blocks(detector, codes, cuts), want)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(
     st.lists(st.integers(200, 3000), min_size=1, max_size=8),
     st.integers(1, 4),

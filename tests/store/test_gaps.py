@@ -44,7 +44,7 @@ def write(bench, folder, records, unseen):
     return run.path, made, kept
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(RECORDS, st.integers(0, 500), st.sampled_from([3, 40, 5000]))
 def test_every_cell_holds_the_samples_of_its_own_time(bench, records, unseen, cells):
     with tempfile.TemporaryDirectory() as folder:

@@ -19,7 +19,6 @@ from tactile_lab.waveform import Waveform
 
 
 @settings(
-    deadline=None,
     max_examples=25,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
