@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 from tactile_lab.acquisition.ending import CoilState
-from tactile_lab.acquisition.instrument_thread import InstrumentThread
+from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Coil, OffReport
 from tactile_lab.clock import Clock
@@ -65,7 +66,7 @@ class CoilThread(InstrumentThread):
         self.measured: float | None = None
         self._stop = stop
         self._lease = lease
-        self._applied: list[Applied] = []
+        self._applied: deque[Applied] = deque()
         self._warned = 0
         self._read = float("-inf")
         self._energise = False
@@ -98,8 +99,7 @@ class CoilThread(InstrumentThread):
 
     def take_applied(self) -> list[Applied]:
         """Set-points applied since this was last asked."""
-        taken, self._applied = self._applied, []
-        return taken
+        return drained(self._applied)
 
     def open(self) -> None:
         """Open the source; it makes itself safe on the way."""

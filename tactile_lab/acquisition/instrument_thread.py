@@ -4,9 +4,22 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
+from collections import deque
+from typing import TypeVar
 
 from tactile_lab.clock import Clock
 from tactile_lab.errors import TactileLabError
+
+T = TypeVar("T")
+
+
+def drained(queue: deque[T]) -> list[T]:
+    """All that `queue` holds, taken out of it, while its instrument may add more.
+
+    Items are taken one by one: a list swapped for a new one would lose what a thread,
+    which still holds the old, is just about to add.
+    """
+    return [queue.popleft() for _ in range(len(queue))]
 
 
 class InstrumentThread(ABC):

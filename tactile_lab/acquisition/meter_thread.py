@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tactile_lab.acquisition.instrument_thread import InstrumentThread
+from collections import deque
+
+from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
 from tactile_lab.bench import FieldMeter, Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError
@@ -17,12 +19,11 @@ class MeterThread(InstrumentThread):
     def __init__(self, meter: FieldMeter, clock: Clock) -> None:
         super().__init__("field meter", clock)
         self.meter = meter
-        self._readings: list[Reading] = []
+        self._readings: deque[Reading] = deque()
 
     def take_readings(self) -> list[Reading]:
         """Readings since this was last asked; times on the bench's clock."""
-        taken, self._readings = self._readings, []
-        return taken
+        return drained(self._readings)
 
     def open(self) -> None:
         """Open the meter."""
