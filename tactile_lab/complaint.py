@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from tactile_lab.errors import SceneError, nearest
-from tactile_lab.table import fields_of
+from tactile_lab.table import adapter, fields_of
 
 M = TypeVar("M")
 Blame = Callable[[tuple[str, ...]], str]
@@ -41,10 +41,6 @@ _UNKNOWN = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 _TAGS = frozenset({"word", "table"})
 
 
-_adapters: dict[type, TypeAdapter[Any]] = {}
-"""Built once: building the schema takes ten times as long as using it."""
-
-
 def validated(
     kind: type[M],
     table: Mapping[str, Any],
@@ -66,9 +62,7 @@ def validated(
     """
     try:
         context = {"text_only": True, "folder": folder}
-        if kind not in _adapters:
-            _adapters[kind] = TypeAdapter(kind)
-        made: M = _adapters[kind].validate_python(table, context=context)
+        made: M = adapter(kind).validate_python(table, context=context)
     except ValidationError as wrong:
         found = wrong.errors()
         inside = {error["loc"][:-1] for error in found}

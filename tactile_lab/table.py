@@ -9,10 +9,11 @@ file holds. Nothing here loads pydantic before a file is read.
 from __future__ import annotations
 
 import dataclasses
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, get_type_hints
 
 if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler
+    from pydantic import GetCoreSchemaHandler, TypeAdapter
     from pydantic.fields import FieldInfo
     from pydantic_core import CoreSchema
 
@@ -75,12 +76,22 @@ def dumped(table: Any) -> dict[str, Any]:
 
     Quantities are exact texts.
     """
-    from pydantic import TypeAdapter
-
-    made: dict[str, Any] = TypeAdapter(type(table)).dump_python(
+    made: dict[str, Any] = adapter(type(table)).dump_python(
         table, by_alias=True, exclude_none=True
     )
     return made
+
+
+@lru_cache(maxsize=128)
+def adapter(kind: type[Any]) -> TypeAdapter[Any]:
+    """Reads and writes a table, or a pydantic model.
+
+    Building its schema takes ten times as long as using it. Only so many are kept:
+    a user's protocol is a new class each time its file is read.
+    """
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def _internal(kind: Any) -> set[str]:
