@@ -13,6 +13,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, get_type_hints
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from pydantic import GetCoreSchemaHandler, TypeAdapter
     from pydantic.fields import FieldInfo
     from pydantic_core import CoreSchema
@@ -82,16 +84,18 @@ def dumped(table: Any) -> dict[str, Any]:
     return made
 
 
-@lru_cache(maxsize=128)
-def adapter(kind: type[Any]) -> TypeAdapter[Any]:
-    """Reads and writes a table, or a pydantic model.
-
-    Building its schema takes ten times as long as using it. Only so many are kept:
-    a user's protocol is a new class each time its file is read.
-    """
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind)
+
+
+adapter: Callable[[type[Any]], TypeAdapter[Any]] = lru_cache(maxsize=128)(_adapter)
+"""Reads and writes a table, or a pydantic model.
+
+Building its schema takes ten times as long as using it. Only so many are kept: a user's
+protocol is a new class each time its file is read.
+"""
 
 
 def _internal(kind: Any) -> set[str]:

@@ -6,7 +6,6 @@ piped stay plain.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -85,6 +84,8 @@ def refusing() -> Iterator[None]:
 
 def print_json(data: Mapping[str, Any]) -> None:
     """The one object on stdout: full double precision, no NaN."""
+    import json
+
     click.echo(json.dumps(data, allow_nan=False))
 
 
