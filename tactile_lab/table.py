@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, cast, get_type_hints
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -90,7 +90,7 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-adapter: Callable[[type[Any]], TypeAdapter[Any]] = lru_cache(maxsize=128)(_adapter)
+adapter = cast("Callable[[type[Any]], TypeAdapter[Any]]", lru_cache(128)(_adapter))
 """Reads and writes a table, or a pydantic model.
 
 Building its schema takes ten times as long as using it. Only so many are kept: a user's
