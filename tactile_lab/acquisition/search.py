@@ -38,8 +38,17 @@ class SpikeSearch:
 
     @classmethod
     def of(cls, scene: Scene, signal: str | None) -> SpikeSearch | None:
-        """The search on a channel; None where no spikes are looked for."""
-        return None if signal is None else cls(scene, signal)
+        """The search on a channel, ready; None where no spikes are looked for.
+
+        Its loop is compiled here, the first time on a computer for some seconds: at
+        the first block the run would stand still for longer than the coil waits.
+        """
+        if signal is None:
+            return None
+        from tactile_lab.spikes.detector import compile_search
+
+        compile_search()
+        return cls(scene, signal)
 
     @property
     def must_learn(self) -> bool:

@@ -197,6 +197,11 @@ def detector_of(detection: Detection) -> Detector | ResetDetector:
     )
 
 
+def compile_search() -> None:
+    """Compile the loop, or load it from disk, before samples wait for it."""
+    Detector(threshold=1, hysteresis=1).feed(0, np.zeros(1, dtype=np.int16))
+
+
 def detect(codes: Codes, detection: Detection, *, first: int = 0) -> Spikes:
     """All spikes of a whole record; equal to any block-wise feeding of a detector."""
     detector = detector_of(detection)

@@ -1,5 +1,7 @@
 """The detector finds what is there, once, however the record is sliced."""
 
+import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -199,3 +201,25 @@ def test_rate_is_carried_from_block_to_block():
 def test_impossible_settings_are_refused(wrong):
     with pytest.raises(ParameterError):
         Detector(**wrong)
+
+
+FIRST_BLOCK = """
+import numpy as np
+from tactile_lab.acquisition.search import SpikeSearch
+from tactile_lab.scene.load import load
+
+SpikeSearch.of(load("demo"), "V_K")
+from tactile_lab.spikes import crossings, detector
+
+ready = list(crossings.scan.signatures)
+block = np.zeros((4, 5000), dtype=np.int16)
+detector.Detector(threshold=100, hysteresis=10).feed(0, block[2])
+print(len(ready), crossings.scan.signatures == ready)
+"""
+
+
+def test_nothing_is_compiled_when_the_first_block_of_a_run_has_come():
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_BLOCK], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["1", "True"]
