@@ -33,14 +33,16 @@ class Level:
 
     Args:
         keep: how many cells are kept; there is room for a quarter more.
+        signal: of the traces it gives.
 
     Attributes:
         width: of a cell, s; 0 before the first.
         count: cells added so far, forgotten ones included.
     """
 
-    def __init__(self, keep: int) -> None:
+    def __init__(self, keep: int, signal: str = "") -> None:
         self.width = 0.0
+        self._signal = signal
         self.count = 0
         self._keep = keep
         self._first, self._last = 0, 0
@@ -89,23 +91,19 @@ class Level:
         self._last -= 1
         self.count -= 1
 
-    def trace(self) -> Trace:
-        """All cells that are kept."""
-        kept = slice(self._first, self._last)
+    def since(self, number: int = 0) -> Trace:
+        """Cells from number `number` on, as far as they are kept."""
+        kept = slice(self._first + max(0, number - self.forgotten), self._last)
         time, low, high, mean = self._values[:, kept]
         gap = self._gap[kept]
         if gap.size and not gap[0]:
             gap = gap.copy()
             gap[0] = True
-        return Trace(time, low, high, mean, gap, self.width)
+        return Trace(time, low, high, mean, gap, self.width, self._signal)
 
     def has_gap(self, number: int) -> bool:
         """Whether there is a gap before cell `number`, which is kept."""
         return bool(self._gap[self._first + number - self.forgotten])
-
-    def since(self, number: int) -> Trace:
-        """Cells from number `number` on, as far as they are kept."""
-        return self.trace()[max(0, number - self.forgotten) :]
 
     def _make_room(self, more: int) -> None:
         """Have room for `more` cells; what a trace still shows is never overwritten."""
@@ -178,7 +176,7 @@ class Pyramid:
 
     def newest(self, cells: int) -> Trace:
         """The newest cells of the finest level."""
-        return self._levels[0].trace()[-cells:]
+        return self._levels[0].since()[-cells:]
 
     def between(self, start: float, end: float, count: int) -> Trace:
         """What lies in [start, end] s in about `count` cells."""
@@ -193,7 +191,7 @@ class Pyramid:
             if known and end - start < 2 * count * above.width:
                 break
             level = above
-        return level.trace().around(start, end).thin(count)
+        return level.since().around(start, end).thin(count)
 
     # --- closer looks
 
@@ -232,5 +230,5 @@ class Pyramid:
         if len(level):
             level.drop_last()
         level.add(fresh.merge(BRANCH, -first % BRANCH), finer.has_gap(first))
-        begun = np.searchsorted(fresh.time, level.trace().time[-1])
+        begun = np.searchsorted(fresh.time, level.since().time[-1])
         self._open[number] = first + int(begun)

@@ -8,7 +8,6 @@ that is too slow loses old bins from the picture, never from the record.
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +34,7 @@ class Live:
         self._interval = 0.0
         self._start = 0.0
         self._gapless = True
-        self._scale: list[tuple[float, float]] = []
+        self._scale = np.empty((2, 0, 1))
         self._rest: NDArray[np.int16] = np.empty((0, 0), np.int16)
         self._next_time = 0.0
 
@@ -59,12 +58,14 @@ class Live:
         with self._lock:
             if stream.channels != self._channels:
                 self._channels = stream.channels
-                self._levels = [Level(CAPACITY) for _ in stream.channels]
+                self._levels = [
+                    Level(CAPACITY, channel.signal) for channel in stream.channels
+                ]
             self._interval = stream.interval
             self._per_bin = max(1, round(BIN / stream.interval))
-            self._scale = [
-                stream.volts_per_code(row) for row in range(len(stream.channels))
-            ]
+            rows = range(len(stream.channels))
+            scale = [stream.volts_per_code(row) for row in rows]
+            self._scale = np.array(scale).T[:, :, np.newaxis]
             self._rest = np.empty((len(stream.channels), 0), np.int16)
             self._next_time = self._start = start
             self._gapless = stream.gapless
@@ -96,10 +97,12 @@ class Live:
         width = per_bin * self._interval
         time = self._next_time + width * np.arange(bins)
         whole = self._per_bin * self._interval
+        gain, offset = self._scale
+        low, high, mean = np.stack([low, high, mean]) * gain + offset
+        gap = np.arange(bins) == 0
         with self._lock:
-            for row, (gain, offset) in enumerate(self._scale):
-                a, b, c = (part[row] * gain + offset for part in (low, high, mean))
-                self._levels[row].add(Trace.bins(time, a, b, c, whole))
+            for row, level in enumerate(self._levels):
+                level.add(Trace(time, low[row], high[row], mean[row], gap, whole))
             self._next_time += bins * width
 
     def since(self, written: int, signal: str) -> Trace:
@@ -111,8 +114,7 @@ class Live:
         if signal not in self.signals:
             raise KeyError(signal)
         with self._lock:
-            found = self._levels[self.signals.index(signal)].since(written)
-        return replace(found, signal=signal)
+            return self._levels[self.signals.index(signal)].since(written)
 
     def levels(self, start: float, end: float) -> dict[str, float]:
         """Mean of each measured signal over [start, end) s, where there is any."""
