@@ -37,6 +37,17 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
 
+    def __post_init__(self) -> None:
+        """Refuse by TypeError what cannot be set in columns."""
+        _check_texts("headings", self.headings)
+        for row in self.rows:
+            _check_texts("rows", row)
+            if len(row) != len(self.headings):
+                raise TypeError(
+                    f"a table with {len(self.headings)} headings has the row {row!r}; "
+                    "give it as many cells"
+                )
+
     @property
     def text(self) -> str:
         """Aligned columns under headings, for a terminal; no trailing newline.
@@ -87,6 +98,14 @@ class Conclusion:
     tables: tuple[Table, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Refuse by TypeError what neither terminal nor page can show."""
+        _check_texts("sentences", self.sentences)
+        _check_texts("missing", self.missing)
+        for table in self.tables:
+            if not isinstance(table, Table):
+                raise TypeError(f"tables hold {table!r}; make it a Table")
+
     def __add__(self, other: Conclusion) -> Conclusion:
         """Both, one after the other."""
         return Conclusion(
@@ -115,6 +134,11 @@ class Conclusion:
                 table of them.
         """
         return {str(name): _plain(value) for name, value in self.values.items()}
+
+
+def _check_texts(what: str, found: Iterable[str]) -> None:
+    if isinstance(found, str) or not all(isinstance(one, str) for one in found):
+        raise TypeError(f"{what} must be a tuple of texts, not {found!r}")
 
 
 def _plain(value: Any) -> Any:

@@ -25,6 +25,25 @@ A message says what, value, unit, limit, and what to do.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+LONGEST = 300
+"""Characters of a foreign error's text that are told: a KeyError repeats its key."""
+
+
+def fault_in(file: str | Path, error: BaseException) -> str:
+    """Kind and text of an error, and where in a user's file it came from, if it did."""
+    import traceback
+    from pathlib import Path
+
+    told = f"{type(error).__name__}: {error}"
+    told = told if len(told) <= LONGEST else f"{told[:LONGEST]} ..."
+    frames = traceback.extract_tb(error.__traceback__)
+    line = next((f.lineno for f in reversed(frames) if f.filename == str(file)), None)
+    return told if line is None else f"{Path(file).name}, line {line}: {told}"
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import inspect
-import traceback
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -15,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 from pydantic.fields import FieldInfo
 
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.errors import ParameterError, TactileLabError
+from tactile_lab.errors import ParameterError, TactileLabError, fault_in
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
@@ -172,8 +170,4 @@ class Protocol(BaseModel):
         """
         if isinstance(error, TactileLabError) and not isinstance(error, ParameterError):
             return str(error)
-        told = f"{type(error).__name__}: {error}"
-        file = inspect.getfile(cls)
-        frames = traceback.extract_tb(error.__traceback__)
-        line = next((f.lineno for f in reversed(frames) if f.filename == file), None)
-        return told if line is None else f"{Path(file).name}, line {line}: {told}"
+        return fault_in(inspect.getfile(cls), error)

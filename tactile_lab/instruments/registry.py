@@ -9,7 +9,7 @@ file names (`driver = "my_scope.py"`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
@@ -27,7 +27,13 @@ from tactile_lab.bench import (
     ScopeCapability,
 )
 from tactile_lab.clock import Clock
-from tactile_lab.errors import LimitError, SceneError, nearest
+from tactile_lab.errors import (
+    LimitError,
+    SceneError,
+    TactileLabError,
+    fault_in,
+    nearest,
+)
 from tactile_lab.instruments.channels import check_channels
 from tactile_lab.plugins import module_from_file, plugged_in, registered
 
@@ -36,6 +42,9 @@ DRIVERS, FAR_ENDS = "tactile_lab.drivers", "tactile_lab.far_ends"
 
 BY_PERSON = "manual"
 """Instead of a field meter's driver: a person is asked what the meter shows."""
+
+MAKING = ("make", "simulated")
+"""What of a driver makes the instrument."""
 
 Instrument = TypeVar("Instrument", covariant=True)
 D = TypeVar("D", bound="Driver[Any]")
@@ -67,9 +76,16 @@ class Driver(Generic[Instrument]):
     """
 
     kind: ClassVar[str]
+    interface: ClassVar[type]
     make: Callable[[Any, Clock], Instrument]
     simulated: Callable[[Any, Any], Instrument] | None = None
     options: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse by TypeError what cannot be called."""
+        for name, value in vars(self).items():
+            if name != "options" and value is not None and not callable(value):
+                raise TypeError(f"{name} = {value!r} must be a function")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +98,7 @@ class CoilDriver(Driver[Coil]):
     """
 
     kind: ClassVar[str] = "coil"
+    interface: ClassVar[type] = Coil
     capability: Callable[[Any], CoilCapability]
 
 
@@ -96,6 +113,7 @@ class ScopeDriver(Driver[Scope]):
     """
 
     kind: ClassVar[str] = "scope"
+    interface: ClassVar[type] = Scope
     capability: Callable[[Any], ScopeCapability]
     check_rate: Callable[[float], None] | None = None
 
@@ -105,6 +123,7 @@ class FieldMeterDriver(Driver[FieldMeter]):
     """A driver of teslameters."""
 
     kind: ClassVar[str] = "field_meter"
+    interface: ClassVar[type] = FieldMeter
 
 
 def driver_names(kind: type[Driver[Any]]) -> tuple[str, ...]:
@@ -234,7 +253,48 @@ def _from_file(kind: type[D], path: Path) -> D:
             f"{path} must hold one {kind.__name__} (tactile_lab.instruments.registry) "
             f"for [{kind.kind}]; it holds {len(found)}."
         )
-    return found[0]
+    driver = found[0]
+    told: dict[str, Any] = {
+        name: _telling(path, one, driver.interface if name in MAKING else None)
+        for name, one in vars(driver).items()
+        if callable(one)
+    }
+    return replace(driver, **told)
+
+
+def _telling(
+    path: Path, function: Callable[..., Any], interface: type | None
+) -> Callable[..., Any]:
+    """A function of a user's file, whose mistakes are told with file and line.
+
+    Args:
+        path: of the file.
+        function: to be called.
+        interface: whose methods the instrument that it makes must have.
+    """
+
+    def telling(*given: Any) -> Any:
+        try:
+            made = function(*given)
+        except TactileLabError:
+            raise
+        except Exception as reason:  # whatever a user's driver raises
+            said = fault_in(path.resolve(), reason)
+            raise SceneError(f"Driver file {path} fails: {said}") from reason
+        if interface is not None:
+            _check_methods(path, made, interface)
+        return made
+
+    return telling
+
+
+def _check_methods(path: Path, made: Any, interface: type) -> None:
+    for name, method in vars(interface).items():
+        if callable(method) and name[0] != "_" and not hasattr(made, name):
+            raise SceneError(
+                f"Driver file {path}: {type(made).__name__} has no {name}(), which a "
+                f"{interface.__name__} needs (tactile_lab/bench.py)."
+            )
 
 
 @cache

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from tactile_lab.planning.heat import heat_along
 from tactile_lab.planning.outcome import ModelOutcome, Step, joined
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
-from tactile_lab.trial import Outcome, Trial
+from tactile_lab.trial import Outcome, Trial, Trials
 from tactile_lab.waveform import Waveform
 
 MOST_TRIALS = 10_000
@@ -79,18 +80,13 @@ def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
             cannot follow and the scene says ``coil.strict = true``.
     """
     driver = _Driver(scene, through_coil)
-    trials = scene.protocol.trials()
     name = f"protocol {scene.protocol.name}"
     try:
-        trial = next(trials, None)
-        while trial is not None:
-            outcome = driver.take(trial)
-            if len(driver.steps) >= MOST_TRIALS:
-                raise SceneError(f"{name} asks for more than {MOST_TRIALS} trials.")
-            try:
-                trial = trials.send(outcome)
-            except StopIteration:
-                trial = None
+        asked = scene.protocol.trials()
+        if not isinstance(asked, Generator):
+            raise TypeError(f"trials gave {type(asked).__name__}; yield Trials")
+        with closing(asked) as trials:
+            _play(trials, driver, name)
     except ParameterError as reason:
         raise SceneError(f"{name} cannot be played: {reason}") from reason
     except LimitError as reason:
@@ -99,11 +95,23 @@ def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
         raise
     except Exception as reason:
         raise SceneError(f"{name} fails: {scene.protocol.fault(reason)}") from reason
-    finally:
-        trials.close()
     if not driver.steps:
         raise SceneError(f"{name} asks for no trial.")
     return driver.timeline()
+
+
+def _play(trials: Trials, driver: _Driver, name: str) -> None:
+    trial = next(trials, None)
+    while trial is not None:
+        if not isinstance(trial, Trial):
+            raise TypeError(f"trials gave {type(trial).__name__}; yield a Trial")
+        outcome = driver.take(trial)
+        if len(driver.steps) >= MOST_TRIALS:
+            raise SceneError(f"{name} asks for more than {MOST_TRIALS} trials.")
+        try:
+            trial = trials.send(outcome)
+        except StopIteration:
+            return
 
 
 class _Driver:

@@ -75,6 +75,9 @@ def find(run: RunData) -> Findings:
     try:
         answers = tuple(run.protocol.plots(run))
         for plot in answers:
+            if not isinstance(plot, Plot):
+                kind = type(plot).__name__
+                raise TypeError(f"plots gave {kind}; yield a Plot")
             plot.to_dict()  # what cannot be described is not drawn either
     except Exception as error:  # whatever a user's protocol raises: the rest is kept
         missing.append(f"No plot of the answer: {run.protocol.fault(error)}")

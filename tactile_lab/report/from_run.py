@@ -64,7 +64,7 @@ def read(folder: Path) -> RunData:
             force_uncertainty=scene.bench.magnet.force_uncertainty,
             field_per_ampere=_field_per_ampere(scene),
             newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
-            traces=tuple(_trace(run, name) for name in run.signals),
+            traces=_traces(run),
             circuit=scene.circuit,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
@@ -141,6 +141,12 @@ def _clock_uncertainty(segments: Records, time: float) -> float | None:
     if number < 0 or not np.isfinite(segments["uncertainty"][number]):
         return None
     return float(segments["uncertainty"][number])
+
+
+def _traces(run: Run) -> tuple[RecordedSignal, ...]:
+    """What was recorded; a scope that was lost at once has left nothing of a signal."""
+    traces = (_trace(run, name) for name in run.signals)
+    return tuple(trace for trace in traces if trace.time.size)
 
 
 def _trace(run: Run, name: str) -> RecordedSignal:

@@ -24,12 +24,21 @@ from tactile_lab.bench import Channel
 from tactile_lab.cli import main
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.engine.bench import open_bench
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, NotFoundError, SceneError
 from tactile_lab.instruments.dialects import scope_dialect
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
+from tactile_lab.report.from_run import read
+from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
+
+SLOW = {
+    "record.sample_rate": 20e3,
+    "protocol.hold": 0.2,
+    "protocol.rest": 0.1,
+}
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "add-a-driver.md"
 
@@ -201,3 +210,39 @@ def test_files_the_page_names_exist() -> None:
         r"`((?:drivers|sim_backend|tests|tactile_lab)/[\w/.-]+)`", text
     ):
         assert (root / path).exists(), path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("def poll(", "def pull(", r"AcmeScope has no poll\(\)"),
+        (
+            "lambda table: CAN",
+            "CAN",
+            r"capability = .*function \(line \d+\)",
+        ),
+        ("lambda table: CAN", "lambda table: 1 / 0", r"line \d+: ZeroDivisionError"),
+        ("lambda table, world: Ac", "lambda table: Ac", "TypeError.*takes 1 pos"),
+    ],
+)
+def test_a_driver_that_is_not_finished_is_refused_in_words(
+    desk: Path, old: str, new: str, told: str
+) -> None:
+    file = desk / "my_scope.py"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(SceneError, match=rf"my_scope\.py.*{told}"):
+        Execution(load("v_c1_only", SLOW, "desk.toml"), desk / "runs").run()
+    assert not (desk / "runs").exists()
+
+
+def test_a_scope_that_is_lost_at_once_leaves_a_run_and_its_report(desk: Path) -> None:
+    file = desk / "my_scope.py"
+    text = file.read_text(encoding="utf-8")
+    lost = text.replace("codes = self._library.read()", "raise OSError('gone')  ", 1)
+    file.write_text(lost, encoding="utf-8")
+    done = Execution(load("v_c1_only", SLOW, "desk.toml"), desk / "runs").run()
+    assert done.off.verified and "gone" in done.reason
+    report = write(done.folder, read(done.folder))
+    assert report.png.exists() and "No trial" in " ".join(report.findings.missing)

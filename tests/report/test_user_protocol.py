@@ -1,6 +1,7 @@
 """A protocol file of the user's own concludes and draws, or says where it fails."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -128,6 +129,26 @@ def test_an_error_of_its_code_names_file_and_line_and_costs_nothing_else(
     assert report.png.exists() and says in report.html.read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("(said,", "(said[0],", r"line \d+: TypeError: sentences must be a tuple"),
+        ('(("1", f"{fall:.3f}"),)', "((1, 2),)", r"line \d+: TypeError: rows must"),
+        ('(("1", f"{fall:.3f}"),)', '(("1",),)', r"line \d+: TypeError: .*2 headings"),
+        ("tables=(table,)", "tables=(rows,)", r"line \d+: TypeError: tables hold"),
+        ("yield Plot(", "yield dict(", "TypeError: plots gave .*; yield a Plot"),
+    ],
+)
+def test_what_cannot_be_shown_is_told_and_costs_nothing_else(
+    made, tmp_path, old, new, says
+):
+    folder = kept(made, tmp_path, old, new)
+    said = CliRunner().invoke(cli, ["report", str(folder)])
+    assert said.exit_code == 0 and re.search(says, said.stderr)
+    found = json.loads((folder / "results.json").read_text())
+    assert bool(found["statements"]) != bool(found["plots"]), "the other one is kept"
+
+
 @pytest.mark.parametrize("when", ["first", "later"])
 def test_trials_that_raise_are_refused_with_file_and_line(tmp_path, when):
     bad = {"first": "        int('x')\n        pulse =", "later": "        pulse ="}[
@@ -141,6 +162,15 @@ def test_trials_that_raise_are_refused_with_file_and_line(tmp_path, when):
     with pytest.raises(SceneError, match=rf"own.py, line {line}: ValueError"):
         Execution(load(str(tmp_path / "own.py"), SLOW), tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("yield Trial(", "yield dict("), ("yield Trial(", "return dict(")]
+)
+def test_trials_that_yield_no_trial_are_refused(tmp_path, old, new):
+    (tmp_path / "own.py").write_text(OWN.replace(old, new))
+    with pytest.raises(SceneError, match=r"own fails: TypeError: trials gave .*yield"):
+        Execution(load(str(tmp_path / "own.py"), SLOW), tmp_path / "runs")
 
 
 def test_trials_that_raise_on_the_bench_keep_the_run(tmp_path):
