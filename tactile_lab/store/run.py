@@ -136,6 +136,12 @@ class Run:
         return () if group is None else tuple(group)
 
     @property
+    def checked(self) -> tuple[str, ...]:
+        """Names of the signals that have checksums or a pyramid."""
+        groups = (self._file.get(kind) for kind in ("checks", "pyramid"))
+        return tuple(sorted({name for group in groups for name in group or ()}))
+
+    @property
     def samples(self) -> int:
         """Samples per channel that all channels have, checksum included."""
         lengths = [self.stored(name) for name in self.signals]

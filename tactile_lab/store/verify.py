@@ -79,6 +79,8 @@ def verify(path: Path) -> Verification:
             findings.append(
                 Damage(INFO, "the run was cut short; `tactile-lab recover` it")
             )
+    if lost := info.get("samples_missing"):
+        notes.append(f"samples were lost while the run was recorded: {lost}")
     findings += _files(path, info)
     if not (path / DATA).exists():
         if info.get("samples"):
@@ -94,11 +96,13 @@ def verify(path: Path) -> Verification:
         try:
             findings += _length(run)
             findings += _tables(run)
+            findings += _missing(run)
             for name in run.signals:
                 findings += _channel(run, name)
             if not any(finding.where.startswith(DATA) for finding in findings):
                 findings += _counters(run)
                 certificate = certify(run)
+                findings += _certificate(run, certificate)
                 # the spikes of a cut-short run lag behind its samples
                 if certificate.differing and info["status"] != "running":
                     findings += _spikes(run)
@@ -134,6 +138,28 @@ def _tables(run: Run) -> Iterator[Damage]:
             run.records(name)
         except UNREADABLE as error:
             yield Damage(f"{DATA} /{name}", f"cannot be read ({_brief(error)})")
+
+
+def _missing(run: Run) -> Iterator[Damage]:
+    """Signals that `run.json` counts, or of which a part is there, but no samples."""
+    counted = run.info.get("samples") or {}
+    for name in sorted({*counted, *run.checked} - {*run.signals}):
+        written = (counted.get(name) or {}).get("written")
+        told = "" if written is None else f"; {INFO} counts {written}"
+        yield Damage(f"{DATA} /samples/{name}", f"the samples are missing{told}")
+
+
+def _certificate(run: Run, found: Certificate) -> Iterator[Damage]:
+    """What the certificate in `run.json` says that the data does not."""
+    stored, now = run.info.get("loss"), found.to_json()
+    if not stored or run.info.get("status") == "running":
+        return
+    for name in ("produced", "written", "gaps", "spikes_online", "spikes_offline"):
+        if name in stored and stored[name] != now[name]:
+            yield Damage(
+                f"{INFO} loss.{name}",
+                f"says {stored[name]}; counted again it is {now[name]}",
+            )
 
 
 def _channel(run: Run, name: str) -> Iterator[Damage]:

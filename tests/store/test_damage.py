@@ -52,6 +52,34 @@ def test_sound_run_has_nothing_lost(complete):
     assert (loss["samples"], loss["spikes"]) == (0, 0)
 
 
+@pytest.mark.parametrize("kinds", [["samples"], ["samples", "checks", "pyramid"]])
+def test_a_signal_whose_samples_are_gone_is_damage(complete, kinds):
+    """One flipped bit in a name is enough to lose it from the file's list."""
+    with h5py.File(complete / "data.h5", "r+") as file:
+        for kind in kinds:
+            del file[f"{kind}/V_C1"]
+    verdict = verify(complete)
+    (finding,) = verdict.findings
+    assert finding.where == "data.h5 /samples/V_C1"
+    assert "5000" in finding.what
+
+
+def test_a_group_of_samples_that_is_gone_is_damage(complete):
+    with h5py.File(complete / "data.h5", "r+") as file:
+        del file["samples"]
+    found = [finding.where for finding in verify(complete).findings]
+    assert found == ["data.h5 /samples/V_C1", "data.h5 /samples/V_K"]
+
+
+def test_a_certificate_that_the_data_does_not_bear_out_is_damage(complete):
+    info = json.loads((complete / "run.json").read_text())
+    info["loss"]["spikes_offline"] += 1
+    (complete / "run.json").write_text(json.dumps(info))
+    (finding,) = verify(complete).findings
+    assert finding.where == "run.json loss.spikes_offline"
+    assert "says 8; counted again it is 7" in finding.what
+
+
 @pytest.mark.parametrize("chunk", [0, 2, 4])
 @pytest.mark.parametrize("where", [0, 0.25, 0.5])
 def test_a_flipped_bit_is_located(complete, chunk, where):
