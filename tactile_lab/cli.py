@@ -118,6 +118,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except click.Abort:
         code = INTERRUPTED
     except BrokenPipeError:
-        sys.stderr.close()  # nobody reads on: no message, no traceback
-        code = 1
+        code = 1  # nobody reads on: no message, no traceback
+    terminal.let_go()
     sys.exit(code if isinstance(code, int) else 0)

@@ -34,7 +34,8 @@ class _Running:
         ring: memory the library writes into.
         count: of samples, against the clock.
         data_at: clock time of the newest samples, s.
-        failure: what the next poll raises, once all samples are taken.
+        failure: what the next poll raises, once all samples are taken, or the stop.
+        told: it was raised.
         asked: clock time of the last question for samples, s.
         drained: whether the library had no more to deliver then.
     """
@@ -44,6 +45,7 @@ class _Running:
     count: SampleCount
     data_at: float
     failure: BaseException | None = None
+    told: bool = False
     asked: float = 0.0
     drained: bool = False
 
@@ -189,9 +191,11 @@ class PicoScope(Opened):
         received = self._clock.now()
         taken = running.ring.take()
         if taken is None:
+            if running.failure is None:
+                running.failure = self._silence(running, received)
             if running.failure is not None:
+                running.told = True
                 raise running.failure
-            self._watch(running, received)
             running.count.poll(running.asked, 0)
             return None
         codes, overrange = taken
@@ -238,25 +242,26 @@ class PicoScope(Opened):
             code = status.NOT_RESPONDING
         return status.failure(code, doing)
 
-    def _watch(self, running: _Running, now: float) -> None:
+    def _silence(self, running: _Running, now: float) -> BaseException | None:
+        """What a silence means that has lasted too long."""
         silent = now - running.data_at
         if silent <= max(self._watchdog, 20 * running.stream.interval):
-            return
+            return None
         if self._unit.answers():
             text = "it answers a ping but sends no data; start again"
         else:
             text = "it does not answer: unplugged or without power; check its cable"
-        running.failure = LinkLostError(
+        return LinkLostError(
             f"{self.identity} has sent nothing for {silent:.3g} s: {text}."
         )
-        raise running.failure
 
     def stop(self) -> None:
         """Stop streaming; idempotent.
 
         Raises:
             SamplesLostError: samples are missing at the end of the stream.
-            TactileLabError: the scope is there but did not stop.
+            TactileLabError: the scope is there but did not stop, or what the last poll
+                found and no poll has raised.
         """
         running, self._running = self._running, None
         if running is None:
@@ -266,6 +271,8 @@ class PicoScope(Opened):
             if code not in (status.OK, *status.DEAD):
                 raise status.failure(code, "Stopping the scope")
             running.count.finish()
+        elif not running.told:
+            raise running.failure
 
     def settings(self) -> dict[str, str]:
         """Settings in force, for the run's record."""

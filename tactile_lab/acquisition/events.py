@@ -122,3 +122,28 @@ Emit = Callable[[Event], None]
 
 def ignore(event: Event) -> None:
     """Watch nothing."""
+
+
+def until_it_fails(emit: Emit, tell: Callable[[str], None] = lambda _: None) -> Emit:
+    """`emit` for as long as it works: a watcher that fails is dropped, never the run.
+
+    Args:
+        emit: a closed terminal, a window or a script with a bug.
+        tell: is told, once, what failed.
+    """
+    failed = False
+
+    def guarded(event: Event) -> None:
+        nonlocal failed
+        if failed:
+            return
+        try:
+            emit(event)
+        except Exception as failure:
+            failed = True
+            tell(
+                "What watched this run failed and is told nothing more: "
+                f"{type(failure).__name__}: {failure}."
+            )
+
+    return guarded

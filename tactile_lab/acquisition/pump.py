@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 from tactile_lab.acquisition import events
@@ -16,7 +17,12 @@ from tactile_lab.acquisition.search import REST, SpikeSearch
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
-from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
+from tactile_lab.errors import (
+    InstrumentError,
+    RecordingError,
+    RefusedError,
+    TactileLabError,
+)
 
 PULSE = 0.25
 """Longest time between two signs of life of the loop, s."""
@@ -153,8 +159,17 @@ class Pump:
             self._account.align(start, self._intake.reached, stream.uncertainty)
         self._end_intake(scope)
 
-    def last_words(self) -> None:
-        """Store what the instruments still delivered while they were closed."""
+    def last_words(self, known: BaseException | None) -> list[BaseException]:
+        """Store what the instruments still delivered while they were closed.
+
+        Args:
+            known: what ended the run, which is told elsewhere.
+
+        Returns:
+            What failed in closing and was not known; it has been told.
+        """
+        threads = self._instruments.threads
+        failures = [one.failure for one in threads if one.failure is not None]
         try:
             self._tell_changes()
             self._take_blocks()
@@ -162,7 +177,11 @@ class Pump:
             if self._instruments.scope is not None:
                 self._end_intake(self._instruments.scope)
         except TactileLabError as failure:
-            self._emit(events.Message("error", str(failure)))
+            failures.append(failure)
+        new = [one for one in failures if one is not known]
+        for one in new:
+            self._tell(one)
+        return new
 
     def _learn(self, search: SpikeSearch, scope: ScopeThread, stream: Stream) -> None:
         """Have the search learn from the first samples while they wait.
@@ -199,6 +218,13 @@ class Pump:
     def _end_intake(self, scope: ScopeThread) -> None:
         seen_until = self._account.axis(scope.polled_until)
         self._account.spikes(self._intake.end(seen_until))
+
+    def _tell(self, failure: BaseException) -> None:
+        """Say what failed as the run was closed, where that can be stored, too."""
+        text = f"As the run was closed: {failure}"
+        with suppress(RecordingError):
+            self._account.note("error", text)
+        self._emit(events.Message("error", text))
 
     def _tell_changes(self) -> None:
         """Say which settings are not as they were when the run began."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
@@ -25,7 +26,13 @@ from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Bench, Stream
-from tactile_lab.errors import InstrumentError, RefusedError, TactileLabError
+from tactile_lab.errors import (
+    InstrumentError,
+    RecordingError,
+    RefusedError,
+    SamplesLostError,
+    TactileLabError,
+)
 from tactile_lab.trial import Outcome, Trial
 
 BASELINE = 0.1
@@ -45,6 +52,10 @@ class Runner:
         stop: asks for the end.
         live: gets the newest samples.
         emit: is told what happens.
+
+    Attributes:
+        missing: what found that samples are missing from a stream without gaps; None
+            where nothing did.
     """
 
     def __init__(
@@ -60,6 +71,7 @@ class Runner:
         self._live = live
         self._program = program
         self._clock = bench.clock
+        emit = events.until_it_fails(emit, self._note_watcher)
         self._account = Account(bench.clock, journal, emit)
         self._stop = stop
         self._emit = emit
@@ -75,6 +87,7 @@ class Runner:
             self._lease,
             emit,
         )
+        self.missing: str | None = None
         self._place_probes = bench.place_probes
         self._probes = "circuit"
 
@@ -100,12 +113,17 @@ class Runner:
                 reason = self._program.fault(error)
             try:
                 self._account.state(events.RunState.STOPPING, "making the coil safe")
-            finally:  # whatever a watcher does
+            finally:  # whatever the record does
                 self._lease.end()
                 off = self.instruments.close()
-            self._pump.last_words()
-            self._account.state(state, reason or off.text)
-        return Ending(state, off, reason, failure, self._stop.signal)
+            ending = Ending(state, off, reason, failure, self._stop.signal)
+            try:
+                last = self._pump.last_words(failure)
+                self.missing = _missing(failure, *last)
+                self._account.state(state, reason or off.text)
+            except Exception as error:  # whatever it is, the coil's state is told
+                ending = ending.faulted_by(error)
+        return ending
 
     def _connect(self) -> None:
         self._account.state(events.RunState.CONNECTING, "opening instruments")
@@ -285,8 +303,19 @@ class Runner:
         coil.play(current.shifted(begin), end)
         return coil.skipped
 
+    def _note_watcher(self, text: str) -> None:
+        """Keep with the run that nobody watches it any more."""
+        with suppress(RecordingError):
+            self._account.note("warning", text)
+
     def _note_edges(self, start: float) -> None:
         """Let the trial that began at `start` s of run time tell where clocks lie."""
         if "coil_current" in self._live.signals and not self._record:
             end = self.intake.reached
             self._account.note_edges(self._live.between(start, end, "coil_current"))
+
+
+def _missing(*failures: BaseException | None) -> str | None:
+    """What the first of `failures` says that tells of missing samples."""
+    lost = (str(one) for one in failures if isinstance(one, SamplesLostError))
+    return next(lost, None)

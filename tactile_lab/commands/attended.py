@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -16,15 +17,32 @@ ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 E = TypeVar("E", bound="Ending")
 
 
+def _nothing() -> None:
+    return
+
+
+@contextmanager
+def interrupted() -> Iterator[None]:
+    """Within, each signal that ends a program raises KeyboardInterrupt."""
+    numbers = [getattr(signal, n) for n in ENDING if hasattr(signal, n)]
+    before = {n: signal.signal(n, signal.default_int_handler) for n in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def run_attended(
     task: Task[E],
-    meanwhile: Callable[[], None] = lambda: None,
+    meanwhile: Callable[[], None] = _nothing,
     acts: Mapping[str, Callable[[], None]] | None = None,
 ) -> E:
     """Run a task in a thread of its own while this one minds the signals.
 
     The first signal asks for a safe end, a second for one without ramp; no number of
-    them ends the program before the coil's state has been verified or given up.
+    them ends the program before the coil's state has been verified or given up. Where
+    `meanwhile` fails, because its terminal was closed, the task is ended as well.
 
     Args:
         task: about to run.
@@ -59,7 +77,11 @@ def run_attended(
                     acts[name]()
                 else:
                     task.stop(f"stopped by {name}", signal=number)
-            meanwhile()
+            try:
+                meanwhile()
+            except Exception as failure:
+                task.stop(f"stopped as nobody watches any more: {failure}")
+                meanwhile = _nothing
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.attended import run_attended
+from tactile_lab.commands.attended import interrupted, run_attended
 from tactile_lab.commands.options import (
     json_option,
     noted,
@@ -113,24 +115,32 @@ def command(
         for text in execution.plan.warnings:
             warn(text)
     narrator.expect(execution)
-    try:
-        done = run_attended(execution)
-    except Exception as error:
-        narrator.close()
-        off = execution.coil_state.off
-        fail(str(error), 3 if off is None or off.verified else 4)
-        return
-    narrator.close()
-    report = None if no_report else _report(done)
-    changed = None if again is None else _differences(again, done)
-    if as_json:
-        print_json(answer(done, report, changed))
-    else:
-        _print(done, report, time.monotonic() - began)
-        if changed is not None:
-            say(f"against {again}\n{changed}")
-    if done.exit_code:
-        fail(_why(done), done.exit_code)
+    with interrupted():
+        try:
+            done = run_attended(execution)
+        except Exception as error:
+            with suppress(OSError):
+                narrator.close()
+            fail(str(error), 3 if execution.coil_left_safe else 4)
+            return
+        try:
+            narrator.close()
+            if done.exit_code:
+                say(f"tactile-lab: {_why(done)}", sys.stderr)
+            report = None if no_report else _report(done)
+            changed = None if again is None else _differences(again, done)
+            if as_json:
+                print_json(answer(done, report, changed))
+            else:
+                _print(done, report, time.monotonic() - began)
+                if changed is not None:
+                    say(f"against {again}\n{changed}")
+        except (Exception, KeyboardInterrupt) as failure:
+            _unreported(done, failure)
+    # how the run ended, whatever became of telling it
+    if not done.off.verified:
+        fail(done.off.text, done.exit_code)
+    raise click.exceptions.Exit(done.exit_code)
 
 
 def record(bench: Bench, folder: Path) -> None:
@@ -298,6 +308,15 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
         say(f"figure  {report.png}")
         say(f"report  {report.html}")
     say(f"run     {done.folder}")
+
+
+def _unreported(done: Executed, failure: BaseException) -> None:
+    """Say that the run could not be told of to the end, if that can be said."""
+    text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
+    warn(
+        f"the report was cut short ({text}). The run is kept in {done.folder}; "
+        f"`tactile-lab report {done.folder}` writes it again."
+    )
 
 
 def _why(done: Executed) -> str:

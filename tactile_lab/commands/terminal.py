@@ -10,7 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
@@ -59,13 +59,15 @@ def _coloured(text: str) -> Text:
 
 
 def warn(message: str) -> None:
-    """Write a warning to stderr."""
-    say(f"warning: {message}", sys.stderr)
+    """Write a warning to stderr, if anybody is there to read it."""
+    with suppress(OSError):
+        say(f"warning: {message}", sys.stderr)
 
 
 def fail(message: str, code: int) -> None:
-    """Write `message` to stderr and exit with `code`."""
-    say(f"tactile-lab: {message}", sys.stderr)
+    """Write `message` to stderr, if anybody is there to read it; exit with `code`."""
+    with suppress(OSError):
+        say(f"tactile-lab: {message}", sys.stderr)
     raise click.exceptions.Exit(code)
 
 
@@ -80,6 +82,19 @@ def refusing() -> Iterator[None]:
         yield
     except TactileLabError as error:
         fail(str(error), REFUSED)
+
+
+def let_go() -> None:
+    """Where nobody reads on, have what still waits to be written go nowhere.
+
+    Else Python's own exit fails to write it and changes the exit code.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def print_json(data: Mapping[str, Any]) -> None:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
 from tactile_lab.commands.terminal import print_json, refusing, say, working
+
+if TYPE_CHECKING:
+    from tactile_lab.store.verify import Verification
 
 DAMAGED = 1
 
@@ -49,6 +53,15 @@ def command(run: Path, as_json: bool) -> None:
             say(f"note        {note}")
         if proof is not None:
             say(str(proof))
-        say("sound" if verdict.sound else f"{len(verdict.findings)} findings")
+        say(_result(verdict))
     if not verdict.sound:
         raise click.exceptions.Exit(DAMAGED)
+
+
+def _result(verdict: Verification) -> str:
+    """The last line: what it comes to."""
+    if not verdict.sound:
+        return f"{len(verdict.findings)} findings"
+    if verdict.certificate is not None and verdict.certificate.missing:
+        return "as it was written, but samples are missing"
+    return "sound"

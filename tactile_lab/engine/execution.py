@@ -105,6 +105,12 @@ class Execution(Task[Executed]):
         coil = self._runner.instruments.coil if self._runner else None
         return CoilState() if coil is None else coil.state
 
+    @property
+    def coil_left_safe(self) -> bool:
+        """Whether the coil was verified off, or was never reached for."""
+        coil = self._runner.instruments.coil if self._runner else None
+        return coil is None or (coil.off is not None and coil.off.verified)
+
     def note(self, text: str, at: float) -> None:
         """Put a note of the user, at `at` s of run time, into the run's log."""
         self.folder.log("note", text, time_s=at)
@@ -171,6 +177,7 @@ class Execution(Task[Executed]):
             "instruments_changed": instruments.changes,
             "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
             "overrange": sorted(runner.intake.overrange),
+            "samples_missing": runner.missing,
         }
         if ending.failure and not isinstance(ending.failure, TactileLabError):
             told = "".join(traceback.format_exception(ending.failure))
@@ -179,7 +186,9 @@ class Execution(Task[Executed]):
             self.folder.finish(status, **entries)
             return None
         try:
-            self._recorder.close(status, runner.intake.produced, **entries)
+            # where samples are missing, how many the scope took is not known
+            produced = None if runner.missing else runner.intake.produced
+            self._recorder.close(status, produced, **entries)
         finally:
             proof = write_certificate(self.folder.path)
         return proof

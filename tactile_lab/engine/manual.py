@@ -56,7 +56,7 @@ class ManualControl(Task[Ending]):
         emit: events.Emit = events.ignore,
     ) -> None:
         used = bench or open_bench(scene, needs(scene), realtime=realtime)
-        super().__init__(scene, used, emit)
+        super().__init__(scene, used, events.until_it_fails(emit))
         if self.bench.coil is None:
             raise SceneError("This bench has no coil source to drive by hand.")
         self._lease = Lease(

@@ -26,7 +26,7 @@ class Certificate:
     Attributes:
         produced: samples the scope delivered, all channels, and where it streams
             without gaps those known to be missing; None where the run was cut short
-            before it could say.
+            before it could say, or samples are missing and nobody knows how many.
         written: samples stored, all channels.
         gaps: samples per channel known to be missing.
         covered: time that has samples, s; None for a scope that streams without gaps.
@@ -35,6 +35,7 @@ class Certificate:
         offline: spikes found again in the stored samples; None where the channel was
             not stored.
         differing: spikes that only one of the two searches found; None likewise.
+        missing: samples are missing, as the run found out, and how many is not known.
     """
 
     produced: int | None
@@ -45,6 +46,7 @@ class Certificate:
     differing: int | None
     covered: float | None = None
     streamed: float | None = None
+    missing: bool = False
 
     @property
     def samples(self) -> int | None:
@@ -60,10 +62,12 @@ class Certificate:
     def clean(self) -> bool:
         """Nothing is known to be lost."""
         lost = self.gaps if self.covered is None else 0
-        return not self.samples and not lost and not self.spikes
+        return not (self.missing or self.samples or lost or self.spikes)
 
     def __str__(self) -> str:
-        if self.produced is None:
+        if self.missing:
+            samples = f"samples are missing, not known how many ({self.written} stored)"
+        elif self.produced is None:
             samples = f"not known of {self.written} samples (the run was cut short)"
         else:
             samples = f"{self.samples} of {self.produced} samples"
@@ -119,6 +123,7 @@ def certify(run: Run) -> Certificate:
         online=online.size,
         offline=None if offline is None else offline.size,
         differing=None if offline is None else unmatched(online, offline).size,
+        missing=bool(run.info.get("samples_missing")),
     )
 
 

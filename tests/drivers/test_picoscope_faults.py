@@ -379,3 +379,18 @@ def test_a_model_with_two_inputs() -> None:
         rig.scope.start(FOUR, 1e-5)
     rig.scope.start(FOUR[:2], 1e-5)
     rig.scope.close()
+
+
+def test_what_the_last_poll_found_is_raised_by_the_stop_and_only_once() -> None:
+    rig = Rig()
+    with rig.clock.taking_part("scope"):
+        rig.scope.open()
+        rig.scope.start(FOUR, 1e-5)
+        for lost in (0, 0, 0, 700):
+            rig.clock.sleep_until(rig.clock.now() + 0.02)
+            rig.library.device.drop(lost)
+            assert rig.scope.poll() is not None
+        with pytest.raises(SamplesLostError, match="about 700 too few"):
+            rig.scope.stop()
+        rig.scope.stop()
+        rig.scope.close()

@@ -6,14 +6,18 @@ from pathlib import Path
 
 import pytest
 
+from drivers.picoscope.scope import PicoScope
 from sim_backend.bench import open_bench
 from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
+from tactile_lab.bench import Block
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
+from tactile_lab.store.verify import verify
 
 OVERRIDES = (
     'protocol.levels=["200 mN"]',
@@ -73,7 +77,43 @@ def test_faults_while_streaming(tmp_path: Path, fault: Fault, reason: str) -> No
     assert reason in (ending.reason or ""), ending.reason
     # all but what the scope had not handed over yet
     assert samples >= 100_000
-    assert done.loss["samples"] == 0
+    # where samples are missing, nobody knows how many, and nobody says none
+    lost = fault.kind in ("gap", "stall", "stream_fails")
+    assert done.loss["samples"] == (None if lost else 0)
+    verdict = verify(done.folder)
+    assert verdict.sound and verdict.certificate.clean is not lost
+    assert ("samples are missing" in str(verdict.certificate)) is lost
+
+
+def test_a_loss_that_only_the_last_poll_finds_is_told(tmp_path: Path) -> None:
+    sound, library = run_slowly(tmp_path / "sound")
+    assert sound.exit_code == 0
+    polls = library.device.schedule.calls["GetStreamingLatestValues"]
+    last = Fault(kind="gap", call="GetStreamingLatestValues", nth=polls, samples=700)
+    done, _ = run_slowly(tmp_path / "lossy", last)
+    assert done.off.verified
+    assert done.state is RunState.FAULTED
+    assert "Samples are missing" in (done.reason or "")
+    assert done.loss["samples"] is None
+    verdict = verify(done.folder)
+    assert "Samples are missing" in verdict.notes[0]
+    assert "not known how many" in str(verdict.certificate)
+
+
+def run_slowly(folder: Path, *faults: Fault) -> tuple[Executed, FakePs3000a]:
+    """A run whose polls take 5 ms, so that the last, too, brings samples."""
+    scene = load("demo", OVERRIDES)
+    bench = open_bench(scene, needs(scene), scope_faults=faults)
+    assert isinstance(bench.scope, PicoScope)
+    poll, library = bench.scope.poll, bench.scope._unit._library
+    assert isinstance(library, FakePs3000a)
+
+    def slow_poll() -> Block | None:
+        bench.clock.sleep_until(bench.clock.now() + 0.005)
+        return poll()
+
+    bench.scope.poll = slow_poll  # type: ignore[method-assign]
+    return Execution(scene, folder, bench=bench).run(), library
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,61 @@
+"""How a run ended is told at once and by the exit code, whatever comes after it."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+SHORT = [
+    "--set", 'protocol.levels=["200 mN"]',
+    "--set", "protocol.hold=0.2 s",
+    "--set", "protocol.rest=0.1 s",
+]  # fmt: skip
+GONE = ["--set", 'simulated.coil_unplugged="0.8 s"']
+"""The source is unplugged for good: nobody can verify that it is off."""
+
+AFTERWARDS = [
+    ValueError("a report with a bug"),
+    MemoryError(),
+    KeyboardInterrupt(),
+    BrokenPipeError(32, "Broken pipe"),
+]
+
+
+@pytest.mark.parametrize("failure", AFTERWARDS, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize(("lost", "code"), [([], 0), (GONE, 4)], ids=["off", "unknown"])
+def test_nothing_in_the_report_changes_how_the_run_ended(
+    tactile_lab, tmp_path, monkeypatch, failure, lost, code
+):
+    def fails(*_):
+        raise failure
+
+    monkeypatch.setattr("tactile_lab.report.write.write", fails)
+    done = tactile_lab("run", *SHORT, *lost, "--out", tmp_path)
+    assert done.code == code
+    (run,) = tmp_path.iterdir()
+    assert str(run) in done.err + done.out
+    info = json.loads((run / "run.json").read_text())
+    assert info["coil_verified_off"] is (code == 0)
+    if code == 4:
+        # told before the report is begun, and last of all
+        warned = done.err.index("warning: the report")
+        first = done.err.index("OUTPUT STATE UNKNOWN")
+        assert first < warned < done.err.rindex("OUTPUT STATE UNKNOWN")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes are POSIX's")
+@pytest.mark.parametrize("closed", ["stdout", "stderr", "both"])
+def test_a_terminal_that_was_closed_does_not_end_the_run(tmp_path, closed):
+    read, write = os.pipe()
+    os.close(read)
+    ends = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    ends |= {name: write for name in ends if closed in (name, "both")}
+    command = [sys.executable, "-m", "tactile_lab", "run", *SHORT, "--out", tmp_path]
+    done = subprocess.run(command, **ends, check=False)
+    os.close(write)
+    assert done.returncode == 0
+    (run,) = tmp_path.iterdir()
+    info = json.loads((run / "run.json").read_text())
+    assert info["status"] == "complete" and info["coil_verified_off"] is True
