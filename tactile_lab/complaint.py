@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from tactile_lab.errors import SceneError, nearest
+from tactile_lab.errors import SceneError, choices, nearest
 from tactile_lab.table import adapter, fields_of
 
 M = TypeVar("M")
@@ -119,13 +119,10 @@ def _line(error: Any, kind: Any, at: tuple[str, ...], blame: Blame) -> str:
     origin = blame(tuple(str(part) for part in full))
     if error["type"] in _UNKNOWN:
         known = known_keys(kind, loc[:-1])
-        hint = nearest(str(loc[-1]), known)
         where = place(full[:-1], table=True)
         what = "table" if isinstance(error["input"], dict) else "key"
-        return (
-            f'{origin}: {where} has no {what} "{loc[-1]}"; {hint + " " if hint else ""}'
-            f"Known: {', '.join(known)}."
-        )
+        told = choices(str(loc[-1]), known)
+        return f'{origin}: {where} has no {what} "{loc[-1]}"; {told}'
     if not loc:  # a check of the whole table
         return f"{origin}: {place(full, table=True)}: {_sentence(reason(error))}"
     if error["type"] == "missing":
@@ -149,10 +146,8 @@ def reason(error: Any) -> str:
         return str(error["ctx"]["error"]).rstrip(".")
     if kind == "literal_error":
         expected = str(error["ctx"]["expected"]).replace("'", '"')
-        choices = [
-            part.strip('" ') for part in expected.replace(" or ", ", ").split(",")
-        ]
-        hint = nearest(str(error["input"]), [c for c in choices if c])
+        words = [part.strip('" ') for part in expected.replace(" or ", ",").split(",")]
+        hint = nearest(str(error["input"]), filter(None, words))
         return f"{expected} is needed" + (f"; {hint}" if hint else "")
     if kind in _BOUNDS:
         sign, key = _BOUNDS[kind]

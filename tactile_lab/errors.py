@@ -55,6 +55,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f'did you mean "{folded[near[0]]}"?' if near else ""
 
 
+def choices(word: str, known: Iterable[str], called: str = "Known") -> str:
+    """The nearest of what is known, and all of it, such as ``Known: a, b.``."""
+    names = list(known)
+    hint = nearest(word, names)
+    return f"{hint}{' ' if hint else ''}{called}: {', '.join(names) or 'none'}."
+
+
 class TactileLabError(Exception):
     """Root of every error this program raises on purpose."""
 

@@ -16,7 +16,7 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_lab.errors import SceneError, nearest
+from tactile_lab.errors import SceneError, choices
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -109,11 +109,9 @@ def protocol_class(name: str) -> type[Protocol]:
     """
     known = _protocols()
     if name not in known:
-        hint = nearest(name, known)
         raise SceneError(
-            f'protocol "{name}" does not exist; {hint + " " if hint else ""}'
-            f"Known: {', '.join(sorted(known))}. A protocol of your own is named by "
-            'source = "path/to/file.py".'
+            f'protocol "{name}" does not exist; {choices(name, sorted(known))} A '
+            'protocol of your own is named by source = "path/to/file.py".'
         )
     return _only_protocol(importlib.import_module(known[name]), name)
 

@@ -89,6 +89,21 @@ class Waveform:
             points.append((fall + ramp + rest, 0.0))
         return cls.through(points)
 
+    @classmethod
+    def tidied(cls, time: FloatArray, value: FloatArray) -> Waveform:
+        """Without points equal to the one before, or between two of the same instant.
+
+        Args:
+            time: s, non-decreasing.
+            value: at those times.
+        """
+        keep = np.ones(time.size, dtype=bool)
+        keep[1:] = (np.diff(time) != 0) | (np.diff(value) != 0)
+        time, value = time[keep], value[keep]
+        keep = np.ones(time.size, dtype=bool)
+        keep[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
+        return cls(time[keep], value[keep])
+
     @property
     def start(self) -> float:
         """Time of the first point, s."""
@@ -151,7 +166,7 @@ class Waveform:
         moved = other.shifted(self.end)
         time = np.concatenate([self.time, moved.time])
         value = np.concatenate([self.value, moved.value])
-        return Waveform(*_without_repeats(time, value))
+        return Waveform.tidied(time, value)
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -162,15 +177,3 @@ class Waveform:
 
     def __hash__(self) -> int:
         return hash((self.time.tobytes(), self.value.tobytes()))
-
-
-def _without_repeats(
-    time: FloatArray, value: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Drop points equal to the one before, and the middle of three at one instant."""
-    keep = np.ones(time.size, dtype=bool)
-    keep[1:] = (np.diff(time) != 0) | (np.diff(value) != 0)
-    time, value = time[keep], value[keep]
-    keep = np.ones(time.size, dtype=bool)
-    keep[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
-    return time[keep], value[keep]

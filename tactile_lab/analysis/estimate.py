@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from tactile_lab.quantity import printed
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    FloatArray = NDArray[np.float64]
 
 _Z95 = 1.959963984540054
 
@@ -55,6 +62,45 @@ class Estimate:
             "low_95": self.low,
             "high_95": self.high,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """The straight line of least squares through points.
+
+    Attributes:
+        slope: with what the scatter about the line leaves open.
+        centre: (mean of x, mean of y), through which it goes.
+        offset: y at x = 0, likewise.
+        scatter: standard deviation of y about the line.
+        spread: sum of squares of x about its mean.
+    """
+
+    slope: Estimate
+    centre: tuple[float, float]
+    offset: Estimate
+    scatter: float
+    spread: float
+
+    @classmethod
+    def through(cls, x: FloatArray, y: FloatArray) -> Line:
+        """The line through points of shape (n,), n above 2, of which two x differ."""
+        import numpy as np
+
+        middle, mean, freedom = float(x.mean()), float(y.mean()), x.size - 2
+        apart = x - middle
+        spread = float(np.sum(apart**2))
+        slope = float(np.sum(apart * y) / spread)
+        left = y - mean - slope * apart
+        scatter = math.sqrt(float(np.sum(left**2)) / freedom)
+        error = scatter * math.sqrt(1 / x.size + middle**2 / spread)
+        return cls(
+            Estimate.of(slope, scatter / math.sqrt(spread), freedom),
+            (middle, mean),
+            Estimate.of(mean - slope * middle, error, freedom),
+            scatter,
+            spread,
+        )
 
 
 def _plain(value: float) -> str:

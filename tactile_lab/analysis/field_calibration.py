@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.calibration import COIL, HASH, UNCERTAINTY, VALID_UNTIL, table_hash
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.quantity import show
@@ -104,14 +104,9 @@ def fit_field(
     upper = np.interp(current, *falling)
     lower = np.interp(current, *rising)
     field = (upper + lower) / 2
-    freedom = current.size - 2
-    centre = current.mean()
-    spread = np.sum((current - centre) ** 2)
-    slope = float(np.sum((current - centre) * field) / spread)
-    line = field.mean() + slope * (current - centre)
-    residual = float(np.sqrt(np.sum((field - line) ** 2) / freedom))
-    at_zero = field.mean() - slope * centre
-    if slope == 0 or abs(slope) * (high - low) < 4 * residual:
+    line = Line.through(current, field)
+    slope = line.slope.value
+    if slope == 0 or abs(slope) * (high - low) < 4 * line.scatter:
         raise NotIdentifiableError("the field does not follow the current")
     half_width = abs(float(np.interp(0.0, current, (upper - lower) / 2)))
     noise = float(np.sqrt(np.mean([step.error**2 for step in steps])))
@@ -143,11 +138,9 @@ def fit_field(
         field=field,
         half_width=half_width,
         half_width_current=half_width / abs(slope),
-        slope=Estimate.of(slope, residual / np.sqrt(spread), freedom),
-        offset=Estimate.of(
-            at_zero, residual * np.sqrt(1 / current.size + centre**2 / spread), freedom
-        ),
-        residual=residual,
+        slope=line.slope,
+        offset=line.offset,
+        residual=line.scatter,
         drift=drift,
         warming=warming,
         uncertainty=math.hypot(2 * noise, half_width, drift or 0.0),

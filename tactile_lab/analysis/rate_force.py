@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
@@ -79,16 +79,12 @@ def mean_slope(
             f"{fired or 'no'} force{'s' * (fired > 1)} made it fire, 3 are needed for "
             "a slope"
         )
-    apart = force - force.mean()
-    spread, freedom = float(np.sum(apart**2)), force.size - 2
-    slope = float(np.sum(apart * rate) / spread)
-    left = rate - rate.mean() - slope * apart
-    error = float(np.sqrt(np.sum(left**2) / freedom / spread))
-    found = Estimate.of(slope, error, freedom)
+    line = Line.through(force, rate)
     if uncertainty is None:
-        return found
-    single = abs(slope) * uncertainty.absolute / math.sqrt(spread)
-    return found.widened(single, abs(slope) * uncertainty.relative)
+        return line.slope
+    steep = abs(line.slope.value)
+    single = steep * uncertainty.absolute / math.sqrt(line.spread)
+    return line.slope.widened(single, steep * uncertainty.relative)
 
 
 def onset(forces: Sequence[float], spikes: Sequence[int]) -> Onset:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 
 FloatArray = NDArray[np.float64]
@@ -91,30 +91,21 @@ def fit_transfer(
         raise NotIdentifiableError(
             f"{x.size} points lie in the subthreshold regime, {FEWEST} are needed"
         )
-    centre = x.mean()
-    spread = np.sum((x - centre) ** 2)
-    slope = float(np.sum((x - centre) * y) / spread) if spread > 0 else 0.0
-    if slope <= 0:
+    line = Line.through(x, y) if np.ptp(x) > 0 else None
+    if line is None or line.slope.value <= 0:
         raise NotIdentifiableError("I_DS does not rise with V_GS")
-    at_centre = float(y.mean())
-    residual = y - at_centre - slope * (x - centre)
-    freedom = x.size - 2
-    scatter = float(np.sqrt(np.sum(residual**2) / freedom))
-    slope_error = scatter / math.sqrt(spread)
-    intercept_error = scatter * math.sqrt(1 / x.size + centre**2 / spread)
-    log_I_S = Estimate.of(at_centre - slope * centre, intercept_error, freedom)
-    steep = Estimate.of(slope, slope_error, freedom)
+    log_I_S, steep = line.offset, line.slope
     I_S = math.exp(log_I_S.value)
     return Transfer(
         I_S=Estimate(
-            I_S, I_S * intercept_error, math.exp(log_I_S.low), math.exp(log_I_S.high)
+            I_S, I_S * log_I_S.error, math.exp(log_I_S.low), math.exp(log_I_S.high)
         ),
         m=_reciprocal(steep, 1 / V_T),
         swing=_reciprocal(steep, math.log(10)),
         V_T=V_T,
         points=int(x.size),
         range=(float(x.min()), float(x.max())),
-        scatter=scatter,
+        scatter=line.scatter,
     )
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from tactile_lab.complaint import validated
-from tactile_lab.errors import SceneError, nearest
+from tactile_lab.errors import SceneError, choices
 from tactile_lab.instruments.scope_dialect import ScopeDialect
 from tactile_lab.instruments.serial_dialect import CoilDialect, Dialect, MeterDialect
 
@@ -62,10 +62,9 @@ def load_dialect(name: str) -> Dialect:
             raise SceneError(f"Dialect {name} cannot be read: {reason}") from reason
     known = dialect_ids()
     if name not in known:
-        hint = nearest(name, known)
         raise SceneError(
-            f'There is no dialect "{name}"; {hint + " " if hint else ""}'
-            f"Known: {', '.join(known)}. A path ending in .toml names one of your own."
+            f'There is no dialect "{name}"; {choices(name, known)} A path ending in '
+            ".toml names one of your own."
         )
     return _shipped(name)
 

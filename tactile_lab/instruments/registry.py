@@ -31,8 +31,8 @@ from tactile_lab.errors import (
     LimitError,
     SceneError,
     TactileLabError,
+    choices,
     fault_in,
-    nearest,
 )
 from tactile_lab.instruments.channels import check_channels
 from tactile_lab.plugins import module_from_file, plugged_in, registered
@@ -149,11 +149,9 @@ def find_driver(kind: type[D], table: InstrumentTable) -> D:
         raise SceneError(f'driver "{name}" is registered as no {kind.__name__}.')
     for key in table.options:
         if key not in driver.options:
-            hint = nearest(key, driver.options)
-            known = ", ".join(driver.options) or "none"
             raise SceneError(
                 f'[{kind.kind}.options] has no key "{key}" for driver "{name}"; '
-                f"{hint + ' ' if hint else ''}Known: {known}."
+                + choices(key, driver.options)
             )
     return driver
 
@@ -228,11 +226,10 @@ def _check_name(kind: type[Driver[Any]], others: Iterable[str], name: str) -> st
     known = (*driver_names(kind), *others)
     if name in known or name.endswith(".py"):
         return name
-    hint = nearest(name, known)
     what = kind.kind.replace("_", " ")
     raise SceneError(
-        f'there is no {what} driver "{name}"; {hint + " " if hint else ""}'
-        f"Known: {', '.join(known)}. A path ending in .py names one of your own."
+        f'there is no {what} driver "{name}"; {choices(name, known)} A path ending in '
+        ".py names one of your own."
     )
 
 

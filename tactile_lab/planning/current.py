@@ -178,11 +178,7 @@ def _on_grid(wave: Waveform, interval: float) -> tuple[Waveform, float]:
     ]
     time = np.concatenate([wave.time[~inside], grid])
     order = np.argsort(time, kind="stable")
-    value = np.concatenate([wave.value[~inside], wave.at(grid)])[order]
-    time = time[order]
-    keep = np.ones(time.size, dtype=bool)
-    keep[1:] = (np.diff(time) > 0) | (np.diff(value) != 0)
-    keep[1:-1] &= (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
-    sampled = Waveform(time[keep], value[keep])
+    value = np.concatenate([wave.value[~inside], wave.at(grid)])
+    sampled = Waveform.tidied(time[order], value[order])
     missed = np.abs(sampled.at(wave.time[inside]) - wave.value[inside])
     return sampled, float(missed.max())

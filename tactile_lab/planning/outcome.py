@@ -116,10 +116,5 @@ def joined(waves: Sequence[tuple[float, Waveform]]) -> Waveform:
     """Waveforms one after another, each put at its start."""
     time = np.concatenate([wave.time + start for start, wave in waves])
     value = np.concatenate([wave.value for _, wave in waves])
-    time = np.maximum.accumulate(time)  # the sum of lengths may round
-    keep = np.ones(time.size, dtype=bool)
-    keep[1:] = (np.diff(time) != 0) | (np.diff(value) != 0)
-    time, value = time[keep], value[keep]
-    keep = np.ones(time.size, dtype=bool)
-    keep[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
-    return Waveform(time[keep], value[keep])
+    # the sum of lengths may round
+    return Waveform.tidied(np.maximum.accumulate(time), value)

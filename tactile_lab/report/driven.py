@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.quantity import show
 from tactile_lab.store.applied import BEFORE, VISIBLE, AppliedCurrent, Shunt
 from tactile_lab.store.run import Run
@@ -50,12 +50,6 @@ def shunt_over_source(applied: AppliedCurrent, shunt: Shunt) -> Estimate | None:
     if len(seen) < 3:
         return None
     source, mean = np.array(seen).T
-    apart = source - source.mean()
-    spread = float(np.sum(apart**2))
-    if spread < VISIBLE**2:
+    if np.sum((source - source.mean()) ** 2) < VISIBLE**2:
         return None
-    slope = float(np.sum(apart * mean) / spread)
-    left = mean - mean.mean() - slope * apart
-    freedom = source.size - 2
-    error = float(np.sqrt(np.sum(left**2) / freedom / spread))
-    return Estimate.of(slope, error, freedom)
+    return Line.through(source, mean).slope

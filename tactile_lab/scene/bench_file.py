@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, ValidationInfo
 from typing_extensions import TypedDict
 
 from tactile_lab.bench import Channel, CoilLimits
-from tactile_lab.errors import nearest
+from tactile_lab.errors import choices
 from tactile_lab.instruments.registry import (
     BY_PERSON,
     CoilDriverName,
@@ -69,11 +69,8 @@ class CoilSpec(Table):
 def _wired(channel: Channel) -> Channel:
     """A channel as a file may have it: what is wired is known, and so is its scale."""
     if channel.signal not in WIRED:
-        hint = nearest(channel.signal, WIRED)
-        raise ValueError(
-            f'no scope channel can carry "{channel.signal}"; '
-            f"{hint + ' ' if hint else ''}Known: {', '.join(WIRED)}."
-        )
+        known = choices(channel.signal, WIRED)
+        raise ValueError(f'no scope channel can carry "{channel.signal}"; {known}')
     if not channel.input:
         raise ValueError('input is empty; name one of the scope, such as "A"')
     if channel.signal == "field":

@@ -12,7 +12,7 @@ from typing import Any
 
 from tactile_lab.columns import read_text
 from tactile_lab.complaint import Blame, complaint, validated, written
-from tactile_lab.errors import SceneError, nearest
+from tactile_lab.errors import SceneError, choices, nearest
 from tactile_lab.plugins import (
     protocol_class,
     protocol_from_file,
@@ -88,11 +88,10 @@ def resolve(
     blame = _blame(str(path), origins or {})
     for name, table in data.items():
         if name not in TABLES:
-            hint = nearest(name, TABLES)
             what = f"table [{name}]" if isinstance(table, dict) else f'key "{name}"'
             raise SceneError(
-                f"{blame((name,))}: a scene has no {what}; {hint + ' ' if hint else ''}"
-                f"Tables: {', '.join(TABLES)}."
+                f"{blame((name,))}: a scene has no {what}; "
+                f"{choices(name, TABLES, 'Tables')}"
             )
         if not isinstance(table, dict):
             raise complaint((name,), "this must be a table, not a value.", blame)

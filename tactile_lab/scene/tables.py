@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationInfo
 
-from tactile_lab.errors import nearest
+from tactile_lab.errors import choices
 from tactile_lab.quantity import (
     Current,
     Duration,
@@ -53,11 +53,8 @@ Hysteresis = Annotated[float | Literal["auto"], OrAuto("V", least=0.0)]
 def _signals(names: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
         if name not in SIGNALS:
-            hint = nearest(name, SIGNALS)
-            raise ValueError(
-                f'signal "{name}" does not exist; {hint + " " if hint else ""}'
-                f"Known: {', '.join(SIGNALS)}."
-            )
+            known = choices(name, SIGNALS)
+            raise ValueError(f'signal "{name}" does not exist; {known}')
     return tuple(dict.fromkeys(names))
 
 
@@ -165,11 +162,8 @@ Names = TypeVar("Names", bound=Iterable[str])
 def _scope_signals(names: Names) -> Names:
     for name in names:
         if name not in NOISE:
-            hint = nearest(name, NOISE)
-            raise ValueError(
-                f'"{name}" is no scope signal; {hint + " " if hint else ""}'
-                f"Known: {', '.join(NOISE)}."
-            )
+            known = choices(name, NOISE)
+            raise ValueError(f'"{name}" is no scope signal; {known}')
     return names
 
 

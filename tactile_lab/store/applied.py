@@ -98,10 +98,9 @@ def held(steps: FloatArray, end: float) -> Waveform:
         steps = np.concatenate([[[0.0, 0.0]], steps])
     time = np.repeat(steps[:, 0], 2)[1:]
     value = np.repeat(steps[:, 1], 2)[:-1]
-    time, value = np.append(time, max(end, time[-1])), np.append(value, value[-1])
-    distinct = np.ones(time.size, dtype=bool)
-    distinct[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
-    return Waveform(time[distinct], value[distinct])
+    return Waveform.tidied(
+        np.append(time, max(end, time[-1])), np.append(value, value[-1])
+    )
 
 
 def _level(sent: float, read: FloatArray) -> float:
