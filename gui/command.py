@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import click
 
 from tactile_lab.commands.options import runs_option
 
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
 INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
 
 
@@ -33,6 +35,11 @@ def command(target: str | None, bench: str, out: Path, theme: str) -> None:
         raise click.ClickException(
             "The window needs Qt, which is not installed. In the checkout: "
             f'pip install -e ".[gui]"; or alone: {INSTALL}'
+        )
+    if sys.platform == "linux" and not any(map(os.environ.get, DISPLAYS)):
+        raise click.ClickException(
+            "The window needs a display, and neither DISPLAY nor WAYLAND_DISPLAY names "
+            "one. Start it on a desktop, or over ssh -X."
         )
     try:
         from gui import app

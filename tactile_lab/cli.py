@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         asked.show()
         code = asked.exit_code
     except click.ClickException as refused:
-        message = refused.format_message()
+        message = " ".join(refused.format_message().split())
         if isinstance(refused, click.UsageError) and refused.ctx is not None:
             message += f" See `{refused.ctx.command_path} --help`."
         terminal.say(f"tactile-lab: {message}", sys.stderr)

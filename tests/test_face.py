@@ -140,6 +140,8 @@ def test_pandas_tables(run):
     frame = run.to_pandas(start=1.0, end=1.5, rate=1e3)
     assert list(frame) == ["V_C1", "V_K", "force"]
     assert frame.index.name == "time" and len(frame) == 500
+    alone = run.to_pandas(start=1.0, end=1.5, rate=1e3, signals="V_C1")
+    assert list(alone) == ["V_C1"] and alone["V_C1"].equals(frame["V_C1"])
     trials = run.to_pandas("trials")
     assert trials["label"].tolist() == ["180 mN"]
     assert len(run.to_pandas("spikes")) == run.trials[0]["spikes"]
@@ -172,6 +174,7 @@ def test_plan_and_report_show_themselves(run):
     assert "coil source" in plan._repr_html_() and "REAL" not in plan._repr_html_()
     report = tactile_lab.write_report(run)
     assert report.html.parent == run.path
+    assert repr(report) == f"<Report of {run.path.name}: {report.html}>"
     assert report._repr_html_().startswith("<iframe srcdoc=")
 
 

@@ -39,15 +39,14 @@ def command(
 ) -> None:
     """Export RUN as CSV (SI, units in the header), MATLAB or NWB file."""
     with refusing():
-        from tactile_lab.quantity import parse
         from tactile_lab.store.export.selection import Selection
         from tactile_lab.store.run import Run
 
         selection = Selection(
             signals=signals or None,
-            start=0.0 if start is None else parse(start, "s"),
-            end=None if end is None else parse(end, "s"),
-            rate=None if rate is None else parse(rate, "S/s"),
+            start=_quantity("--from", start, "s") or 0.0,
+            end=_quantity("--until", end, "s"),
+            rate=_quantity("--rate", rate, "S/s"),
         )
         target = out or run / (
             "csv" if form == "csv" else f"{run.resolve().name}.{form}"
@@ -63,6 +62,16 @@ def command(
     else:
         for file in written:
             say(str(file))
+
+
+def _quantity(option: str, text: str | None, unit: str) -> float | None:
+    from tactile_lab.errors import QuantityError
+    from tactile_lab.quantity import parse
+
+    try:
+        return None if text is None else parse(text, unit)
+    except QuantityError as reason:
+        raise QuantityError(f"{option}: {reason}") from reason
 
 
 def _exporter(form: str) -> Any:

@@ -34,7 +34,11 @@ out_option: Callable[..., Any] = click.option(
 def cap_option(default: float) -> Callable[..., Any]:
     """How long another solver may take."""
     return click.option(
-        "--cap", default=default, show_default=True, help="Most CPU time per solver, s."
+        "--cap",
+        type=click.FloatRange(0, min_open=True),
+        default=default,
+        show_default=True,
+        help="Most CPU time per solver, s.",
     )
 
 
@@ -42,7 +46,13 @@ def cap_option(default: float) -> Callable[..., Any]:
 @out_option
 @cap_option(20.0)
 @click.option("--scene", "names", multiple=True, metavar="NAME", help="Only this one.")
-@click.option("--repeats", default=3, show_default=True, help="Timings; least counts.")
+@click.option(
+    "--repeats",
+    type=click.IntRange(1),
+    default=3,
+    show_default=True,
+    help="Timings; least counts.",
+)
 def accuracy(
     out: Path | None, names: tuple[str, ...], cap: float, repeats: int
 ) -> None:

@@ -24,6 +24,9 @@ class Report:
     html: Path
     results: Path
 
+    def __repr__(self) -> str:
+        return f"<Report of {self.findings.run.run}: {self.html}>"
+
     def _repr_html_(self) -> str:
         """The page in a frame, for a notebook."""
         return notebook.framed(self.html.read_text(encoding="utf-8"))

@@ -59,6 +59,12 @@ def load(
         SceneError: something cannot be used as written; names file, key, value, what is
             allowed and the nearest valid key.
     """
+    for what, given in (("scene", scene), ("bench", bench)):
+        if given is not None and not isinstance(given, str | Path | Scene):
+            raise SceneError(
+                f"{what} = {given!r}: a name or the path of a file is needed; "
+                "single keys are changed by the second argument."
+            )
     if isinstance(scene, Scene):
         if not overrides and bench is None:
             return scene
@@ -226,7 +232,8 @@ def _protocol(
     fields = dict(table)
     name, source = fields.pop("name"), fields.pop("source", None)
     for key, value in (("name", name), ("source", source)):
-        if value is not None and not isinstance(value, str):
+        needed = key == "name" or value is not None
+        if needed and not isinstance(value, str):
             raise complaint(
                 ("protocol", key), f"{written(value)}: a text is needed.", blame
             )

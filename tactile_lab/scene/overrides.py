@@ -57,12 +57,17 @@ def apply(data: dict[str, Any], overrides: Overrides) -> dict[str, str]:
 
 def _changes(overrides: Overrides) -> Iterable[tuple[list[str], Any, str]]:
     """Path of the key, value, and how the change was written."""
+    if isinstance(overrides, str) or not isinstance(overrides, Iterable):
+        raise SceneError(
+            f"{overrides!r} changes no key; write for example "
+            '{"protocol.hold": 2.0}, or ["protocol.hold=2 s"].'
+        )
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
-            yield _path(key), _from_python(value), f"{key} = {value!r}"
+            yield _path(str(key)), _from_python(value), f"{key} = {value!r}"
         return
     for text in overrides:
-        key, equals, written = text.partition("=")
+        key, equals, written = str(text).partition("=")
         yield _path(key) if equals else [], _from_text(written.strip()), f"--set {text}"
 
 

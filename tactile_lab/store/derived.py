@@ -39,7 +39,7 @@ def table(
     if signals is None:  # a folder without a scene knows no force
         known = (run.path / "scene.toml").exists()
         signals = (*run.signals, "force") if known else run.signals
-    names = tuple(signals)
+    names = (signals,) if isinstance(signals, str) else tuple(signals)
     stored = tuple(name for name in names if name not in DERIVED)
     axis = stored or run.signals[:1]
     pieces = list(Selection(signals=axis, start=start, end=end, rate=rate).pieces(run))

@@ -114,7 +114,14 @@ def test_ctrl_c_has_its_code(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments", [("simulat",), ("run", "--nonsense"), ("show",), ("plan", "nonsense")]
+    "arguments",
+    [
+        ("simulat",),
+        ("run", "--nonsense"),
+        ("show",),
+        ("plan", "nonsense"),
+        ("export", "nonsense"),
+    ],
 )
 def test_every_refusal_is_one_line_of_the_same_form(capsys, arguments):
     with pytest.raises(SystemExit) as end:
@@ -124,6 +131,16 @@ def test_every_refusal_is_one_line_of_the_same_form(capsys, arguments):
     assert told.out == ""
     assert told.err.startswith("tactile-lab: ")
     assert len(told.err.splitlines()) == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is a display")
+def test_the_window_without_a_display_says_so(capsys, monkeypatch):
+    for display in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(display, raising=False)
+    with pytest.raises(SystemExit) as end:
+        main(["gui"])
+    assert end.value.code == 1
+    assert "needs a display" in capsys.readouterr().err
 
 
 def completed(line, monkeypatch, capsys):

@@ -32,6 +32,12 @@ def test_stability_beside_the_others(tactile_lab):
     assert "RK45" in answer.out and "right" in row.split("|")[7]
 
 
+def test_a_number_that_measures_nothing_is_refused(tactile_lab):
+    for option in ("--cap=-1", "--cap=0", "--repeats=0"):
+        answer = tactile_lab("validate", "accuracy", "--scene", "pulses", option)
+        assert answer.code == 2 and "not in the range" in answer.err
+
+
 def test_a_scene_that_is_none_is_refused(tactile_lab):
     answer = tactile_lab("validate", "accuracy", "--scene", "nonsense")
     assert answer.code == 2

@@ -124,6 +124,26 @@ def test_a_bad_override_is_named(override):
         load(None, [override])
 
 
+@pytest.mark.parametrize(
+    ("scene", "changes", "bench", "told"),
+    [
+        (None, "protocol.hold=2 s", None, r"'protocol.hold=2 s' changes no key"),
+        (None, 5, None, "5 changes no key"),
+        (None, {1: 2}, None, "1 = 2: write table.key=value"),
+        (None, [7], None, "--set 7: write table.key=value"),
+        (None, {"protocol.name": None}, None, r"\[protocol\] name.*a text is needed"),
+        (5, (), None, "scene = 5: a name or the path"),
+        ({"protocol": {"name": "pulses"}}, (), None, "scene = {'protocol'.*a name"),
+        (None, (), 5, "bench = 5: a name or the path"),
+    ],
+)
+def test_what_is_no_scene_bench_or_change_is_refused_in_words(
+    scene, changes, bench, told
+):
+    with pytest.raises(SceneError, match=told):
+        load(scene, changes, bench)
+
+
 def test_a_bad_value_from_the_command_line_is_blamed_on_the_option():
     with pytest.raises(
         SceneError, match=r"^--set protocol.hold=2 V: \[protocol\] hold"
