@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
+from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.serial_line.from_row import Answer, RowParser, invented
 from sim_backend.serial_line.scpi import Handler, ScpiError, ScpiParser, number
 from tactile_lab.clock import Clock
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.serial_dialect import MULTIPLIERS, MeterDialect
-
-
-class FieldPlant(Protocol):
-    """The physics at the probe."""
-
-    def field(self, time: float) -> float:
-        """Flux density at clock time `time` s, T."""
-        ...
-
 
 PER_TESLA = {1: 1e4, 2: 1.0, 3: 1e4, 4: 1.0 / (4e-7 * np.pi)}
 """Answer per tesla for unit 1 G, 2 T, 3 Oe, 4 A/m."""
@@ -48,7 +39,7 @@ class SimTeslameter:
 
     def __init__(
         self,
-        plant: FieldPlant,
+        plant: DrivenCoil,
         model: str,
         clock: Clock,
         *,
@@ -215,7 +206,7 @@ class RowMeter:
         SceneError: no answer can be made from one of its patterns.
     """
 
-    def __init__(self, plant: FieldPlant, row: MeterDialect, clock: Clock) -> None:
+    def __init__(self, plant: DrivenCoil, row: MeterDialect, clock: Clock) -> None:
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")
         per_tesla = 1 / row.scale
@@ -238,7 +229,7 @@ class RowMeter:
 
 
 def meter_far_end(
-    plant: FieldPlant,
+    plant: DrivenCoil,
     row: MeterDialect,
     clock: Clock,
     *,

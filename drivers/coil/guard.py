@@ -12,7 +12,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Protocol
 
 from drivers.coil import guard_process
 from drivers.serial_line.port import port_settings
@@ -24,30 +23,6 @@ SILENCE = 0.5
 
 READY = 10.0
 """Longest wait for the guard process to be ready, s."""
-
-
-class CoilGuard(Protocol):
-    """A guard that switches the output off when the heartbeat stops."""
-
-    @property
-    def lost(self) -> str | None:
-        """Why the guard no longer guards, or None."""
-        ...
-
-    def start(self) -> None:
-        """Be ready to guard."""
-
-    def arm(self) -> None:
-        """From now on silence means danger."""
-
-    def beat(self) -> None:
-        """The thread that owns the source is alive."""
-
-    def disarm(self) -> None:
-        """The output is verified off; silence is fine again."""
-
-    def stop(self) -> None:
-        """Leave when disarmed; while armed, hand the released port to the guard."""
 
 
 def in_process(port: str) -> bool:

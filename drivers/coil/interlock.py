@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
-from drivers.coil.guard import CoilGuard
+from drivers.coil.guard import Guard
 from tactile_lab.bench import COPPER, CoilLimits
 from tactile_lab.errors import InterlockError, LimitError
 from tactile_lab.instruments.serial_dialect import CoilDialect
@@ -86,7 +86,7 @@ class Interlock:
         self,
         limits: CoilLimits,
         time: float,
-        guard: CoilGuard | None,
+        guard: Guard | None,
         warn: Callable[[str], None],
     ) -> None:
         self.heat = HeatBudget(limits, time)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from drivers.coil.guard import CoilGuard, Guard, in_process
+from drivers.coil.guard import Guard, in_process
 from drivers.coil.interlock import Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, upload
 from drivers.coil.wire import CoilWire
@@ -46,7 +46,7 @@ class CoilSource:
         clock: Clock,
         *,
         baud: int | None = None,
-        guard: CoilGuard | None = None,
+        guard: Guard | None = None,
         guarded: bool = True,
         spy: Spy | None = None,
     ) -> None:

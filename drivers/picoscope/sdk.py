@@ -39,10 +39,8 @@ _floats = POINTER(c_float)
 PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "ps3000aOpenUnit": (_int16s, _text),
     "ps3000aCloseUnit": (c_int16,),
-    "ps3000aEnumerateUnits": (_int16s, _text, _int16s),
     "ps3000aGetUnitInfo": (c_int16, _text, c_int16, _int16s, c_uint32),
     "ps3000aPingUnit": (c_int16,),
-    "ps3000aCurrentPowerSource": (c_int16,),
     "ps3000aChangePowerSource": (c_int16, c_uint32),
     "ps3000aMaximumValue": (c_int16, _int16s),
     "ps3000aGetAnalogueOffset": (c_int16, _enum, _enum, _floats, _floats),

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.picoscope import status
-from drivers.picoscope.power import acknowledge, open_unit
 from drivers.picoscope.sdk import INFORMATION, INPUTS, bind, load
 from drivers.picoscope.sdk_calls import LibraryCalls
 from tactile_lab.bench import Channel
-from tactile_lab.errors import RefusedError
+from tactile_lab.errors import LimitError, RefusedError
+
+_MOST_ACKNOWLEDGEMENTS = 4
 
 
 class Unit:
@@ -41,7 +42,11 @@ class Unit:
         self.full_scale = 0
         self._library = library
         self._serial = serial
-        self._allowed = {"allow_usb2": allow_usb2, "allow_usb_power": allow_usb_power}
+        self._allowed = {
+            status.SUPPLY_CONNECTED: True,
+            status.SUPPLY_NOT_CONNECTED: allow_usb_power,
+            status.USB3_ON_USB2_PORT: allow_usb2,
+        }
         self._calls: LibraryCalls | None = None
         self._handle = 0
         self._power = status.OK
@@ -68,11 +73,13 @@ class Unit:
             found = self._library is None or isinstance(self._library, str)
             library = load(self._library) if found else bind(self._library)
             self._calls = LibraryCalls(library)
-        self._handle, self.accepted = open_unit(
-            self._calls, self._serial, **self._allowed
-        )
-        self._power = status.OK
+        handle = ctypes.c_int16(0)
+        text = None if self._serial is None else _text(self._serial)
+        code = self._calls("ps3000aOpenUnit", ctypes.byref(handle), text)
+        self._handle, self._power = max(handle.value, 0), status.OK
+        which = "the scope" if self._serial is None else f"scope {self._serial}"
         try:
+            self.accepted = self._acknowledged(code, f"Opening {which}")
             self.information = {name: self._read(name) for name in INFORMATION}
             most = ctypes.c_int16()
             self.do("Reading full scale", "ps3000aMaximumValue", ctypes.byref(most))
@@ -127,12 +134,9 @@ class Unit:
         Raises:
             LimitError: a power state that was not allowed.
         """
-        if self._power == status.OK or self._calls is None:
-            return
-        code, self._power = self._power, status.OK
-        self.accepted += acknowledge(
-            self._calls, self._handle, code, "Starting again", **self._allowed
-        )
+        if self._power != status.OK:
+            code, self._power = self._power, status.OK
+            self.accepted += self._acknowledged(code, "Starting again")
 
     def answers(self) -> bool:
         """Ping the scope: whether it is still there."""
@@ -153,6 +157,20 @@ class Unit:
         if code not in status.DEAD | {status.OK}:
             raise status.failure(code, "Closing the scope")
 
+    def _acknowledged(self, code: int, doing: str) -> tuple[str, ...]:
+        """Answer power states, of which one may follow another, until it is ready."""
+        accepted: list[str] = []
+        for _ in range(_MOST_ACKNOWLEDGEMENTS):
+            if code not in self._allowed or self._calls is None:
+                break
+            if not self._allowed[code]:
+                raise LimitError(f"{doing}: {status.describe(code)}.")
+            accepted.append(status.MEANINGS[code].name)
+            code = self._calls("ps3000aChangePowerSource", self._handle, code)
+        if code != status.OK:
+            raise status.failure(code, doing)
+        return tuple(accepted)
+
     def _read(self, item: str) -> str:
         text = (ctypes.c_int8 * 64)()
         needed = ctypes.c_int16()
@@ -161,3 +179,8 @@ class Unit:
             text, len(text), ctypes.byref(needed), INFORMATION[item],
         )  # fmt: skip
         return bytes(text).split(b"\0", 1)[0].decode("ascii", "replace")
+
+
+def _text(serial: str) -> ctypes.Array[ctypes.c_int8]:
+    raw = serial.encode("ascii", "replace") + b"\0"
+    return (ctypes.c_int8 * len(raw)).from_buffer_copy(raw)

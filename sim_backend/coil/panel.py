@@ -8,29 +8,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from sim_backend.coil.list_mode import ListPlayer
+from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.serial_line.scpi import Handler, ScpiError, no_argument, number
 from tactile_lab.clock import Clock
-
-
-class CoilPlant(Protocol):
-    """The physics a simulated source drives; times are the bench clock's, s."""
-
-    def set_current(self, time: float, amperes: float) -> None:
-        """From `time` on the source regulates to `amperes`, A."""
-
-    def output(self, time: float, on: bool) -> None:
-        """The output is switched at `time`."""
-
-    def coil_current(self, time: float) -> float:
-        """Current through the coil, A."""
-        ...
-
-    def coil_voltage(self, time: float) -> float:
-        """Voltage at the source's terminals, V."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -54,7 +36,7 @@ class CoilPanel:
 
     def __init__(
         self,
-        plant: CoilPlant,
+        plant: DrivenCoil,
         clock: Clock,
         rating: tuple[float, float],
         output_on: bool = False,

@@ -12,8 +12,9 @@ from collections import deque
 
 from sim_backend.coil.keithley import KEITHLEY_2400, KEITHLEY_2420
 from sim_backend.coil.kepco import KEPCO, PLAIN
-from sim_backend.coil.panel import CoilPanel, CoilPlant
+from sim_backend.coil.panel import CoilPanel
 from sim_backend.coil.tti import AIM_TTI
+from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.serial_line.from_row import Answer, RowParser, invented, reader
 from sim_backend.serial_line.scpi import ScpiParser
 from tactile_lab.clock import Clock
@@ -46,7 +47,7 @@ class SimCoilSource(CoilPanel):
     """
 
     def __init__(
-        self, plant: CoilPlant, model: str, clock: Clock, *, output_on: bool = False
+        self, plant: DrivenCoil, model: str, clock: Clock, *, output_on: bool = False
     ) -> None:
         if model not in MODELS:
             raise SceneError(
@@ -83,7 +84,7 @@ class RowCoil(CoilPanel):
         SceneError: no answer can be made from one of its patterns.
     """
 
-    def __init__(self, plant: CoilPlant, row: CoilDialect, clock: Clock) -> None:
+    def __init__(self, plant: DrivenCoil, row: CoilDialect, clock: Clock) -> None:
         super().__init__(plant, clock, (row.current, row.voltage))
         self._row = row
         self.reply_end = row.serial.reply_end.encode("ascii")
@@ -164,7 +165,7 @@ class RowCoil(CoilPanel):
 
 
 def coil_far_end(
-    plant: CoilPlant, row: CoilDialect, clock: Clock
+    plant: DrivenCoil, row: CoilDialect, clock: Clock
 ) -> SimCoilSource | RowCoil:
     """The simulated source that speaks `row`: written from a manual, or from the row.
 

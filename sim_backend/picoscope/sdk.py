@@ -96,7 +96,7 @@ class FakePs3000a:
             raise self.errors.pop(0)
 
     def _guarded(self, name: str, method: Any) -> Callable[..., int]:
-        takes_handle = name not in ("OpenUnit", "EnumerateUnits")
+        takes_handle = name != "OpenUnit"
 
         def entry(*arguments: Any) -> int:
             if not self._busy.acquire(blocking=False):
@@ -132,21 +132,6 @@ class FakePs3000a:
         self.buffers.clear()
         return unit.OK
 
-    @header(POINTER(c_int16), POINTER(c_int8), POINTER(c_int16))
-    def _enumerate_units(self, count: Any, serials: Any, length: Any) -> int:
-        device = self.device
-        free = device.present and not device.is_open and not device.make.taken
-        text = device.make.serial.encode() if free else b""
-        if not count or not length:
-            return unit.NULL_PARAMETER
-        if free and serials and length[0] > 2 and serials[0:2] == [*b"-v"]:
-            text += f"[{device.make.variant}]".encode()
-        count[0] = int(free)
-        if serials and length[0] > len(text):
-            ctypes.memmove(serials, text + b"\0", len(text) + 1)
-        length[0] = len(text)
-        return unit.OK
-
     @header(c_int16, POINTER(c_int8), c_int16, POINTER(c_int16), c_uint32)
     def _get_unit_info(self, string: Any, length: int, needed: Any, info: int) -> int:
         make = self.device.make
@@ -168,10 +153,6 @@ class FakePs3000a:
     @header(c_int16)
     def _ping_unit(self) -> int:
         return unit.OK
-
-    @header(c_int16)
-    def _current_power_source(self) -> int:
-        return self.device.power()
 
     @header(c_int16, c_uint32)
     def _change_power_source(self, power: int) -> int:

@@ -53,6 +53,10 @@ class DrivenCoil(ABC):
         with self._lock:
             return self._electromagnet.voltage(time)
 
+    @abstractmethod
+    def field(self, time: float) -> float:
+        """Flux density at the probe at `time` s, T."""
+
     @property
     def _driven(self) -> float:
         """Current the source regulates to, A."""

@@ -15,7 +15,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.picoscope.listing import attached
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import RANGES
 from tactile_lab.bench import Channel
@@ -52,7 +51,6 @@ def scope() -> Iterator[PicoScope]:
 
 
 def test_listed_and_identified(scope: PicoScope) -> None:
-    fact("units", attached())
     scope.open()
     for name, value in scope.settings().items():
         fact(name, value)
