@@ -24,6 +24,9 @@ DRIFT = 0.02
 """Drift over the largest field beyond which there is no calibration."""
 WARMING = 30.0
 """Warming of the winding beyond which a calibration is doubted, K."""
+READ_BACK_NOISE = 2e-4
+"""Current by which an end may differ from the whole mA it was asked to be, A. The field
+is known no better than to what it makes of that."""
 HEADER = "current_A,field_T"
 
 
@@ -93,14 +96,13 @@ def fit_field(
     """
     falling = _branch(steps, "falling")
     rising = _branch(steps, "rising")
-    low = max(falling[0].min(), rising[0].min())
-    high = min(falling[0].max(), rising[0].max())
+    low = _end(max(falling[0].min(), rising[0].min()))
+    high = _end(min(falling[0].max(), rising[0].max()))
     if not low <= 0 <= high:
         raise NotIdentifiableError("the branches do not both cover 0 A")
-    current = np.unique(
-        np.round(np.concatenate([falling[0], rising[0], [low, 0.0, high]]), 4)
-    )
-    current = _apart(current[(current >= low) & (current <= high)])
+    currents = np.concatenate([falling[0], rising[0], [low, 0.0, high]])
+    # what lies beyond an end by noise or rounding is that end, which must not be lost
+    current = _apart(np.unique(np.clip(np.round(currents, 4), low, high)))
     upper = np.interp(current, *falling)
     lower = np.interp(current, *rising)
     field = (upper + lower) / 2
@@ -170,10 +172,16 @@ def _branch(steps: Sequence[FieldStep], name: str) -> tuple[FloatArray, FloatArr
     return values[:, 0], values[:, 1]
 
 
+def _end(current: float) -> float:
+    """An end of the range, A: what was asked for, where only noise is between."""
+    asked = round(current, 3)
+    return asked if abs(asked - current) <= READ_BACK_NOISE else current
+
+
 def _apart(current: FloatArray) -> FloatArray:
-    """Without currents that differ by read-back noise only; 0 A always stays."""
+    """Without currents that differ by read-back noise only; 0 A and both ends stay."""
     nearest = 0.2 * (current[-1] - current[0]) / current.size
-    kept = [0.0]
+    kept = sorted({0.0, float(current[0]), float(current[-1])})
     for value in current[np.argsort(np.abs(current))]:
         if min(abs(value - other) for other in kept) > nearest:
             kept.append(float(value))

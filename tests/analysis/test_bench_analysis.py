@@ -1,4 +1,5 @@
 import datetime
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,6 +43,23 @@ def test_the_calibration_finds_slope_and_loop():
     assert found.uncertainty >= found.half_width
     assert found.warnings == ()
     assert 0.0 in found.current
+
+
+@pytest.mark.parametrize("most", [1.0, 0.2, 0.1234])
+def test_both_ends_of_the_range_are_calibrated_whatever_the_read_back_shows(most):
+    for seed in range(100):
+        noise = np.random.default_rng(seed).normal(0.0, 50e-6, 42)
+        steps = [
+            replace(step, current=most * step.current + error)
+            for step, error in zip(loop(seed=seed), noise, strict=True)
+        ]
+        current = fit_field(steps).current
+        assert np.all(np.diff(current) > 0.01 * most)
+        assert current.size == 21
+        ends = np.array([current[0], current[-1]])
+        assert ends == pytest.approx([-most, most], abs=3e-4)
+        if most > 0.15:  # a force there is not refused
+            assert ends.tolist() == [-most, most]
 
 
 def test_a_wide_loop_is_warned_of():
