@@ -62,18 +62,20 @@ class Teslameter:
         self._talk.link.record(path)
 
     def open(self) -> None:
-        """Connect, identify, set unit and range.
+        """Connect, identify, set unit and range, and read back that they were taken.
 
         Raises:
             NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
-            BadReplyError: another instrument answers.
+            BadReplyError: another instrument answers, or it does not take its settings.
         """
         self._talk.link.open()
         try:
             self._talk.recognise()
             self._talk.clear_errors()
-            for line in (*self.dialect.optional, *self.dialect.init):
-                self._talk.command(line)
+            self._set_up()
+            if self._not_taken():  # a line may have been lost on the way
+                self._set_up()
+                self._refuse(self._not_taken())
         except BaseException:
             self._talk.link.close()
             raise
@@ -114,6 +116,27 @@ class Teslameter:
             self._talk.offer(self.dialect.release)
             self._talk.link.close()
         self._talk.link.end_record()
+
+    def _set_up(self) -> None:
+        for line in (*self.dialect.optional, *self.dialect.init):
+            self._talk.command(line)
+
+    def _not_taken(self) -> list[str]:
+        """Questions whose answer is not what the row wants, and that answer."""
+        asked = {line: self._talk.query(line) for line in self.dialect.confirm}
+        return [
+            f"{line} answers {answer!r}"
+            for line, answer in asked.items()
+            if re.search(self.dialect.confirm[line], answer) is None
+        ]
+
+    def _refuse(self, wrong: list[str]) -> None:
+        if wrong:
+            raise BadReplyError(
+                f"The teslameter does not take its settings: {', '.join(wrong)} after "
+                f"{', '.join(self.dialect.init)}, so its readings could be in another "
+                "unit. Unlock its front panel, check cable and baud rate, try again."
+            )
 
     def _factor(self) -> float:
         if self.dialect.multiplier is None:

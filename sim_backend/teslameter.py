@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -149,9 +150,11 @@ def _lakeshore_421(meter: SimTeslameter) -> dict[str, Handler]:
         "UNIT?": lambda _: {1: "G", 2: "T"}[meter.unit],
         "RANGE?": lambda _: str(4 - meter.range),
         "AUTO": auto,
+        "AUTO?": lambda _: str(int(meter.autorange)),
         "ACDC": lambda argument: meter.settings.update(
             acdc=str(_choice(argument, 0, 1))
         ),
+        "ACDC?": lambda _: meter.settings.get("acdc", "1"),
         "FIELD?": field,
         "FIELDM?": lambda _: prefix()[0] or " ",
     }
@@ -177,7 +180,9 @@ def _lakeshore_f41(meter: SimTeslameter) -> dict[str, Handler]:
     return {
         "*IDN?": lambda _: "Lake Shore,F41,LSA1234,1.5.2019091901",
         "SENSe:MODE": mode,
+        "SENSe:MODE?": lambda _: meter.settings.get("mode", "AC"),
         "UNIT:FIELd": unit,
+        "UNIT:FIELd?": lambda _: {1: "GAUSS", 2: "TESLA"}[meter.unit],
         "FETCh:DC?": field,
         "FETCh:TEMPerature?": lambda _: "22.5",
         "PROBe:SNUMber?": lambda _: "P4321",
@@ -219,6 +224,9 @@ class RowMeter:
         if row.multiplier is not None:
             per_tesla /= MULTIPLIERS["m"]
             answers[row.multiplier] = lambda: "m"
+        for line, wanted in row.confirm.items():
+            answers[line] = partial(invented, wanted)
+            answers[line]()
         answers[row.field] = field
         self._talk = RowParser(row, answers, lambda text: False, deque())
         field()

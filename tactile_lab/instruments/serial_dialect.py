@@ -292,6 +292,8 @@ class MeterDialect(SerialDialect):
         scale: tesla per unit of the answer.
         multiplier: query of a prefix letter (empty, u, m, k) that scales the answer.
         overload: pattern of an answer that says the range is exceeded.
+        confirm: queries after `init`, and the pattern that each answer must match: a
+            line that was lost would leave another unit.
         report: queries whose answers are kept with the run, by name.
         interval: shortest time between two readings, s.
     """
@@ -301,5 +303,6 @@ class MeterDialect(SerialDialect):
     scale: float = 1.0
     multiplier: str | None = None
     overload: Pattern = r"(?i)^\s*O(V)?L"
+    confirm: dict[str, Pattern] = Field(default={})
     report: dict[str, str] = Field(default={})
     interval: Pause = 0.1

@@ -52,6 +52,39 @@ def test_one_bad_exchange_is_repeated(meter, kind):
     assert end.faults.struck == 1
 
 
+@pytest.fixture(params=METERS)
+def closed(request, resistor):
+    """A meter as it comes: in gauss, not yet opened."""
+    row = load_dialect(request.param)
+    clock = SimulatedClock()
+    resistor.output(0, True)
+    resistor.set_current(0, 0.5)
+    end = plug_in(SimTeslameter(resistor, row.id, clock), row.serial, clock, "meter")
+    with clock.taking_part("test"):
+        yield end, Teslameter(row, end.url, clock)
+
+
+LINES = r"^(UNIT|RDGMODE|ACDC|AUTO|SENSE:MODE|UNIT:FIELD)\b[^?]*$"
+
+
+@pytest.mark.parametrize("which", range(3))
+def test_a_setting_that_was_lost_is_sent_again(closed, which):
+    end, meter = closed
+    end.faults.add(SerialFault(kind="deaf", line=LINES, skip=which))
+    meter.open()
+    assert meter.read().value == pytest.approx(5.5e-3, rel=1e-3)
+    meter.close()
+
+
+def test_a_meter_that_does_not_take_its_unit_is_refused(closed):
+    """It would store 74 T for 7.4 mT."""
+    end, meter = closed
+    end.faults.add(SerialFault(kind="deaf", line=r"^UNIT[^?]*$", times=None))
+    with pytest.raises(BadReplyError, match=r"UNIT\S*\? answers .* in another unit"):
+        meter.open()
+    meter.close()
+
+
 def test_readings_repeat_from_their_seed(resistor):
     clock = SimulatedClock()
     resistor.output(0, True)
