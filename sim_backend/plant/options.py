@@ -10,15 +10,9 @@ from sim_backend.plant.chain import Follower
 from sim_backend.plant.electromagnet import Electromagnet
 from sim_backend.plant.winding import Winding
 from tactile_lab.errors import ParameterError
+from tactile_lab.scene.tables import NOISE
 
-SCOPE_NOISE = {
-    "V_C1": 5e-3,
-    "V_C2": 5e-3,
-    "V_K": 20e-3,
-    "coil_current": 0.5e-3,
-    "field": 1e-3,
-    "I_DS": 5e-3,
-}
+SCOPE_NOISE = {**NOISE, "field": 1e-3}
 """Standard deviation at the scope's input, V."""
 
 _POSITIVE = ("follower_pole", "slew", "mains")

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sim_backend.plant.chain import Pulse
 from sim_backend.plant.coupling import Capacitor
@@ -24,6 +23,7 @@ from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
 from sim_backend.plant.sensor import NEEDS, Sensor
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
+from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.waveform import Waveform
 
@@ -36,23 +36,11 @@ SIGNALS = (*NEEDS, "coil_current", "field", *PLACED)
 """What may lie at a scope input."""
 
 
-class MagnetLike(Protocol):
-    """Field and force of the electromagnet; `tactile_lab.magnetics.Magnet` is one."""
-
-    def field(self, current: ArrayLike) -> FloatArray:
-        """Field, T, at `current` A."""
-        ...
-
-    def force(self, current: ArrayLike) -> FloatArray:
-        """Drive force, N, at `current` A."""
-        ...
-
-
 class _Drive:
     """Force on the cantilever as the electromagnet gives it."""
 
     def __init__(
-        self, electromagnet: Electromagnet, magnet: MagnetLike, options: PlantOptions
+        self, electromagnet: Electromagnet, magnet: Magnet, options: PlantOptions
     ) -> None:
         self._electromagnet = electromagnet
         self._magnet = magnet
@@ -80,7 +68,7 @@ class Plant(DrivenCoil):
     def __init__(
         self,
         circuit: Circuit,
-        magnet: MagnetLike,
+        magnet: Magnet,
         options: PlantOptions | None = None,
         seed: int = 1,
     ) -> None:

@@ -11,6 +11,7 @@ from tactile_lab.commands.options import json_option, scene_options
 from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
 
 if TYPE_CHECKING:
+    from tactile_lab.planning.plan import Plan
     from tactile_lab.scene.scene import Scene
 
 FORMATS = (".png", ".svg", ".pdf")
@@ -73,9 +74,7 @@ def command(
         with working("planning"):
             planned = plan(loaded)
         if picture is not None:
-            from tactile_lab.planning.figure import draw
-
-            draw(planned, picture)
+            _draw(planned, picture)
     if as_json:
         print_json({**planned.to_dict(), "figure": str(picture) if picture else None})
     else:
@@ -84,6 +83,24 @@ def command(
             say(f"preview drawn into {picture}")
     for line in planned.warnings:
         warn(line)
+
+
+def _draw(planned: Plan, path: Path) -> None:
+    from tactile_lab.errors import SceneError
+    from tactile_lab.planning.figure import preview_plot
+    from tactile_lab.report.canvas import draw
+
+    scene = planned.scene
+    figure = draw(
+        preview_plot(planned),
+        f"{scene.name}: preview from the model",
+        scene.bench.name,
+        simulated=scene.bench.simulated or None,
+    )
+    try:
+        figure.savefig(path, dpi=160)
+    except OSError as reason:
+        raise SceneError(f"--preview {path} cannot be written: {reason}.") from reason
 
 
 def _list_keys(scene: Scene, as_json: bool) -> None:
