@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +23,8 @@ FloatArray = NDArray[np.float64]
 PANEL, SMALL = 200, 130
 """Height of a panel, and of one that is low in the report, px."""
 LEFT, RIGHT, TOP, FOOT = 48, 12, 24, 36
+LINE, MARK = 16, 30
+"""Height of a second line above a panel, and room of a mark in a legend, px."""
 SIZE = 3.8
 """Half a point, px."""
 
@@ -116,8 +117,13 @@ class _Drawing:
                 edge = float(self._y(limit))
                 low, high = (edge, high) if at == 0 else (low, edge)
         foot = FOOT if last else 8
+        self._corner = place.topLeft() + QPointF(2, 2)
+        self._named = [s for s in panel.series if s.name]
+        legend = sum(_rich(s.name).size().width() + MARK for s in self._named)
+        beside = _rich(self._y_text).size().width() + legend < place.width() - RIGHT
         self.frame = Frame(
-            place.left() + LEFT, place.right() - RIGHT, place.top() + TOP,
+            place.left() + LEFT, place.right() - RIGHT,
+            place.top() + TOP + (0 if beside else LINE),
             place.bottom() - foot, float(start), float(end), float(low), float(high),
         )  # fmt: skip
 
@@ -138,7 +144,7 @@ class _Drawing:
             up = self._panel.corner == "upper"
             side |= Qt.AlignmentFlag.AlignTop if up else Qt.AlignmentFlag.AlignBottom
             painter.drawText(area.adjusted(0, 2, -2, -2), side, self._panel.text)
-        self._legend([s for s in self._panel.series if s.name])
+        self._legend()
 
     def _x(self, values: ArrayLike) -> FloatArray:
         shown = np.asarray(values, dtype=np.float64) * self._x_by
@@ -176,8 +182,7 @@ class _Drawing:
             name = _rich(self._x_text)
             middle = (frame.left + frame.right - name.size().width()) / 2
             painter.drawStaticText(QPointF(middle, frame.bottom + 16), name)
-        corner = QPointF(frame.left - LEFT + 2, frame.top - TOP + 2)
-        painter.drawStaticText(corner, _rich(self._y_text))
+        painter.drawStaticText(self._corner, _rich(self._y_text))
 
     def _guide(self, guide: Guide) -> None:
         frame, across = self.frame, guide.along == "x"
@@ -274,11 +279,11 @@ class _Drawing:
             self._painter.setPen(paint.pen(colour.name()))
             self._painter.drawLines(lines)
 
-    def _legend(self, named: Iterable[Series]) -> None:
-        """Marks and names above the panel, from its right edge."""
+    def _legend(self) -> None:
+        """Marks and names from the right edge, beside the heading or below it."""
         painter, right = self._painter, self.frame.right
         y = self.frame.top - TOP + 10.0
-        for s in reversed(list(named)):
+        for s in reversed(self._named):
             text, colour = _rich(s.name), QColor(self._colour(s.colour))
             right -= text.size().width()
             painter.setPen(QColor(self._tokens.text))
@@ -289,7 +294,7 @@ class _Drawing:
             else:
                 ends = np.array([right - 18.0, right - 5.0])
                 self._line(s, ends, np.array([y, y]), colour)
-            right -= 30
+            right -= MARK
 
     def _colour(self, name: str) -> str:
         known = {

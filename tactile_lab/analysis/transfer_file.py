@@ -16,8 +16,8 @@ from tactile_lab.errors import SceneError
 
 FloatArray = NDArray[np.float64]
 
-VOLTAGE = ("v_gs_v", "vgs", "vg", "vgate", "gatev")
-CURRENT = ("i_ds_a", "ids", "id", "idrain", "draini")
+VOLTAGE = ("v_gs_v", "v_gs", "vgs", "vg", "vgate", "gatev")
+CURRENT = ("i_ds_a", "i_ds", "ids", "id", "idrain", "draini")
 """Names of the columns, in small letters: ours, EasyEXPERT's usual ones, Keithley's."""
 NAMES, VALUES = "dataname", "datavalue"
 """First cells of EasyEXPERT's line of names and of its lines of values."""

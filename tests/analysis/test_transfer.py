@@ -49,7 +49,7 @@ def test_a_range_can_be_chosen():
 
 
 def test_it_reads_csv_of_ours_and_of_an_analyser(tmp_path):
-    for header in ("V_GS_V,I_DS_A", "VG,ID"):
+    for header in ("V_GS_V,I_DS_A", "V_GS,I_DS", "VG,ID"):
         path = tmp_path / "curve.csv"
         path.write_text(f"{header}\n" + "\n".join(f"{v},{i}" for v, i in
                         zip(V, curve(), strict=True)))  # fmt: skip
