@@ -37,11 +37,13 @@ class Level:
 
     Attributes:
         width: of a cell, s; 0 before the first.
+        end: of the newest cell, s; 0 without one.
         count: cells added so far, forgotten ones included.
     """
 
     def __init__(self, keep: int, signal: str = "") -> None:
         self.width = 0.0
+        self.end = 0.0
         self._signal = signal
         self.count = 0
         self._keep = keep
@@ -62,11 +64,6 @@ class Level:
         """Time of the oldest cell that is kept, s; 0 without one."""
         return float(self._values[0, self._first]) if len(self) else 0.0
 
-    @property
-    def end(self) -> float:
-        """End of the newest cell, s; 0 without one."""
-        return float(self._values[0, self._last - 1]) + self.width if len(self) else 0.0
-
     def add(self, cells: Trace, gap: bool | None = None) -> None:
         """Append cells; `gap`: whether one is before them, None: as their time says."""
         if cells.empty:
@@ -84,6 +81,7 @@ class Level:
         self._gap[self._last] = gap
         self._last += len(more)
         self.count += len(more)
+        self.end = more.end
         self._first = max(self._first, self._last - self._keep)
 
     def drop_last(self) -> None:
@@ -93,9 +91,17 @@ class Level:
 
     def since(self, number: int = 0) -> Trace:
         """Cells from number `number` on, as far as they are kept."""
-        kept = slice(self._first + max(0, number - self.forgotten), self._last)
-        time, low, high, mean = self._values[:, kept]
-        gap = self._gap[kept]
+        return self._cells(self._first + max(0, number - self.forgotten), self._last)
+
+    def around(self, start: float, end: float) -> Trace:
+        """What a picture of [start, end] s needs: one more cell on either side."""
+        time = self._values[0, self._first : self._last]
+        first, last = self._first + np.searchsorted(time, [start, end])
+        return self._cells(max(self._first, first - 1), min(last + 1, self._last))
+
+    def _cells(self, first: int, last: int) -> Trace:
+        time, low, high, mean = self._values[:, first:last]
+        gap = self._gap[first:last]
         if gap.size and not gap[0]:
             gap = gap.copy()
             gap[0] = True
@@ -176,7 +182,8 @@ class Pyramid:
 
     def newest(self, cells: int) -> Trace:
         """The newest cells of the finest level."""
-        return self._levels[0].since()[-cells:]
+        level = self._levels[0]
+        return level.since(level.count - cells)
 
     def between(self, start: float, end: float, count: int) -> Trace:
         """What lies in [start, end] s in about `count` cells."""
@@ -191,7 +198,7 @@ class Pyramid:
             if known and end - start < 2 * count * above.width:
                 break
             level = above
-        return level.since().around(start, end).thin(count)
+        return level.around(start, end).thin(count)
 
     # --- closer looks
 
@@ -230,5 +237,5 @@ class Pyramid:
         if len(level):
             level.drop_last()
         level.add(fresh.merge(BRANCH, -first % BRANCH), finer.has_gap(first))
-        begun = np.searchsorted(fresh.time, level.since().time[-1])
+        begun = np.searchsorted(fresh.time, level.since(level.count - 1).time[0])
         self._open[number] = first + int(begun)
