@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +46,22 @@ def read_text(path: Path, what: str = "File") -> str:
     return text
 
 
+def read_cells(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """(line number, cells) of a CSV file; empty lines and those with # are left out.
+
+    Raises:
+        SceneError: not readable, or no CSV; the line is named.
+    """
+    reader = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells) and not cells[0].startswith("#"):
+                yield reader.line_num, cells
+    except csv.Error as reason:
+        raise SceneError(f"{path}, line {reader.line_num}: {reason}.") from reason
+
+
 def read_columns(
     path: Path, headers: Sequence[tuple[str, ...]]
 ) -> tuple[tuple[str, ...], NDArray[np.float64], list[int]]:
@@ -62,29 +78,22 @@ def read_columns(
         SceneError: not readable, another header, a row of another length, or a value
             that is not a finite number; the line is named.
     """
-    reader = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
     wanted = " or ".join(",".join(names) for names in headers)
     header: tuple[str, ...] | None = None
     rows: list[list[float]] = []
     lines: list[int] = []
-    try:
-        for cells in reader:
-            cells = [cell.strip() for cell in cells]
-            if not any(cells) or cells[0].startswith("#"):
-                continue
-            at = f"{path}, line {reader.line_num}"
-            if header is None:
-                header = tuple(cells)
-                if header not in headers:
-                    raise SceneError(
-                        f'{at}: the header is "{",".join(cells)[:60]}"; it must be '
-                        f"{wanted}."
-                    )
-                continue
-            rows.append(_numbers(cells, header, at))
-            lines.append(reader.line_num)
-    except csv.Error as reason:
-        raise SceneError(f"{path}, line {reader.line_num}: {reason}.") from reason
+    for line, cells in read_cells(path):
+        at = f"{path}, line {line}"
+        if header is None:
+            header = tuple(cells)
+            if header not in headers:
+                raise SceneError(
+                    f'{at}: the header is "{",".join(cells)[:60]}"; it must be '
+                    f"{wanted}."
+                )
+            continue
+        rows.append(_numbers(cells, header, at))
+        lines.append(line)
     if header is None or not rows:
         raise SceneError(f"{path} holds no rows under the header {wanted}.")
     return header, np.array(rows, dtype=np.float64), lines

@@ -13,12 +13,34 @@ from tactile_lab.acquisition.alignment import CLUSTER, Edge, align, find_edges
 from tactile_lab.acquisition.coil_thread import Applied
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.journal import Journal
-from tactile_lab.acquisition.rate import Rate
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
 from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome
+
+
+class Rate:
+    """Instantaneous rate on the fly: 1/ISI of the last two spikes, 0 before the second.
+
+    Attributes:
+        value: Hz, after the last spike fed.
+    """
+
+    def __init__(self) -> None:
+        self.value = 0.0
+        self._last: float | None = None
+
+    def feed(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rate right after each spike, Hz, for spike times in s, increasing."""
+        if times.size == 0:
+            return np.empty(0)
+        before = times[:1] if self._last is None else np.array([self._last])
+        intervals = np.diff(times, prepend=before)
+        rates = np.zeros(times.size)
+        np.divide(1.0, intervals, out=rates, where=intervals > 0)
+        self._last, self.value = float(times[-1]), float(rates[-1])
+        return rates
 
 
 class Account:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.columns import read_text
+from tactile_lab.columns import read_cells
 from tactile_lab.errors import SceneError
 
 FloatArray = NDArray[np.float64]
@@ -52,30 +50,23 @@ def read_transfer(path: Path) -> Curve:
         SceneError: no such header, no row, or a cell that is no number; the line is
             named.
     """
-    reader = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
     columns: tuple[int, int] | None = None
     analyser = False
     rows: list[tuple[float, float]] = []
     left_out: list[int] = []
-    try:
-        for cells in reader:
-            cells = [cell.strip() for cell in cells]
-            if not any(cells) or cells[0].startswith("#"):
-                continue
-            if columns is None:
-                columns = _columns(cells)
-                analyser = cells[0].lower() == NAMES
-                continue
-            if analyser and cells[0].lower() != VALUES:
-                continue  # the next sweep's settings
-            at = f"{path}, line {reader.line_num}"
-            pair = (_number(cells, columns[0], at), _number(cells, columns[1], at))
-            if all(abs(value) < NO_NUMBER for value in pair):
-                rows.append(pair)
-            else:
-                left_out.append(reader.line_num)
-    except csv.Error as reason:
-        raise SceneError(f"{path}, line {reader.line_num}: {reason}.") from reason
+    for line, cells in read_cells(path):
+        if columns is None:
+            columns = _columns(cells)
+            analyser = cells[0].lower() == NAMES
+            continue
+        if analyser and cells[0].lower() != VALUES:
+            continue  # the next sweep's settings
+        at = f"{path}, line {line}"
+        pair = (_number(cells, columns[0], at), _number(cells, columns[1], at))
+        if all(abs(value) < NO_NUMBER for value in pair):
+            rows.append(pair)
+        else:
+            left_out.append(line)
     if columns is None:
         raise SceneError(
             f"{path} has no line that names V_GS and I_DS, such as V_GS_V,I_DS_A or "

@@ -33,9 +33,9 @@ def begin_run(
     scene = request.load()
     magnet = scene.bench.magnet
     if MODELLED & set(scene.record.signals):
-        from tactile_lab.engine.model_parts import LiveParts
+        from tactile_lab.acquisition.live_model import LiveModel
 
-        served.model = LiveParts(scene)
+        served.model = LiveModel.of(scene)
     return Execution(
         scene,
         out,

@@ -30,7 +30,7 @@ from tactile_lab.engine.threads import start
 from tactile_lab.errors import RefusedError, TactileLabError
 
 if TYPE_CHECKING:
-    from tactile_lab.engine.model_parts import LiveParts
+    from tactile_lab.acquisition.live_model import LiveModel
     from tactile_lab.engine.task import Task
 
 T = TypeVar("T")
@@ -149,7 +149,7 @@ class ServedTask:
     ) -> None:
         self._make, self._tell, self.realtime = make, tell, realtime
         self.task: Task[Any] | None = None
-        self.model: LiveParts | None = None
+        self.model: LiveModel | None = None
         self.answers: SimpleQueue[str] = SimpleQueue()
         self._said: list[Callable[[Any], None]] = []
         self._lock = threading.Lock()
@@ -265,13 +265,15 @@ class ServedTask:
             seen, last, said = written, coil, time.monotonic()
 
     def _tell_model(
-        self, model: LiveParts, task: Task[Any], over: threading.Event
+        self, model: LiveModel, task: Task[Any], over: threading.Event
     ) -> None:
         """Advance the model behind the samples, slice by slice, and to their end."""
+        from tactile_lab.engine.model_parts import live_part
+
         ended = False
         while not ended:
             ended = over.wait(SLICE)
-            part = model.until(task.live.reach - (0.0 if ended else BEHIND))
+            part = live_part(model, task.live.reach - (0.0 if ended else BEHIND))
             if part is not None:
                 self._tell(part)
 

@@ -13,8 +13,8 @@ from tactile_lab.errors import TactileLabError
 from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
+    from tactile_lab.acquisition.live_model import LiveModel
     from tactile_lab.model.simulate import Result
-    from tactile_lab.scene.scene import Scene
 
 STEP = 1e-3
 """Length of a bin, s; of a whole run on disk while there are at most `MOST`."""
@@ -24,36 +24,23 @@ PER = 4
 """Samples of the model in a bin, besides those at its spikes."""
 
 
-class LiveParts:
-    """The scene's circuit under the force that the applied current gives."""
-
-    def __init__(self, scene: Scene) -> None:
-        from tactile_lab.acquisition.live_model import LiveModel
-
-        self._model = LiveModel.of(scene)
-
-    def add(self, at: float, amperes: float) -> None:
-        """A set-point was applied at run time `at` s."""
-        self._model.add(at, amperes)
-
-    def until(self, end: float) -> ModelPart | None:
-        """Advance to `end` s; None where there is nothing new or no answer."""
-        begin = self._model.reached
-        if end - begin < 2 * STEP:
-            return None
-        try:
-            out = self._model.until(end)
-        except TactileLabError:
-            return None
-        count = max(2, round((end - begin) / STEP))
-        grid = np.linspace(begin, end, count, endpoint=False)
-        bins = {}
-        for signal in ("V_C1", "V_C2"):
-            value = out.sample(signal, grid)
-            step = (end - begin) / count
-            bins[signal] = Trace.bins(grid, value, value, value, step)
-        spikes = np.empty(0) if out.spike_times is None else out.spike_times
-        return ModelPart(bins, spikes, end)
+def live_part(model: LiveModel, end: float) -> ModelPart | None:
+    """Advance a model to run time `end` s; None: nothing is new, or no answer."""
+    begin = model.reached
+    if end - begin < 2 * STEP:
+        return None
+    try:
+        out = model.until(end)
+    except TactileLabError:
+        return None
+    count = max(2, round((end - begin) / STEP))
+    grid = np.linspace(begin, end, count, endpoint=False)
+    bins = {}
+    for signal in ("V_C1", "V_C2"):
+        value = out.sample(signal, grid)
+        bins[signal] = Trace.bins(grid, value, value, value, (end - begin) / count)
+    spikes = np.empty(0) if out.spike_times is None else out.spike_times
+    return ModelPart(bins, spikes, end)
 
 
 class StoredParts:

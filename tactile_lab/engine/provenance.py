@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import inspect
+import platform
+import subprocess
 from collections.abc import Iterator, Mapping
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, Stream
-from tactile_lab.engine.environment import environment
 from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import Plan
 from tactile_lab.plugins import ships
@@ -17,6 +19,10 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, RunFolder
 from tactile_lab.store.layout import Layout
+
+PACKAGES = (
+    "tactile-lab", "numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb",
+)  # fmt: skip
 
 Settings = Mapping[str, Mapping[str, str]]
 
@@ -113,3 +119,44 @@ def _shipped(scene: Scene) -> Iterator[Path]:
     for kind in type(scene.protocol).__mro__:
         if ships(kind):
             yield Path(inspect.getfile(kind))
+
+
+def environment() -> dict[str, str]:
+    """Versions by name, for the record of a run."""
+    found = {
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+    }
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    commit = commit_of(Path(__file__).parents[2])
+    if commit is not None:
+        found["commit"] = commit
+    return found
+
+
+def commit_of(root: Path) -> str | None:
+    """The checkout's commit, with a plus where files were changed; None outside git."""
+    if not (root / ".git").exists():
+        return None
+    try:
+        # `describe --dirty` would take the lock of the user's index
+        commit = _git(root, "describe", "--always")
+        changed = _git(root, "status", "--porcelain", "--untracked-files=no")
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return commit and commit + ("+" if changed else "")
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    done = subprocess.run(
+        ["git", "--no-optional-locks", "-C", str(root), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=5,
+        check=False,
+    )
+    return done.stdout.strip() or None

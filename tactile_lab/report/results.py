@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from tactile_lab.analysis.adaptation import Adaptation
 from tactile_lab.analysis.twin import Twin
-from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.report.findings import Findings
 from tactile_lab.report.run_data import RunData
@@ -53,7 +53,7 @@ def results(findings: Findings) -> dict[str, Any]:
         },
         "conclusion": findings.conclusion.plain,
         "statements": list(findings.conclusion.sentences),
-        "tables": [_table(table) for table in findings.conclusion.tables],
+        "tables": [asdict(table) for table in findings.conclusion.tables],
         "plots": [plot.to_dict() for plot in findings.answers],
         "twin": None if findings.twin is None else _twin(findings.twin),
         "accuracy": run.accuracy or None,
@@ -97,15 +97,6 @@ def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
         "silent_from_s": response.silent,
         "adaptation": None if fit is None else _adaptation(fit),
         "adaptation_why_not": trial.why_not or None,
-    }
-
-
-def _table(table: Table) -> dict[str, Any]:
-    return {
-        "title": table.title,
-        "headings": list(table.headings),
-        "rows": [list(row) for row in table.rows],
-        "note": table.note,
     }
 
 

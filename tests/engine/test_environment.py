@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 
-from tactile_lab.engine.environment import commit_of
+from tactile_lab.engine.provenance import commit_of
 
 
 @pytest.fixture

@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.twin import CLOSE, Twin
+from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.engine.events import ModelPart
-from tactile_lab.engine.model_parts import LiveParts, binned
+from tactile_lab.engine.model_parts import binned, live_part
 from tactile_lab.model.simulate import simulate
 from tactile_lab.scene.load import load
 from tactile_lab.trace import Trace
@@ -19,10 +20,10 @@ POINTS = [(0.1, 0.0), (0.2, 0.3), (0.3, 0.6), (0.9, 0.2), (1.2, 0.0)]
 
 
 def in_one_piece() -> ModelPart:
-    twin = LiveParts(SCENE)
+    twin = LiveModel.of(SCENE)
     for point in POINTS:
         twin.add(*point)
-    part = twin.until(1.5)
+    part = live_part(twin, 1.5)
     assert part is not None
     return part
 
@@ -31,13 +32,13 @@ def in_one_piece() -> ModelPart:
 @given(st.lists(st.floats(0.01, 1.45), max_size=6))
 def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
     whole = in_one_piece()
-    twin, tracks = LiveParts(SCENE), Twin()
+    twin, tracks = LiveModel.of(SCENE), Twin()
     fed = 0
     for end in [*sorted(cuts), 1.5]:
         while fed < len(POINTS) and POINTS[fed][0] <= end:
             twin.add(*POINTS[fed])
             fed += 1
-        part = twin.until(end)
+        part = live_part(twin, end)
         if part is not None:
             tracks.add(part)
     assert whole.spikes.size > 2
@@ -61,10 +62,10 @@ def test_set_points_hold_until_the_next() -> None:
 
 
 def test_late_set_point_moves_to_where_the_twin_is() -> None:
-    twin = LiveParts(SCENE)
-    assert twin.until(0.5) is not None
+    twin = LiveModel.of(SCENE)
+    assert live_part(twin, 0.5) is not None
     twin.add(0.4, 0.8)
-    part = twin.until(1.0)
+    part = live_part(twin, 1.0)
     assert part is not None and part.end == 1.0
     assert part.bins["V_C1"].mean[-1] < part.bins["V_C1"].mean[0] - 0.1
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tactile_lab.acquisition.rate import Rate
+from tactile_lab.acquisition.account import Rate
 from tactile_lab.errors import ParameterError
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.detector import (
