@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QLabel
 
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import label, push
+from gui.parts import bar, label, lines, push
 from gui.state import Fault
 
 
@@ -24,19 +24,11 @@ class Banner(QFrame):
         self._sign = QLabel()
         self._title = label("", "bannertitle", wrap=True)
         self._text = label("", "", wrap=True)
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        words.addWidget(self._title)
-        words.addWidget(self._text)
+        words = lines(self._title, self._text, spacing=2)
         self.show_log = push("Show in log")
         self.acknowledge = push("Acknowledge and reset", "primary")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(16, 9, 12, 9)
-        row.setSpacing(12)
-        row.addWidget(self._sign)
-        row.addLayout(words, 1)
-        row.addWidget(self.show_log)
-        row.addWidget(self.acknowledge)
+        parts = (self._sign, (words, 1), self.show_log, self.acknowledge)
+        bar(self, (16, 9, 12, 9), 12, *parts)
         self.show_log.clicked.connect(self.log_asked)
         self.acknowledge.clicked.connect(self.acknowledged)
         self.hide()

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QButtonGroup,
     QFrame,
     QGridLayout,
     QHBoxLayout,
     QLabel,
     QLayout,
+    QLineEdit,
     QPushButton,
     QScrollArea,
     QSizePolicy,
@@ -21,7 +24,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gui.look.icons import icon
+from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
 
 
@@ -31,7 +34,6 @@ def label(text: str, role: str = "", *, wrap: bool = False) -> QLabel:
     if role:
         made.setProperty("role", role)
     made.setWordWrap(wrap)
-    made.setTextFormat(Qt.TextFormat.AutoText)
     return made
 
 
@@ -41,6 +43,14 @@ def set_role(widget: QWidget, role: str) -> None:
         widget.setProperty("role", role)
         widget.style().unpolish(widget)
         widget.style().polish(widget)
+
+
+def sign(name: str, colour: str, words: str) -> QLabel:
+    """An icon that says what a row of a list is; `words` are its accessible name."""
+    made = QLabel()
+    made.setPixmap(pixmap(name, colour, 18))
+    made.setAccessibleName(words)
+    return made
 
 
 def line() -> QFrame:
@@ -70,12 +80,13 @@ class Primary(QPushButton):
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(4, 4, -4, -4), 3, 3)
 
 
-def push(text: str, role: str = "", *, name: str = "") -> QPushButton:
-    """A push button with an accessible name."""
+def push(text: str, role: str = "", *, name: str = "", tip: str = "") -> QPushButton:
+    """A push button with an accessible name and a tool tip."""
     made = Primary(text) if role == "primary" else QPushButton(text)
     if role:
         made.setProperty("role", role)
     made.setAccessibleName(name or text)
+    made.setToolTip(tip)
     made.setMinimumHeight(32)
     return made
 
@@ -145,9 +156,7 @@ class Segments(QFrame):
         super().__init__()
         self.setProperty("role", role)
         self.setAccessibleName(name)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(2, 2, 2, 2)
-        row.setSpacing(1)
+        row = bar(self, (2, 2, 2, 2), 1)
         self.group = QButtonGroup(self)
         for number, choice in enumerate(choices):
             button = QToolButton()
@@ -187,7 +196,7 @@ def scrolling(inner: QWidget) -> QScrollArea:
     return area
 
 
-BAR = 10
+SCROLL_BAR = 10
 """Width of a scroll bar, px, as the style sheet has it."""
 
 
@@ -195,7 +204,7 @@ def with_gutter(area: QScrollArea, inside: QLayout) -> QScrollArea:
     """Keep `inside` as wide with a scroll bar as without: the bar has its own room."""
 
     def make_room(least: int, most: int) -> None:
-        inside.setContentsMargins(0, 0, 0 if most > least else BAR, 0)
+        inside.setContentsMargins(0, 0, 0 if most > least else SCROLL_BAR, 0)
 
     make_room(0, 0)
     area.verticalScrollBar().rangeChanged.connect(make_room)
@@ -211,8 +220,8 @@ def stack(
 ) -> QGridLayout:
     """Parts below each other; `page`, one of them, takes the height that is left.
 
-    The page reaches `BAR` further to the right than the others: its scroll bar lies
-    in what is their margin.
+    The page reaches `SCROLL_BAR` further to the right than the others: its scroll bar
+    lies in what is their margin.
     """
     grid = QGridLayout(parent)
     grid.setContentsMargins(0, 0, 0, 0)
@@ -225,32 +234,84 @@ def stack(
             grid.addWidget(part, at, 0, 1, 2 if part is page else 1)
         grid.setRowStretch(at, int(part is page))
     grid.setColumnStretch(0, 1)
-    grid.setColumnMinimumWidth(1, BAR)
+    grid.setColumnMinimumWidth(1, SCROLL_BAR)
     return grid
 
 
-def column(parent: QWidget, margin: int = 0, spacing: int = 6) -> QVBoxLayout:
+STRETCH = "stretch"
+"""A part of a row or column that takes the room that is left."""
+
+Box = TypeVar("Box", bound=QBoxLayout)
+Part = QWidget | QLayout | tuple[QWidget | QLayout, int] | int | str
+
+
+def filled(box: Box, parts: Sequence[Part]) -> Box:
+    """Put parts into a row or column.
+
+    Args:
+        box: the layout.
+        parts: widgets and layouts, alone or with their share of the room that is left;
+            an empty space, px; `STRETCH`.
+    """
+    for part in parts:
+        what, share = part if isinstance(part, tuple) else (part, 0)
+        if isinstance(what, QWidget):
+            box.addWidget(what, share)
+        elif isinstance(what, QLayout):
+            box.addLayout(what, share)
+        elif isinstance(what, int):
+            box.addSpacing(what)
+        else:
+            box.addStretch(1)
+    return box
+
+
+def column(
+    parent: QWidget, *parts: Part, margin: int = 0, spacing: int = 6
+) -> QVBoxLayout:
     """A vertical layout on `parent`."""
     layout = QVBoxLayout(parent)
     layout.setContentsMargins(margin, margin, margin, margin)
     layout.setSpacing(spacing)
-    return layout
+    return filled(layout, parts)
 
 
-def row(spacing: int = 6) -> QHBoxLayout:
-    """A horizontal layout without margins."""
-    layout = QHBoxLayout()
-    layout.setContentsMargins(0, 0, 0, 0)
+def lines(*parts: Part, spacing: int = -1) -> QVBoxLayout:
+    """Parts below each other within another layout; `spacing`: its own, by itself."""
+    layout = QVBoxLayout()
     layout.setSpacing(spacing)
-    return layout
+    return filled(layout, parts)
 
 
-def elided(widget: QLabel, text: str) -> None:
-    """Set text, shortened with an ellipsis to the label's width; whole in the tip."""
-    metrics = widget.fontMetrics()
-    width = max(widget.width(), 40)
-    widget.setText(metrics.elidedText(text, Qt.TextElideMode.ElideRight, width))
-    widget.setToolTip(text)
+def row(*parts: Part, spacing: int = -1) -> QHBoxLayout:
+    """Parts beside each other; `spacing`: of the layout it stands in, by itself."""
+    layout = QHBoxLayout()
+    layout.setSpacing(spacing)
+    return filled(layout, parts)
+
+
+def bar(
+    parent: QWidget, margins: tuple[int, int, int, int], spacing: int, *parts: Part
+) -> QHBoxLayout:
+    """Parts beside each other as all of `parent`; margins from the left clockwise."""
+    layout = QHBoxLayout(parent)
+    layout.setContentsMargins(*margins)
+    layout.setSpacing(spacing)
+    return filled(layout, parts)
+
+
+def line_edit(name: str, hint: str = "", text: str = "") -> QLineEdit:
+    """A field for one line of text; `hint` is shown while it is empty."""
+    made = QLineEdit(text)
+    made.setAccessibleName(name)
+    made.setPlaceholderText(hint)
+    return made
+
+
+def say(where: QLabel, text: str) -> None:
+    """Show a text; hide the label where there is none."""
+    where.setText(text)
+    where.setVisible(bool(text))
 
 
 class Elided(QLabel):

@@ -7,9 +7,8 @@ from typing import Any
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import column, empty, label, panel
+from gui.parts import column, empty, label, panel, say, sign
 
 TOP = Qt.AlignmentFlag.AlignTop
 
@@ -29,15 +28,12 @@ class Attached(QWidget):
         self._rows.setVerticalSpacing(9)
         self._rows.setColumnStretch(1, 1)
         self._card.hide()
-        whole = column(self, spacing=0)
-        whole.addWidget(self.told)
-        whole.addWidget(self._card)
+        column(self, self.told, self._card, spacing=0)
         theme.changed.connect(self._show)
 
     def say(self, text: str) -> None:
         """Say this instead of a list."""
-        self.told.setText(text)
-        self.told.setVisible(bool(text))
+        say(self.told, text)
         self._found = []
         self._show()
 
@@ -62,11 +58,9 @@ class Attached(QWidget):
         tokens = self._theme.tokens
         for row, one in enumerate(self._found):
             good = bool(one["fits"])
-            sign = QLabel()
             icon, colour = ("check", tokens.green) if good else ("info", tokens.muted)
-            sign.setPixmap(pixmap(icon, colour, 18))
-            sign.setAccessibleName("fits" if good else "not known")
-            self._rows.addWidget(sign, row, 0, TOP)
+            mark = sign(icon, colour, "fits" if good else "not known")
+            self._rows.addWidget(mark, row, 0, TOP)
             self._rows.addWidget(_words(one), row, 1)
             if good:
                 fits = label(", ".join(one["fits"]), "pill-ok")

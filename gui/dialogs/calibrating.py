@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from gui.dialogs.bench_text import Choice
 from gui.look.theme import Theme
-from gui.parts import column, label, line, push
+from gui.parts import STRETCH, column, label, line, line_edit, push, row
 from gui.review.conclusion import Concluded
 from gui.review.live_plots import loop_plot
 from gui.review.plot_view import PlotView
@@ -99,47 +99,28 @@ class Calibrating(QWidget):
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(6)
         for number, (key, words) in enumerate(MAGNET):
-            edit = QLineEdit()
-            edit.setAccessibleName(words)
-            self.fields[key] = edit
-            row, side = divmod(number, 2)
-            grid.addWidget(label(words), row, 2 * side)
-            grid.addWidget(edit, row, 2 * side + 1)
+            self.fields[key] = line_edit(words)
+            at, side = divmod(number, 2)
+            grid.addWidget(label(words), at, 2 * side)
+            grid.addWidget(self.fields[key], at, 2 * side + 1)
         grid.setColumnStretch(1, 1)
         grid.setColumnStretch(3, 1)
-        run = QHBoxLayout()
-        run.setSpacing(12)
-        run.addWidget(self.field)
-        run.addWidget(self.progress, 1)
-        check = QHBoxLayout()
-        check.setSpacing(12)
-        check.addWidget(self.force)
-        check.addWidget(
-            label(
-                "Holds some currents and compares Eq. (2) with your own reading of the "
-                "force. Table 1 prints an A2 ten times too large for a 15 mm core.",
-                "muted",
-                wrap=True,
-            ),
-            1,
+        about = label(
+            "Take the magnet away and put the probe in its place. The core is "
+            "demagnetised, then both branches of the field are read against the "
+            "current, and a dated calibration file with its uncertainty is kept.",
+            "muted",
+            wrap=True,
         )
-        whole = column(self, spacing=10)
-        whole.addLayout(grid)
-        whole.addWidget(self.named)
-        whole.addWidget(line())
-        whole.addWidget(
-            label(
-                "Take the magnet away and put the probe in its place. The core is "
-                "demagnetised, then both branches of the field are read against the "
-                "current, and a dated calibration file with its uncertainty is kept.",
-                "muted",
-                wrap=True,
-            )
+        run = row(self.field, (self.progress, 1), spacing=12)
+        why = label(
+            "Holds some currents and compares Eq. (2) with your own reading of the "
+            "force. Table 1 prints an A2 ten times too large for a 15 mm core.",
+            "muted",
+            wrap=True,
         )
-        whole.addLayout(run)
-        whole.addWidget(self.loop)
-        whole.addWidget(self.findings)
-        whole.addWidget(self.use, 0, Qt.AlignmentFlag.AlignLeft)
-        whole.addWidget(line())
-        whole.addLayout(check)
-        whole.addStretch(1)
+        check = row(self.force, (why, 1), spacing=12)
+        use = row(self.use, STRETCH)
+        results = (self.loop, self.findings, use)
+        parts = (grid, self.named, line(), about, run, *results, line(), check, STRETCH)
+        column(self, *parts, spacing=10)

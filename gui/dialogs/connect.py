@@ -9,14 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QHBoxLayout,
-    QLineEdit,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
 
 from gui.dialogs.bench_text import save_bench, show_bench, start_choice
 from gui.dialogs.calibrating import Calibrating
@@ -24,7 +18,17 @@ from gui.dialogs.instruments import Instruments
 from gui.dialogs.overlay import Overlay
 from gui.dialogs.wiring import Wiring
 from gui.look.theme import Theme
-from gui.parts import Segments, column, label, push, scrolling
+from gui.parts import (
+    STRETCH,
+    Segments,
+    column,
+    label,
+    line_edit,
+    push,
+    row,
+    say,
+    scrolling,
+)
 from gui.review.conclusion import conclusion_of
 from gui.session.form_plan import Planned
 from gui.session.log import Level
@@ -70,8 +74,7 @@ class Connect(Overlay):
         self.instruments = Instruments(self._choice, theme)
         self.wiring = Wiring(self._choice, theme)
         self.calibration = Calibrating(self._choice, theme)
-        self.name = QLineEdit(self._choice.name)
-        self.name.setAccessibleName("Name of the bench")
+        self.name = line_edit("Name of the bench", text=self._choice.name)
         self.problem = label("", "error", wrap=True)
         self.problem.hide()
         self.pages = QStackedWidget()
@@ -264,8 +267,7 @@ class Connect(Overlay):
         self.prepare_asked.emit(protocol_checking("force"))
 
     def _say(self, problem: str) -> None:
-        self.problem.setText(problem)
-        self.problem.setVisible(bool(problem))
+        say(self.problem, problem)
         self.open()
 
     def _place(self) -> None:
@@ -273,25 +275,11 @@ class Connect(Overlay):
         super()._place()
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.addWidget(label("Connect instruments", "big"))
-        head.addStretch(1)
-        head.addWidget(self.tabs)
-        named = QHBoxLayout()
-        named.addWidget(label("Name of the bench"))
-        named.addWidget(self.name, 1)
-        foot = QHBoxLayout()
-        foot.addWidget(self.open_file)
-        foot.addStretch(1)
-        foot.addWidget(self.close_button)
-        foot.addWidget(self.save)
-        whole = column(self.card, margin=22, spacing=14)
-        whole.addLayout(head)
-        whole.addLayout(named)
-        whole.addWidget(self.pages, 1)
-        whole.addWidget(self.problem)
-        whole.addLayout(foot)
-        self.card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        head = row(label("Connect instruments", "big"), STRETCH, self.tabs)
+        named = row(label("Name of the bench"), (self.name, 1))
+        foot = row(self.open_file, STRETCH, self.close_button, self.save)
+        parts = (head, named, (self.pages, 1), self.problem, foot)
+        column(self.card, *parts, margin=22, spacing=14)
 
 
 def show_connect(window: QWidget, panels: Panels, screen: Screen) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QStackedWidget, QWidget
 
 from gui.dialogs.overlay import Overlay
-from gui.parts import Segments, column, label, push, scrolling
+from gui.parts import STRETCH, Segments, column, label, push, row, scrolling
 
 PANELS = (
     (
@@ -99,26 +99,19 @@ class Help(Overlay):
         super().__init__(window, 640)
         self.topic = ""
         self._titles: dict[str, QLabel] = {}
-        self._pages = (self._panels(), self._shortcuts(keys))
         choice = Segments(["Panels", "Shortcuts"], "Help page")
         choice.group.idClicked.connect(self._show)
         self._choice = choice
         self.close_button = push("Close", "primary")
         self.close_button.clicked.connect(self.hide)
-        head = QHBoxLayout()
-        head.addWidget(label("Help", "big"))
-        head.addStretch(1)
-        head.addWidget(choice)
-        foot = QHBoxLayout()
-        foot.addStretch(1)
-        foot.addWidget(self.close_button)
-        whole = column(self.card, margin=22, spacing=14)
-        whole.addLayout(head)
-        self._areas = [scrolling(page) for page in self._pages]
-        for area in self._areas:
-            area.setMinimumHeight(430)
-            whole.addWidget(area)
-        whole.addLayout(foot)
+        self._pages = QStackedWidget()
+        self._pages.setMinimumHeight(430)
+        self._area = scrolling(self._panels())
+        for page in (self._area, scrolling(self._shortcuts(keys))):
+            self._pages.addWidget(page)
+        head = row(label("Help", "big"), STRETCH, choice)
+        foot = row(STRETCH, self.close_button)
+        column(self.card, head, self._pages, foot, margin=22, spacing=14)
         self._show(0)
 
     def show_topic(self, topic: str) -> None:
@@ -127,12 +120,11 @@ class Help(Overlay):
         self._show(0)
         title = self._titles.get(topic)
         top = 0 if title is None else title.y()
-        self._areas[0].verticalScrollBar().setValue(top)
+        self._area.verticalScrollBar().setValue(top)
 
     def _show(self, number: int) -> None:
         self._choice.choose(number)
-        for at, area in enumerate(self._areas):
-            area.setVisible(at == number)
+        self._pages.setCurrentIndex(number)
 
     def _panels(self) -> QWidget:
         page = QWidget()
@@ -156,9 +148,9 @@ class Help(Overlay):
         listed += [("Wheel", "Zoom time"), ("Shift+wheel", "Pan")]
         half = -(-len(listed) // 2)
         for number, (keys, words) in enumerate(listed):
-            row, side = number % half, 2 * (number // half)
-            grid.addWidget(label(keys, "strong"), row, side)
-            grid.addWidget(label(words), row, side + 1)
+            at, side = number % half, 2 * (number // half)
+            grid.addWidget(label(keys, "strong"), at, side)
+            grid.addWidget(label(words), at, side + 1)
         grid.setRowStretch(half, 1)
         return page
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from drivers.attached import attached, try_out
 from gui.dialogs.attached import Attached
 from gui.dialogs.bench_text import BY_PERSON, Choice
 from gui.look.theme import Theme
-from gui.parts import column, label, line, push, set_role
+from gui.parts import STRETCH, column, label, line, line_edit, push, row, set_role
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.instruments.dialects import dialect_ids
@@ -49,10 +49,9 @@ class Instruments(QWidget):
         for driver in driver_names(ScopeDriver):
             self.scope.addItem(SCOPES.get(driver, driver), driver)
         self.scope.addItem("none", "")
-        self.serial = QLineEdit()
-        self.serial.setPlaceholderText("serial number, if several")
-        self.library = QLineEdit()
-        self.library.setPlaceholderText("vendor library, if not in the usual places")
+        self.serial = line_edit("Serial number", "serial number, if several")
+        words = "vendor library, if not in the usual places"
+        self.library = line_edit("Vendor library", words)
         self.test_coil, self.test_meter = push("Test"), push("Test")
         self.answers = {"coil": label("", wrap=True), "meter": label("", wrap=True)}
         self._lay_out()
@@ -73,13 +72,13 @@ class Instruments(QWidget):
         choice = self._choice
         self.coil_port.setCurrentText(choice.coil_port)
         self.meter_port.setCurrentText(choice.meter_port)
-        for row, dialect in (
+        for box, dialect in (
             (self.coil_row, choice.coil_dialect),
             (self.meter_row, choice.meter_dialect),
         ):
-            if row.findText(dialect) < 0:  # a row of the user's own
-                row.addItem(dialect)
-            row.setCurrentText(dialect)
+            if box.findText(dialect) < 0:  # a row of the user's own
+                box.addItem(dialect)
+            box.setCurrentText(dialect)
         if self.scope.findData(choice.scope) < 0:  # a driver of the user's own
             self.scope.addItem(choice.scope, choice.scope)
         self.scope.setCurrentIndex(self.scope.findData(choice.scope))
@@ -182,13 +181,10 @@ class Instruments(QWidget):
         return made
 
     def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.addWidget(self.scan)
-        top.addWidget(self._what, 1)
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         coil, meter = self.answers["coil"], self.answers["meter"]
-        for row, (title, widgets) in enumerate(
+        for at, (title, widgets) in enumerate(
             (
                 ("Coil source", (self.coil_port, self.coil_row, self.test_coil)),
                 ("", (coil,)),
@@ -199,21 +195,17 @@ class Instruments(QWidget):
             )
         ):
             if title:
-                grid.addWidget(label(title, "strong"), row, 0)
+                grid.addWidget(label(title, "strong"), at, 0)
             for where, widget in enumerate(widgets):
                 last = where == len(widgets) - 1
                 span = 4 - len(widgets) if last else 1
-                grid.addWidget(widget, row, 1 + where, 1, max(span, 1))
+                grid.addWidget(widget, at, 1 + where, 1, max(span, 1))
         coil.hide()
         meter.hide()
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)
-        whole = column(self, spacing=12)
-        whole.addLayout(top)
-        whole.addWidget(self.attached)
-        whole.addWidget(line())
-        whole.addLayout(grid)
-        whole.addStretch(1)
+        top = row(self.scan, (self._what, 1))
+        column(self, top, self.attached, line(), grid, STRETCH, spacing=12)
 
 
 def told(settings: Mapping[str, str]) -> str:

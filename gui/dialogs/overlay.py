@@ -10,13 +10,13 @@ from PySide6.QtWidgets import (
     QApplication,
     QFrame,
     QGraphicsDropShadowEffect,
-    QHBoxLayout,
     QLabel,
     QLayout,
     QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
+
+from gui.parts import STRETCH, bar, lines, row
 
 HEADER = 68
 
@@ -51,24 +51,11 @@ class Overlay(QWidget):
         answers: Sequence[QWidget],
     ) -> None:
         """Lay the card out as a question: a sign, words below each other, answers."""
-        buttons = QHBoxLayout()
-        buttons.addStretch(1)
-        for answer in answers:
-            buttons.addWidget(answer)
-        column = QVBoxLayout()
-        column.setSpacing(8)
-        for part in words:
-            if isinstance(part, QWidget):
-                column.addWidget(part)
-            else:
-                column.addLayout(part)
-        column.addSpacing(8)
-        column.addLayout(buttons)
-        row = QHBoxLayout(self.card)
-        row.setContentsMargins(24, 22, 22, 20)
-        row.setSpacing(16)
-        row.addWidget(sign, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(column, 1)
+        buttons = row(STRETCH, *answers)
+        said = lines(*words, 8, buttons, spacing=8)
+        whole = bar(self.card, (24, 22, 22, 20), 16)
+        whole.addWidget(sign, 0, Qt.AlignmentFlag.AlignTop)
+        whole.addLayout(said, 1)
 
     def open(self) -> None:
         """Show the card."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import label, push, set_role
+from gui.parts import label, line_edit, push, row, say, set_role
 from gui.session.session import Session
 from tactile_lab.acquisition.asked_field import read_off
 from tactile_lab.engine.events import PersonAsked
@@ -26,9 +26,7 @@ class QuestionCard(Overlay):
         self._sign = QLabel()
         self.text = label("", "big", wrap=True)
         self.doubt = label("", "error", wrap=True)
-        self.entry = QLineEdit()
-        self.entry.setAccessibleName("Field that the teslameter shows")
-        self.entry.setPlaceholderText("such as 5.4 mT")
+        self.entry = line_edit("Field that the teslameter shows", "such as 5.4 mT")
         self.entry.setFixedWidth(150)
         self.understood = label("", "muted", wrap=True)
         self.before = label("", "muted", wrap=True)
@@ -56,8 +54,7 @@ class QuestionCard(Overlay):
             if asked.current is None
             else f"Type the field that is shown at {_amperes(asked.current)}."
         )
-        self.doubt.setText(asked.doubt)
-        self.doubt.setVisible(bool(asked.doubt))
+        say(self.doubt, asked.doubt)
         reads = asked.current is not None
         self.entry.setVisible(reads)
         self.understood.setVisible(reads)
@@ -117,10 +114,7 @@ class QuestionCard(Overlay):
         self._session.run.answer(answer)
 
     def _lay_out(self) -> None:
-        typed = QHBoxLayout()
-        typed.setSpacing(10)
-        typed.addWidget(self.entry)
-        typed.addWidget(self.understood, 1)
+        typed = row(self.entry, (self.understood, 1), spacing=10)
         self.ask_with(
             self._sign,
             [self.text, self.doubt, typed, self.before, self.coil],

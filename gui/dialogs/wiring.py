@@ -5,18 +5,15 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QGridLayout,
-    QHBoxLayout,
     QHeaderView,
-    QLabel,
     QTableWidget,
     QTableWidgetItem,
     QWidget,
 )
 
 from gui.dialogs.bench_text import Choice
-from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import column, empty, label, push, set_role
+from gui.parts import STRETCH, column, empty, label, push, row, say, set_role, sign
 from gui.review.conclusion import Concluded
 
 COLUMNS = ("Input", "Signal", "Range", "Offset", "Shunt")
@@ -59,10 +56,10 @@ class Wiring(QWidget):
     def show_choice(self) -> None:
         """Fill the table from the choice."""
         self.table.setRowCount(0)
-        for row, cells in enumerate(self._choice.channels):
-            self.table.insertRow(row)
+        for at, cells in enumerate(self._choice.channels):
+            self.table.insertRow(at)
             for where, text in enumerate(cells):
-                self.table.setItem(row, where, QTableWidgetItem(text))
+                self.table.setItem(at, where, QTableWidgetItem(text))
         rows = max(self.table.rowCount(), 2)
         header = self.table.horizontalHeader().sizeHint().height()
         self.table.setFixedHeight(ROW * rows + header + 6)
@@ -70,8 +67,8 @@ class Wiring(QWidget):
     def take(self) -> None:
         """Put the table into the choice."""
         rows = []
-        for row in range(self.table.rowCount()):
-            cells = [self.table.item(row, where) for where in range(len(COLUMNS))]
+        for at in range(self.table.rowCount()):
+            cells = [self.table.item(at, where) for where in range(len(COLUMNS))]
             texts = [cell.text().strip() if cell else "" for cell in cells]
             rows.append((texts[0], texts[1], texts[2], texts[3], texts[4]))
         self._choice.channels = rows
@@ -100,26 +97,23 @@ class Wiring(QWidget):
         found = self._concluded
         verdicts = found.verdicts if found else ()
         tokens = self._theme.tokens
-        for row, verdict in enumerate(verdicts):
-            sign = QLabel()
+        for at, verdict in enumerate(verdicts):
             name, colour = (
                 ("check", tokens.green) if verdict.ok else ("warning", tokens.red)
             )
-            sign.setPixmap(pixmap(name, colour, 18))
-            sign.setAccessibleName(_word(verdict.ok))
+            mark = sign(name, colour, _word(verdict.ok))
             also = "".join(f"; {more}" for more in self._more(verdict.signal))
             text = label(f"{_word(verdict.ok)}: {verdict.text}{also}", wrap=True)
             if not verdict.ok:
                 set_role(text, "error")
             top = Qt.AlignmentFlag.AlignTop
-            self._verdicts.addWidget(sign, row, 0, top)
-            self._verdicts.addWidget(label(verdict.signal, "strong"), row, 1, top)
-            self._verdicts.addWidget(text, row, 2)
+            self._verdicts.addWidget(mark, at, 0, top)
+            self._verdicts.addWidget(label(verdict.signal, "strong"), at, 1, top)
+            self._verdicts.addWidget(text, at, 2)
         signals = tuple(f"{verdict.signal}:" for verdict in verdicts)
         statements = found.statements if found else ()
         rest = [text for text in statements if not text.startswith(signals)]
-        self._also.setText("\n".join(rest))
-        self._also.setVisible(bool(rest))
+        say(self._also, "\n".join(rest))
         wrong = sum(not verdict.ok for verdict in verdicts)
         self.mark.setVisible(found is not None)
         set_role(self.mark, "pill-ok" if verdicts and not wrong else "pill-bad")
@@ -142,26 +136,16 @@ class Wiring(QWidget):
         ]
 
     def _lay_out(self) -> None:
-        run = QHBoxLayout()
-        run.setSpacing(12)
-        run.addWidget(self.check)
-        run.addWidget(self.progress, 1)
-        run.addWidget(self.mark)
-        whole = column(self, spacing=10)
-        whole.addWidget(
-            label(
-                "The wiring check makes a small push on the connected bench and says "
-                "whether each channel is what its bench file says: swapped, inverted, "
-                "open, wrong attenuation, and how much mains hum it carries.",
-                "muted",
-                wrap=True,
-            )
+        about = label(
+            "The wiring check makes a small push on the connected bench and says "
+            "whether each channel is what its bench file says: swapped, inverted, "
+            "open, wrong attenuation, and how much mains hum it carries.",
+            "muted",
+            wrap=True,
         )
-        whole.addWidget(self.table)
-        whole.addLayout(run)
-        whole.addLayout(self._verdicts)
-        whole.addWidget(self._also)
-        whole.addStretch(1)
+        run = row(self.check, (self.progress, 1), self.mark, spacing=12)
+        parts = (about, self.table, run, self._verdicts, self._also, STRETCH)
+        column(self, *parts, spacing=10)
 
 
 def _word(ok: bool) -> str:

@@ -6,13 +6,23 @@ from enum import IntEnum
 
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
-from gui.header.lamp import LampWidget
 from gui.look import tokens as look
+from gui.look.icons import pixmap
 from gui.look.tokens import DARK
-from gui.parts import label
+from gui.parts import bar, label, lines
 from gui.state import InstrumentView, Lamp
+
+LAMPS = {
+    Lamp.ABSENT: ("lamp-absent", look.LAMP_GREY, "not present"),
+    Lamp.WAITING: ("lamp-waiting", look.LAMP_AMBER, "connecting"),
+    Lamp.GOOD: ("lamp-good", look.LAMP_GREEN, "good"),
+    Lamp.ACTIVE: ("lamp-active", look.LAMP_BLUE, "active"),
+    Lamp.WARNING: ("lamp-warning", look.LAMP_AMBER, "attention"),
+    Lamp.BAD: ("lamp-bad", look.LAMP_RED, "fault"),
+}
+"""Icon, colour and words of each: it says its state by shape as well as by colour."""
 
 
 class Room(IntEnum):
@@ -37,34 +47,21 @@ class Chip(QWidget):
         super().__init__(parent)
         self.setFixedHeight(44)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self._bad = False
         self._view = InstrumentView("", Lamp.ABSENT)
-        self._lamp = LampWidget(self)
+        self._lamp = QLabel()
+        self._lamp.setFixedSize(18, 18)
         self._name = label("", "hname")
         self._detail = label("", "hsub")
-        self._value = label("—", "hvalue")
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addWidget(self._name)
-        words.addWidget(self._detail)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(10, 4, 11, 4)
-        row.setSpacing(9)
-        row.addWidget(self._lamp)
-        row.addLayout(words)
-        row.addSpacing(6)
-        row.addWidget(self._value)
+        self.value = label("—", "hvalue")
+        words = lines(self._name, self._detail, spacing=0)
+        bar(self, (10, 4, 11, 4), 9, self._lamp, words, 6, self.value)
+        self._show_lamp()
         self._room = Room.FULL
 
     @property
     def lamp(self) -> Lamp:
         """State of the lamp."""
-        return self._lamp.lamp
-
-    @property
-    def value(self) -> QLabel:
-        """The label that holds the live value."""
-        return self._value
+        return self._view.lamp
 
     def show_room(self, room: Room) -> None:
         """Show as much as there is room for."""
@@ -73,7 +70,7 @@ class Chip(QWidget):
 
     def forget_width(self) -> None:
         """Let it shrink again."""
-        self._value.setMinimumWidth(0)
+        self.value.setMinimumWidth(0)
 
     def show_instrument(self, view: InstrumentView) -> bool:
         """Show an instrument's state; whether the chip has become wider by it."""
@@ -81,23 +78,25 @@ class Chip(QWidget):
         if view == before:
             return False
         self._view = view
-        self._lamp.show_state(view.lamp)
+        self._show_lamp()
         if view.detail != before.detail:  # other values follow, such as a verdict
             self.forget_width()
-        self._value.setText(view.value)
+        self.value.setText(view.value)
         self._arrange()
         told = " · ".join(text for text in (view.detail, view.value) if text)
         self.setToolTip(f"{view.name}: {told}")
         self.setAccessibleName(f"{view.name}, {view.detail}, {view.value}")
-        bad = view.lamp is Lamp.BAD
-        if bad is not self._bad:
-            self._bad = bad
-            self.update()
-        needed = self._value.sizeHint().width()
-        grown = needed > self._value.minimumWidth()
+        self.update()
+        needed = self.value.sizeHint().width()
+        grown = needed > self.value.minimumWidth()
         if grown:
-            self._value.setMinimumWidth(needed)
+            self.value.setMinimumWidth(needed)
         return grown or view.name != before.name
+
+    def _show_lamp(self) -> None:
+        name, colour, words = LAMPS[self._view.lamp]
+        self._lamp.setPixmap(pixmap(name, colour, 18))
+        self._lamp.setAccessibleName(f"Lamp: {words}")
 
     def _arrange(self) -> None:
         view, room = self._view, self._room
@@ -116,9 +115,10 @@ class Chip(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         body = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        edge = look.LAMP_RED if self._bad else DARK.header_border
+        bad = self.lamp is Lamp.BAD
+        edge = look.LAMP_RED if bad else DARK.header_border
         painter.setPen(QPen(QColor(edge), 1))
-        painter.setBrush(QColor("#3A1720" if self._bad else DARK.header_chip))
+        painter.setBrush(QColor("#3A1720" if bad else DARK.header_chip))
         painter.drawRoundedRect(body, 7, 7)
-        if self._bad:
+        if bad:
             painter.drawLine(QPointF(body.left() + 1, 8), QPointF(body.left() + 1, 36))

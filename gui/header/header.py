@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFont, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QLabel
 
 from gui.header.chip import Chip, Room
 from gui.header.stop import StopButton
 from gui.look import tokens as look
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import IconButton, elided, label
+from gui.parts import STRETCH, Elided, IconButton, bar, filled, label, lines, row
 from gui.state import Snapshot, State, clock_text
 
 _CLOCK_COLOURS = {
@@ -43,16 +43,14 @@ class Header(QFrame):
         self.stop = StopButton()
         self.badge = label("SIMULATED BENCH", "sim")
         self.badge.setAccessibleName("This bench is simulated")
-        self._title = label("", "hsub")
-        self._title.setMinimumWidth(190)
-        self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._title = Elided("", "hsub")
+        self._title.setMinimumWidth(WHOLE)
         self._state = QLabel()
         self._state.setMinimumWidth(112)
         self._clock = label("", "hsub")
         self._chips: list[Chip] = []
         self._shown: State | None = None
-        self._chip_row = QHBoxLayout()
-        self._chip_row.setSpacing(6)
+        self._chip_row = row(spacing=6)
         self._buttons = [
             IconButton(theme, name, words, role="hflat", on_header=True)
             for name, words in (
@@ -109,7 +107,8 @@ class Header(QFrame):
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Render identity, chips, clock and STOP."""
         self.badge.setVisible(snapshot.simulated)
-        elided(self._title, snapshot.title)
+        self._title.set_whole(snapshot.title)
+        self._title.setToolTip(snapshot.title)
         while len(self._chips) < len(snapshot.instruments):
             chip = Chip()
             self._chips.append(chip)
@@ -143,31 +142,10 @@ class Header(QFrame):
         logo.setPixmap(pixmap("logo", look.LAMP_BLUE, 26))
         name = label("Tactile Lab", "hidentity")
         name.font().setWeight(QFont.Weight.DemiBold)
-        first = QHBoxLayout()
-        first.setSpacing(9)
-        first.addWidget(name)
-        first.addWidget(self.badge)
-        first.addStretch(1)
-        words = QVBoxLayout()
-        words.setSpacing(3)
+        first = row(name, self.badge, STRETCH, spacing=9)
+        words = lines(first, self._title, spacing=3)
         words.setContentsMargins(0, 13, 0, 11)
-        words.addLayout(first)
-        words.addWidget(self._title)
-        clock = QVBoxLayout()
-        clock.setSpacing(1)
+        clock = lines(self._state, self._clock, spacing=1)
         clock.setContentsMargins(0, 14, 0, 12)
-        clock.addWidget(self._state)
-        clock.addWidget(self._clock)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(16, 0, 14, 0)
-        row.setSpacing(11)
-        row.addWidget(logo)
-        row.addLayout(words)
-        row.addSpacing(8)
-        row.addLayout(self._chip_row)
-        row.addStretch(1)
-        for button in self._buttons:
-            row.addWidget(button)
-        row.addSpacing(6)
-        row.addLayout(clock)
-        row.addWidget(self.stop)
+        whole = bar(self, (16, 0, 14, 0), 11, logo, words, 8, self._chip_row, STRETCH)
+        filled(whole, (*self._buttons, 6, clock, self.stop))

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QPixmap, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QLabel
 
 from gui.lanes.axis import number, signed
 from gui.lanes.compare import MARKS
 from gui.lanes.lane import Lane
 from gui.look.theme import Theme
-from gui.parts import label
+from gui.parts import STRETCH, column, label, row
 
 CARD = 164
 """Width, px."""
@@ -43,27 +43,14 @@ class LaneCard(QFrame):
         self._more = label("", "small")
         self._more.hide()
         self._runs: tuple[Values, Values | None, str] | None = None
-        title = QHBoxLayout()
-        title.setSpacing(7)
-        title.addWidget(self._swatch)
-        title.addWidget(label(lane.title, "strong"))
         self._beside = label("", "muted")
         self._beside.hide()
-        title.addWidget(self._beside)
-        title.addStretch(1)
-        value = QHBoxLayout()
-        value.setSpacing(5)
-        (title if self._flat else value).addWidget(self._value)
-        (title if self._flat else value).addWidget(self._unit)
-        if not self._flat:
-            value.addStretch(1)
-        words = QVBoxLayout(self)
+        number_ = (self._value, self._unit)
+        heading = (self._swatch, label(lane.title, "strong"), self._beside, STRETCH)
+        title = row(*heading, *(number_ if self._flat else ()), spacing=7)
+        value = row(*(() if self._flat else (*number_, STRETCH)), spacing=5)
+        words = column(self, title, value, self._more, STRETCH, spacing=1)
         words.setContentsMargins(MARGIN, 6, RIGHT, 4)
-        words.setSpacing(1)
-        words.addLayout(title)
-        words.addLayout(value)
-        words.addWidget(self._more)
-        words.addStretch(1)
 
     @property
     def text(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QWheelEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
 
 from gui.lanes.axis import number, signed
 from gui.lanes.card import LaneCard
@@ -23,6 +23,7 @@ from gui.lanes.readings import (
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
+from gui.parts import bar
 
 
 class LanePlot(QWidget):
@@ -132,11 +133,7 @@ class LaneRow(QFrame):
         self.card = LaneCard(lane, theme)
         self.plot = LanePlot(lane, view, options, theme)
         self._view, self._theme = view, theme
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
-        row.addWidget(self.card)
-        row.addWidget(self.plot, 1)
+        bar(self, (0, 0, 0, 0), 0, self.card, (self.plot, 1))
         self.plot.painted.connect(self._follow_picture)
         theme.changed.connect(self.tint)
         self.tint()

@@ -15,7 +15,7 @@ from gui.lanes.row import LaneRow
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
-from gui.parts import column, line
+from gui.parts import column, empty, line
 
 
 class LaneStack(QFrame):
@@ -43,12 +43,8 @@ class LaneStack(QFrame):
         """Show these lanes; those of the same name keep their range."""
         if [row.lane for row in self.rows] == list(lanes):
             return
-        while (item := self._layout.takeAt(0)) is not None:
-            widget = item.widget()
-            if widget is not None and widget is not self.navigator:
-                widget.hide()
-                widget.setParent(None)
-                widget.deleteLater()
+        self._layout.removeWidget(self.navigator)
+        empty(self._layout)
         self.rows = []
         for lane in lanes:
             row = LaneRow(lane, self.view, self.options, self._theme)

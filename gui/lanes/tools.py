@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import QPoint, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QWidget
 
 from gui.lanes.axis import decimals
 from gui.lanes.compare import MARKS
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
-from gui.parts import IconButton, Segments
+from gui.parts import IconButton, Segments, bar
 from tactile_lab.quantity import show
 
 WIDTHS = (1.0, 5.0, 10.0)
@@ -44,14 +44,7 @@ class Tools(QWidget):
         self.lanes = IconButton(theme, "layers", "Choose lanes")
         self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
         self.help = IconButton(theme, "help", "Help on the lanes")
-        self._readout = QLabel()
-        self._texts = [
-            self.follow,
-            self.cursors,
-            self.twin,
-            self.residual,
-            self.monitor,
-        ]
+        self.readout = QLabel()
         self._lay_out()
         self._connect()
 
@@ -63,7 +56,7 @@ class Tools(QWidget):
     def set_width(self, width: int) -> None:
         """Text beside the icons where there is room, else icons alone."""
         wide = width > (1330 if self._view.cursors is not None else 960)
-        for button in self._texts:
+        for button in self.findChildren(IconButton):
             button.set_wide(wide)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -89,11 +82,6 @@ class Tools(QWidget):
         if self._view.cursors is None:
             self.toggle_cursors(True)
         self._view.move_cursor(which, self._view.start + self._view.width / 2)
-
-    @property
-    def readout(self) -> str:
-        """The cursors as text."""
-        return self._readout.text()
 
     def _connect(self) -> None:
         self.follow.clicked.connect(self._view.set_follow)
@@ -164,7 +152,7 @@ class Tools(QWidget):
         self.cursors.setChecked(cursors is not None)
         self.set_width(self.width())
         if cursors is None:
-            self._readout.setText("")
+            self.readout.setText("")
             return
         tokens = self._theme.tokens
         low, high = sorted(cursors)
@@ -184,24 +172,16 @@ class Tools(QWidget):
         apart = f"Δt <b>{show(span, 's')}</b>"
         between = apart + rate
         whole = f"{boxes[0]} &nbsp; {boxes[1]} &nbsp; {between}"
-        self._readout.setToolTip(whole)
+        self.readout.setToolTip(whole)
         for words in (whole, between, apart):
-            self._readout.setText(words)
-            if self._readout.sizeHint().width() <= self._readout.width():
+            self.readout.setText(words)
+            if self.readout.sizeHint().width() <= self.readout.width():
                 break
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout(self)
-        row.setContentsMargins(10, 7, 10, 7)
-        row.setSpacing(5)
         views = (self.follow, self.freeze, self.widths, self.fit, self.zoom)
-        for widget in (*views, self.cursors, self.twin, self.residual):
-            row.addWidget(widget)
-        row.addSpacing(8)
-        row.addWidget(self._readout, 1)
-        for widget in (self.monitor, self.lanes, self.export, self.help):
-            row.addWidget(widget)
-        self._readout.setSizePolicy(
-            QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed
-        )
-        self._readout.setAccessibleName("Cursors")
+        shown = (self.cursors, self.twin, self.residual)
+        rest = (self.monitor, self.lanes, self.export, self.help)
+        bar(self, (10, 7, 10, 7), 5, *views, *shown, 8, (self.readout, 1), *rest)
+        self.readout.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.readout.setAccessibleName("Cursors")

@@ -66,6 +66,18 @@ _PATHS = {
     "layers": '<path d="M12 3l9 5-9 5-9-5zM3 12.5l9 5 9-5"/>',
     "theme": '<circle cx="12" cy="12" r="8.5"/>'
     '<path d="M12 3.5a8.5 8.5 0 0 1 0 17z" fill="{c}"/>',
+    "lamp-absent": '<g stroke-width="2.4"><circle cx="12" cy="12" r="8"/>'
+    '<path d="M6.7 17.3L17.3 6.7"/></g>',
+    "lamp-waiting": '<path d="M19.5 9.3A8 8 0 1 0 14.7 19.5" stroke-width="2.4"/>',
+    "lamp-good": '<circle cx="12" cy="12" r="8" fill="{c}" stroke-width="2.4"/>'
+    '<path d="M8 12.3L10.9 15.2 16 9.1" stroke="#141414" stroke-width="2.7" '
+    'stroke-linecap="square" stroke-linejoin="bevel"/>',
+    "lamp-active": '<g fill="{c}" stroke="none"><circle cx="12" cy="12" r="10.7" '
+    'fill-opacity="0.27"/><circle cx="12" cy="12" r="5.3"/></g>',
+    "lamp-warning": '<g stroke-width="2.4"><path d="M12 3.3L21.3 20.7H2.7z" '
+    'stroke-linejoin="bevel"/><path d="M12 9.3V14.7M12 17.9v.1"/></g>',
+    "lamp-bad": '<g stroke-width="2.4"><path d="M12 3.3L21.3 20.7H2.7z" fill="{c}" '
+    'stroke-linejoin="bevel"/><path d="M12 9.3V14.7M12 17.9v.1" stroke="#141414"/></g>',
     "copy": '<rect x="8" y="8" width="12" height="12" rx="2"/>'
     '<path d="M16 8V4H4v12h4"/>',
 }

@@ -13,15 +13,11 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QWidget
 
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import IconButton, Segments, column, label
+from gui.parts import STRETCH, IconButton, Segments, column, label, line_edit, row
 from gui.record.log_table import LogTable
 from gui.session.log import Level, Line
 
@@ -123,14 +119,14 @@ class LogView(QWidget):
         self.choices = Segments(["All", "Warnings", "Safety", "Notes"], "Log filter")
         self.choices.choose(0)
         self.help = IconButton(theme, "help", "Help on steps and log")
-        self.note = QLineEdit()
-        self.note.setPlaceholderText("Add a note …  (N)")
-        self.note.setAccessibleName("Note")
+        self.note = line_edit("Note", "Add a note …  (N)")
         self.note.setToolTip("Stamped with wall-clock and run time; Enter adds it")
         self.note.setMinimumWidth(120)
         self.note.setMaximumWidth(280)
         self.table = LogTable(self.filter)
-        self._lay_out()
+        title = label("Run log", "title")
+        top = (title, self.choices, STRETCH, (self.note, 1), self.help)
+        column(self, row(*top, spacing=10), (self.table, 1))
         self.choices.group.idClicked.connect(self._chosen)
         self.note.returnPressed.connect(self._noted)
         theme.changed.connect(self.table.viewport().update)
@@ -153,15 +149,3 @@ class LogView(QWidget):
         if text:
             self.noted.emit(text)
             self.note.clear()
-
-    def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.setSpacing(10)
-        top.addWidget(label("Run log", "title"))
-        top.addWidget(self.choices)
-        top.addStretch(1)
-        top.addWidget(self.note, 1)
-        top.addWidget(self.help)
-        whole = column(self, spacing=6)
-        whole.addLayout(top)
-        whole.addWidget(self.table, 1)

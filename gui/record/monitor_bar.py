@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy
+from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy
 
 from gui.lanes.axis import number
-from gui.parts import column, label, push, set_role
+from gui.parts import STRETCH, bar, column, filled, label, push, set_role
 from tactile_lab.engine.sensor import SensorState
 
 
@@ -19,35 +19,26 @@ class MonitorBar(QFrame):
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Monitor")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(14, 5, 10, 5)
-        row.setSpacing(20)
+        whole = bar(self, (14, 5, 10, 5), 20)
         self._values: dict[str, QLabel] = {}
         for name in ("V_C1", "V_C2", "Rate", "To the threshold"):
             box = QFrame()
-            inside = column(box, spacing=0)
-            value = label("—", "value")
+            value, title = label("—", "value"), label(name, "small")
             value.setAccessibleName(name)
-            title = label(name, "small")
-            inside.addWidget(title)
-            inside.addWidget(value)
+            column(box, title, value, spacing=0)
             self._values[name] = value
-            row.addWidget(box)
+            whole.addWidget(box)
         self._threshold = title
         self._threshold.setMinimumWidth(132)
         self.side = label("", "pill")
         self.side.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        row.addWidget(self.side)
-        row.addStretch(1)
         self._kept = label("", "muted")
-        row.addWidget(self._kept)
-        self.record = push("Record")
-        self.record.setToolTip("Keep what was seen, up to the last 60 s, as a run")
+        tip = "Keep what was seen, up to the last 60 s, as a run"
+        self.record = push("Record", tip=tip)
         self.record.clicked.connect(self.record_asked)
-        row.addWidget(self.record)
         off = push("Stop watching")
         off.clicked.connect(self.closed)
-        row.addWidget(off)
+        filled(whole, (self.side, STRETCH, self._kept, self.record, off))
         self.hide()
 
     @property

@@ -6,11 +6,11 @@ from datetime import datetime, timedelta
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from gui.lanes.expected import Hold
 from gui.look.theme import Theme
-from gui.parts import column, label
+from gui.parts import STRETCH, column, label, row
 from gui.state import Snapshot, State, minutes
 
 
@@ -71,16 +71,10 @@ class Progress(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        whole = column(self, spacing=6)
         self._left = label("No run", "")
         self._right = label("", "muted")
         self.blocks = Blocks(theme)
-        top = QHBoxLayout()
-        top.addWidget(self._left)
-        top.addStretch(1)
-        top.addWidget(self._right)
-        whole.addLayout(top)
-        whole.addWidget(self.blocks)
+        column(self, row(self._left, STRETCH, self._right), self.blocks)
 
     @property
     def text(self) -> str:

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from gui.lanes.lane import title_of
 from gui.look.theme import Theme
-from gui.parts import column, label, panel, row
+from gui.parts import STRETCH, column, label, panel, row
 from gui.review.wording import unbroken
 from gui.session.fit import Bar, Card
 
@@ -27,12 +27,9 @@ class FitCards(QWidget):
         self._labels = []
         for number in range(4):
             card = panel("card")
-            inside = column(card, margin=8, spacing=0)
-            parts = label("", "small"), label("—", "value"), label("", "small")
-            parts[2].setWordWrap(True)
-            for part in parts:
-                inside.addWidget(part)
-            inside.addStretch(1)
+            small = label("", "small", wrap=True)
+            parts = label("", "small"), label("—", "value"), small
+            column(card, *parts, STRETCH, margin=8, spacing=0)
             grid.addWidget(card, *divmod(number, 2))
             self._labels.append((card, *parts))
         grid.setColumnStretch(0, 1)
@@ -66,17 +63,14 @@ class TwinBars(QWidget):
         super().__init__()
         self._theme = theme
         self._rows: list[tuple[QLabel, _Gauge, QLabel]] = []
-        head = row()
-        head.addWidget(label("Model beside the run", "title"))
-        head.addStretch(1)
-        head.addWidget(label("NRMSE · full bar 10 % or 20 ms", "small"))
+        title = label("Model beside the run", "title")
+        full = label("NRMSE · full bar 10 % or 20 ms", "small")
+        head = row(title, STRETCH, full, spacing=6)
         self._grid = QGridLayout()
         self._grid.setHorizontalSpacing(10)
         self._grid.setVerticalSpacing(3)
         self._grid.setColumnStretch(1, 1)
-        whole = column(self, spacing=4)
-        whole.addLayout(head)
-        whole.addLayout(self._grid)
+        column(self, head, self._grid, spacing=4)
         self.hide()
 
     def show_bars(self, bars: tuple[Bar, ...]) -> None:

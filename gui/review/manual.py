@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QHBoxLayout,
-    QLineEdit,
-    QSlider,
-    QWidget,
-)
+from PySide6.QtWidgets import QGridLayout, QSlider, QWidget
 
 from gui.look.theme import Theme
-from gui.parts import column, label, line, panel, push
+from gui.parts import STRETCH, column, label, line, line_edit, panel, push, row, say
 from gui.review.scope_inputs import ScopeInputs
 from gui.session.live_manual import LiveManual
 from gui.state import CoilView, Snapshot, State, Truth, milliamperes, truth
@@ -42,8 +36,7 @@ class ManualView(QWidget):
         self._gain = 0.0
         self._no_meter = "No bench."
         self.begin = push("Take the coil by hand …")
-        self.current = QLineEdit("0 mA")
-        self.current.setAccessibleName("Coil current to set")
+        self.current = line_edit("Coil current to set", text="0 mA")
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(-100, 100)
         self.slider.setAccessibleName("Coil current to set, percent of the limit")
@@ -52,8 +45,8 @@ class ManualView(QWidget):
         self.off = push("Coil off", "danger")
         self._problem = label("", "error", wrap=True)
         self._problem.hide()
-        self._now = label("—", "value")
-        self._force = label("", "muted")
+        self.now = label("—", "value")
+        self.force = label("", "muted")
         self._limits = label("", "muted", wrap=True)
         self._field = label("not read", "value")
         self.read = push("Read")
@@ -118,36 +111,26 @@ class ManualView(QWidget):
         words = "not read" if field is None else show(round(field, 6), "T", 4)
         self._field.setText("reading …" if reading else words)
 
-    @property
-    def now(self) -> str:
-        """The current as it was read back last."""
-        return self._now.text()
-
-    @property
-    def doing(self) -> str:
-        """What the coil does, in words."""
-        return self._force.text()
-
     def follow(self, manual: LiveManual) -> None:
         """Show what was asked of the coil, unless somebody is about to ask anew."""
         asked = manual.current
         if manual.alive and not manual.opened:
-            self._force.setText("opening the source …")
+            self.force.setText("opening the source …")
         edited = self.current.isModified() or self.current.hasFocus()
         if not edited and not self.slider.isSliderDown():
             self.current.setText(show(asked, "A") if asked else "0 mA")
             self.slider.setValue(round(100 * asked / self._limit) if self._limit else 0)
 
     def _show_coil(self, coil: CoilView | None) -> None:
-        self._now.setText("—" if coil is None else milliamperes(coil.current))
+        self.now.setText("—" if coil is None else milliamperes(coil.current))
         what = truth(State.READY, coil)
         if what is Truth.UNKNOWN:
-            self._force.setText("state unknown: look at the source")
+            self.force.setText("state unknown: look at the source")
         elif coil is None or coil.current is None or coil.output is not True:
-            self._force.setText("output off" if coil is not None else "")
+            self.force.setText("output off" if coil is not None else "")
         else:
             force = show(round(coil.current * self._gain, 6), "N", 3)
-            self._force.setText(f"read back · drives {force}")
+            self.force.setText(f"read back · drives {force}")
 
     def _slid(self, percent: int) -> None:
         self.current.setText(show(self._limit * percent / 100, "A", 3))
@@ -157,55 +140,35 @@ class ManualView(QWidget):
         try:
             value = parse(self.current.text(), "A")
         except QuantityError as error:
-            self._say(str(error))
+            say(self._problem, str(error))
             return
         if abs(value) > self._limit:
-            self._say(
-                f"{show(value, 'A')} is beyond the limit of {show(self._limit, 'A')}."
-            )
+            limit = show(self._limit, "A")
+            say(self._problem, f"{show(value, 'A')} is beyond the limit of {limit}.")
             return
-        self._say("")
+        say(self._problem, "")
         self.current.setModified(False)
         self.slider.setValue(round(100 * value / self._limit) if self._limit else 0)
         self.set_asked.emit(value)
 
-    def _say(self, problem: str) -> None:
-        self._problem.setText(problem)
-        self._problem.setVisible(bool(problem))
-
     def _lay_out(self) -> None:
-        whole = column(self, spacing=9)
-        whole.addWidget(label("Coil by hand", "title"))
         card = panel("card")
-        inside = column(card, margin=12, spacing=2)
-        inside.addWidget(label("Current", "small"))
-        inside.addWidget(self._now)
-        inside.addWidget(self._force)
-        whole.addWidget(card)
-        whole.addWidget(self.begin)
-        row = QHBoxLayout()
-        row.addWidget(self.current, 1)
-        row.addWidget(self.set)
-        whole.addLayout(row)
+        column(
+            card, label("Current", "small"), self.now, self.force, margin=12, spacing=2
+        )
         chosen = QGridLayout()
         chosen.setVerticalSpacing(0)
         chosen.addWidget(self.slider, 0, 0, 1, 3)
         for place, (mark, side) in enumerate(zip(self._scale, SIDES, strict=True)):
             chosen.addWidget(mark, 1, place, side)
             chosen.setColumnStretch(place, 1)
-        whole.addLayout(chosen)
-        whole.addWidget(self._problem)
-        whole.addWidget(self.off)
-        whole.addWidget(self._limits)
-        whole.addWidget(line())
-        whole.addWidget(label("Field", "title"))
-        meter = QHBoxLayout()
-        meter.addWidget(self._field, 1)
-        meter.addWidget(self.read)
-        whole.addLayout(meter)
-        whole.addWidget(line())
-        whole.addWidget(label("Oscilloscope inputs", "title"))
-        whole.addWidget(self.inputs)
-        whole.addWidget(line())
-        whole.addWidget(self.check)
-        whole.addStretch(1)
+        asked = row((self.current, 1), self.set)
+        coil = (card, self.begin, asked, chosen, self._problem, self.off, self._limits)
+        meter = row((self._field, 1), self.read)
+        parts = (
+            *(label("Coil by hand", "title"), *coil, line()),
+            *(label("Field", "title"), meter, line()),
+            *(label("Oscilloscope inputs", "title"), self.inputs, line()),
+            *(self.check, STRETCH),
+        )
+        column(self, *parts, spacing=9)

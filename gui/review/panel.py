@@ -5,13 +5,21 @@ from __future__ import annotations
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
-    QHBoxLayout,
     QStackedWidget,
     QToolButton,
 )
 
 from gui.look.theme import Theme
-from gui.parts import BAR, IconButton, scrolling, stack, with_gutter
+from gui.parts import (
+    SCROLL_BAR,
+    STRETCH,
+    IconButton,
+    filled,
+    row,
+    scrolling,
+    stack,
+    with_gutter,
+)
 from gui.review.manual import ManualView
 from gui.review.results import ResultsView
 from gui.review.runs import RunsView
@@ -36,8 +44,7 @@ class ReviewPanel(QFrame):
         with_gutter(manual, inside)
         self._pages = QStackedWidget()
         self._tabs = QButtonGroup(self)
-        head = QHBoxLayout()
-        head.setSpacing(2)
+        head = row(spacing=2)
         for number, (name, page) in enumerate(
             (
                 ("Results", self.results),
@@ -54,11 +61,9 @@ class ReviewPanel(QFrame):
             self._tabs.addButton(tab, number)
             self._pages.addWidget(page)
             head.addWidget(tab)
-        head.addStretch(1)
-        head.addWidget(self.export)
-        head.addWidget(self.help)
+        filled(head, (STRETCH, self.export, self.help))
         whole = stack(self, (head, self._pages), self._pages, spacing=10)
-        whole.setContentsMargins(14, 6, 14 - BAR, 12)
+        whole.setContentsMargins(14, 6, 14 - SCROLL_BAR, 12)
         self._tabs.idClicked.connect(self.show_tab)
         self.show_tab(0)
 

@@ -9,21 +9,24 @@ import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QHeaderView,
     QSizePolicy,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
 from gui.look.theme import Theme
 from gui.parts import (
+    STRETCH,
     column,
+    empty,
     label,
+    lines,
     panel,
     push,
+    row,
+    say,
     scrolling,
     set_role,
     stack,
@@ -42,6 +45,9 @@ from tactile_lab.trace import FloatArray
 HEAD, ROW, MOST = 52, 26, 12
 """Heights of the table's head and of a row, px; rows that always have room."""
 
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+
 HEADINGS = ("Step", "Spikes", "First\nms", "Peak\nHz", "Final\nHz", "Fall\n%")
 
 
@@ -53,9 +59,9 @@ class ResultsView(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._title = label("Rate against force", "title")
-        self._mark = label("", "pill")
-        self._mark.hide()
-        self._mark.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.mark = label("", "pill")
+        self.mark.hide()
+        self.mark.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._theme = theme
         self.plot = PlotView(theme)
         self.loop = PlotView(theme)
@@ -76,38 +82,21 @@ class ResultsView(QWidget):
         self.table = QTableWidget(0, len(HEADINGS))
         self._facts = panel("card")
         self._facts_text = label("", "", wrap=True)
-        column(self._facts, margin=10).addWidget(self._facts_text)
+        column(self._facts, self._facts_text, margin=10)
         self._facts.hide()
         self.report = push("Open report")
         self.report.hide()
         self.report.clicked.connect(self.report_asked)
         self._set_up_table()
-        head = QHBoxLayout()
-        head.addWidget(self._title)
-        head.addStretch(1)
-        head.addWidget(self._mark)
+        head = row(self._title, STRETCH, self.mark)
         inner = QWidget()
-        middle = column(inner, spacing=9)
-        page = with_gutter(scrolling(inner), middle)
-        middle.addWidget(self.cards)
-        middle.addWidget(self.plot, 2)
-        middle.addWidget(self.loop, 2)
-        self._drawn = QVBoxLayout()
-        middle.addLayout(self._drawn, 2)
-        middle.addWidget(self.table, 3)
-        middle.addWidget(self.statements)
-        middle.addWidget(self.tables)
-        middle.addStretch(1)
-        middle.addWidget(self.bars)
-        middle.addWidget(self._facts)
-        middle.addWidget(self.report)
+        self._drawn = lines()
+        plots = (self.plot, 2), (self.loop, 2), (self._drawn, 2), (self.table, 3)
+        said = (self.statements, self.tables, STRETCH)
+        parts = (self.cards, *plots, *said, self.bars, self._facts, self.report)
+        page = with_gutter(scrolling(inner), column(inner, *parts, spacing=9))
         stack(self, (head, page), page, spacing=9)
         self._arrange()
-
-    @property
-    def mark(self) -> str:
-        """The words that say whether the results are final."""
-        return self._mark.text()
 
     def show_findings(
         self, findings: Sequence[Finding], *, total: int, running: bool, whole: bool
@@ -117,18 +106,14 @@ class ResultsView(QWidget):
         self._show_rates()
         self._fill(findings)
         self._arrange()
-        self._mark.setVisible(bool(findings) or running)
+        self.mark.setVisible(bool(findings) or running)
         steps = f"{len(findings)} step{'' if len(findings) == 1 else 's'}"
         if running:
             of = f" of {total}" if total else ""
-            self._mark.setText(f"preliminary · {len(findings)}{of} steps")
-            set_role(self._mark, "pill-warn")
-        elif not whole:
-            self._mark.setText(f"partial · {steps}")
-            set_role(self._mark, "pill-warn")
+            self.mark.setText(f"preliminary · {len(findings)}{of} steps")
         else:
-            self._mark.setText(f"final · {steps}")
-            set_role(self._mark, "pill-ok")
+            self.mark.setText(f"{'final' if whole else 'partial'} · {steps}")
+        set_role(self.mark, "pill-ok" if whole and not running else "pill-warn")
 
     def show_fit(self, found: Fit | None) -> None:
         """Show what the steps say together, beside the model; None clears it."""
@@ -157,13 +142,9 @@ class ResultsView(QWidget):
         plots: Sequence[Plot] = (),
     ) -> None:
         """Show what the report concludes, its tables, and the protocol's own plots."""
-        self.statements.setText(unbroken("\n".join(statements)))
-        self.statements.setVisible(bool(statements))
-        self.tables.setText("".join(_html(table) for table in tables))
-        self.tables.setVisible(bool(tables))
-        for old in self.answers:
-            old.setParent(None)
-            old.deleteLater()
+        say(self.statements, unbroken("\n".join(statements)))
+        say(self.tables, "".join(_html(table) for table in tables))
+        empty(self._drawn)
         self.answers = [PlotView(self._theme) for _ in plots]
         for view, plot in zip(self.answers, plots, strict=True):
             view.show_plot(plot)
@@ -209,17 +190,12 @@ class ResultsView(QWidget):
         table = self.table
         if table.rowCount() > len(findings):
             table.setRowCount(0)
-        for row in range(table.rowCount(), len(findings)):
-            table.insertRow(row)
-            for where, text in enumerate(findings[row].cells()):
+        for at in range(table.rowCount(), len(findings)):
+            table.insertRow(at)
+            for where, text in enumerate(findings[at].cells()):
                 item = QTableWidgetItem(text)
-                side = (
-                    Qt.AlignmentFlag.AlignLeft
-                    if where == 0
-                    else Qt.AlignmentFlag.AlignRight
-                )
-                item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-                table.setItem(row, where, item)
+                item.setTextAlignment(RIGHT if where else LEFT)
+                table.setItem(at, where, item)
         table.setMinimumHeight(HEAD + ROW * min(max(len(findings), 4), MOST))
         if findings:
             table.scrollToBottom()
@@ -242,14 +218,10 @@ class ResultsView(QWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         header.setMinimumSectionSize(36)
-        header.setDefaultAlignment(
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        )
+        header.setDefaultAlignment(RIGHT)
         first = table.horizontalHeaderItem(0)
         if first is not None:
-            first.setTextAlignment(
-                Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-            )
+            first.setTextAlignment(LEFT)
 
 
 def _html(table: Table) -> str:

@@ -9,21 +9,22 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QFrame,
-    QHBoxLayout,
     QLabel,
-    QLineEdit,
-    QVBoxLayout,
     QWidget,
 )
 
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import (
+    STRETCH,
     Elided,
     Segments,
+    bar,
     column,
     empty,
     label,
+    line_edit,
+    lines,
     push,
     row,
     scrolling,
@@ -67,8 +68,7 @@ class RunCard(QFrame):
         self.tick.setToolTip("Tick two or three runs to compare them")
         self.tick.toggled.connect(self.ticked)
         word, role = PILLS.get(entry.status, (entry.status, "pill"))
-        first = QHBoxLayout()
-        first.addWidget(Elided(entry.title, "strong"), 1)
+        first = row((Elided(entry.title, "strong"), 1))
         first.addWidget(label(word, role), 0, Qt.AlignmentFlag.AlignVCenter)
         kind = "sim" if entry.simulated else "bench"
         when = f"{entry.started} · {minutes(entry.duration)} · {kind}"
@@ -77,19 +77,9 @@ class RunCard(QFrame):
         theme.changed.connect(self._tint)
         self._theme = theme
         self._tint()
-        second = row()
-        second.addWidget(Elided(when, "muted"), 1)
-        second.addWidget(self._eye)
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        words.addLayout(first)
-        words.addLayout(second)
-        whole = QHBoxLayout(self)
-        whole.setContentsMargins(8, 7, 10, 7)
-        whole.setSpacing(10)
-        whole.addWidget(self.thumbnail)
-        whole.addLayout(words, 1)
-        whole.addWidget(self.tick)
+        second = row((Elided(when, "muted"), 1), self._eye, spacing=6)
+        words = lines(first, second, spacing=2)
+        bar(self, (8, 7, 10, 7), 10, self.thumbnail, (words, 1), self.tick)
 
     def mark(self, *, chosen: bool, shown: bool) -> None:
         """Show whether it is the chosen one, and whether it is on screen."""
@@ -139,9 +129,7 @@ class RunsView(QWidget):
         self._entries: list[Entry] = []
         self._chosen: Entry | None = None
         self._current: Path | None = None
-        self.search = QLineEdit()
-        self.search.setPlaceholderText("Search runs …  (Ctrl+F)")
-        self.search.setAccessibleName("Search runs")
+        self.search = line_edit("Search runs", "Search runs …  (Ctrl+F)")
         self.filter = Segments(["All", "Complete", "Sim", "Faults"], "Runs shown")
         self.filter.choose(0)
         self._count = label("", "muted")
@@ -150,10 +138,7 @@ class RunsView(QWidget):
         self.open = push("Open run", "primary")
         self.rerun = push("Re-run with these settings")
         self.compare = push("Compare")
-        top = QHBoxLayout()
-        top.addWidget(self.filter)
-        top.addStretch(1)
-        top.addWidget(self._count)
+        top = row(self.filter, STRETCH, self._count)
         page = with_gutter(scrolling(inner), self._rows)
         parts = (self.search, top, page, self.open, self.rerun, self.compare)
         stack(self, parts, page)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QComboBox, QFrame, QLineEdit, QWidget
 
-from gui.parts import column, empty, label, push
+from gui.parts import STRETCH, column, empty, label, push, row, say
 from gui.setup.parameter import toml
 from tactile_lab.bench import Channel
 from tactile_lab.errors import QuantityError, SceneError
@@ -36,12 +36,8 @@ class InputCard(QFrame):
         self.coupling.addItems(["DC", "AC"])
         self.coupling.setCurrentText(table.coupling)
         self._sees = label("", "small")
-        top = QHBoxLayout()
-        top.addWidget(label(name, "strong"))
-        top.addStretch(1)
-        top.addWidget(self._sees)
-        below = QHBoxLayout()
-        below.setSpacing(5)
+        top = row(label(name, "strong"), STRETCH, self._sees)
+        below = row(spacing=5)
         for words, editor, share in (
             ("Range", self.range, 4),
             ("Offset", self.offset, 4),
@@ -50,9 +46,7 @@ class InputCard(QFrame):
             editor.setAccessibleName(f"{words} of input {name}")
             editor.setToolTip(f"{words} of input {name}")
             below.addWidget(editor, share)
-        whole = column(self, margin=9, spacing=5)
-        whole.addLayout(top)
-        whole.addLayout(below)
+        column(self, top, below, margin=9, spacing=5)
         self.range.currentIndexChanged.connect(self._edited)
         self.offset.textChanged.connect(self._edited)
         self.coupling.currentIndexChanged.connect(self._edited)
@@ -96,12 +90,9 @@ class ScopeInputs(QWidget):
         inner = QWidget()
         self._rows = column(inner, spacing=6)
         self.use = push("Use these settings")
-        self._problem = label("", "error", wrap=True)
-        self._problem.hide()
-        whole = column(self, spacing=6)
-        whole.addWidget(inner)
-        whole.addWidget(self._problem)
-        whole.addWidget(self.use)
+        self.problem = label("", "error", wrap=True)
+        self.problem.hide()
+        column(self, inner, self.problem, self.use)
         self.use.clicked.connect(self._ask)
         self._idle = False
 
@@ -138,13 +129,7 @@ class ScopeInputs(QWidget):
 
     def say(self, problem: str) -> None:
         """Tell why the settings cannot be used, "" if they can."""
-        self._problem.setText(problem)
-        self._problem.setVisible(bool(problem))
-
-    @property
-    def problem(self) -> str:
-        """Why the settings cannot be used."""
-        return self._problem.text()
+        say(self.problem, problem)
 
     def _buttons(self) -> None:
         self.use.setEnabled(self._idle and bool(self.cards))

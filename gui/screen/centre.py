@@ -7,14 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QSplitter,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QLabel, QSplitter, QWidget
 
 from gui.lanes.lane import Lane
 from gui.lanes.source import Source
@@ -23,7 +16,7 @@ from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import column, label, line, panel, push
+from gui.parts import STRETCH, column, empty, label, line, lines, panel, push, row, say
 from gui.record.log import LogView
 from gui.record.monitor_bar import MonitorBar
 from gui.record.progress import Progress
@@ -47,35 +40,24 @@ class EmptyCard(QFrame):
         self.setAccessibleName("No bench connected")
         self._theme = theme
         self._picture = QLabel()
-        self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         title = label("No bench connected", "big")
-        title.setAlignment(Qt.AlignmentFlag.AlignCenter)
         text = label(
             "Explore with the simulated bench: same drivers, same protocols, same "
             "files, no hardware. Or connect your own coil source, oscilloscope "
             "and teslameter.",
             wrap=True,
         )
-        text.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.simulated = push("Use simulated bench", "primary")
         connect = push("Connect instruments …")
         scene = push("Open scene …")
-        buttons = QHBoxLayout()
-        buttons.setSpacing(8)
-        buttons.addStretch(1)
-        for button in (self.simulated, connect, scene):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
-        self._recent = QVBoxLayout()
-        self._recent.setSpacing(2)
+        offers = (self.simulated, connect, scene)
+        buttons = row(STRETCH, *offers, STRETCH, spacing=8)
+        self._recent = lines(spacing=2)
         hint = label("or drop a scene or a run anywhere", "small")
-        hint.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        whole = column(self, margin=26, spacing=12)
-        for widget in (self._picture, title, text):
-            whole.addWidget(widget)
-        whole.addLayout(buttons)
-        whole.addLayout(self._recent)
-        whole.addWidget(hint)
+        for words in (self._picture, title, text, hint):
+            words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        parts = (self._picture, title, text, buttons, self._recent, hint)
+        column(self, *parts, margin=26, spacing=12)
         self.simulated.clicked.connect(self.simulated_asked)
         connect.clicked.connect(self.connect_asked)
         scene.clicked.connect(self.open_asked)
@@ -84,10 +66,7 @@ class EmptyCard(QFrame):
 
     def show_recent(self, folders: list[tuple[str, Path]]) -> None:
         """Offer recent runs as (title, folder)."""
-        while (item := self._recent.takeAt(0)) is not None:
-            widget = item.widget()
-            if widget is not None:
-                widget.deleteLater()
+        empty(self._recent)
         if folders:
             self._recent.addWidget(label("RECENT RUNS", "section"))
         for title, folder in folders[:4]:
@@ -113,25 +92,16 @@ class Centre(QWidget):
         self.progress = Progress(theme)
         self.log = LogView(theme)
         upper = panel()
-        above = QVBoxLayout(upper)
-        above.setContentsMargins(1, 1, 1, 1)
-        above.setSpacing(0)
         self.notice = label("", "muted")
         self.notice.setContentsMargins(14, 6, 14, 6)
         self.notice.hide()
-        above.addWidget(self.tools)
-        above.addWidget(line())
-        above.addWidget(self.notice)
         self.compare_bar = CompareBar(self.stack, self.view, theme)
-        above.addWidget(self.compare_bar)
         self.monitor_bar = MonitorBar()
-        above.addWidget(self.monitor_bar)
-        above.addWidget(self.stack, 1)
+        bars = (self.tools, line(), self.notice, self.compare_bar, self.monitor_bar)
+        column(upper, *bars, (self.stack, 1), margin=1, spacing=0)
         lower = panel()
-        below = column(lower, spacing=7)
+        below = column(lower, self.progress, (self.log, 1), spacing=7)
         below.setContentsMargins(12, 10, 12, 10)
-        below.addWidget(self.progress)
-        below.addWidget(self.log, 1)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
         self.splitter.addWidget(upper)
         self.splitter.addWidget(lower)
@@ -175,8 +145,7 @@ class Centre(QWidget):
 
     def say(self, problem: str) -> None:
         """Say something above the lanes; "" takes it away."""
-        self.notice.setText(problem)
-        self.notice.setVisible(bool(problem))
+        say(self.notice, problem)
 
     def _show_lanes(self, lanes: Sequence[Lane] | None) -> None:
         if lanes is not None:

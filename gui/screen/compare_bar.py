@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QFont, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
 from gui.lanes.compare import MARKS, Comparison, Layout
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.theme import Theme
-from gui.parts import IconButton, Segments, empty, label
+from gui.parts import STRETCH, IconButton, Segments, bar, empty, label, row
 
 ALIGNED = ("start", "step", "cursor")
 LAYOUTS = (Layout.STACK, Layout.OVERLAY, Layout.DIFFERENCE)
@@ -39,22 +39,13 @@ class CompareBar(QFrame):
         for number, layout in enumerate(LAYOUTS):
             words = layout.value[0].upper() + layout.value[1:]
             self.layout_.group.button(number).setToolTip(words)
-        self._names = QHBoxLayout()
-        self._names.setSpacing(14)
+        self._names = row(spacing=14)
         parts = (("COMPARE", "section"), ("Align", "muted"), ("Layout", "muted"))
         self._words = [label(text, role) for text, role in parts]
         close = IconButton(theme, "close", "End the comparison")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(12, 4, 8, 4)
-        row.setSpacing(10)
-        row.addWidget(self._words[0])
-        row.addLayout(self._names)
-        row.addStretch(1)
-        row.addWidget(self._words[1])
-        row.addWidget(self.align)
-        row.addWidget(self._words[2])
-        row.addWidget(self.layout_)
-        row.addWidget(close)
+        title, align, layout_ = self._words
+        choices = (align, self.align, layout_, self.layout_, close)
+        bar(self, (12, 4, 8, 4), 10, title, self._names, STRETCH, *choices)
         self._buttons = (self.align, self.layout_, close)
         close.clicked.connect(self.closed)
         self.align.group.idClicked.connect(self._align)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 
 from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
-from gui.parts import push, row
+from gui.parts import bar, push
 from gui.state import State
 
 WORDS = {State.RUNNING: "Running …", State.ABORTING: "Stopping …"}
@@ -22,17 +22,10 @@ class Buttons(QWidget):
         self.run = push("Run", "primary")
         self.queue = push("Queue")
         self.save = push("Save to queue", "primary")
-        self.cancel = push("Cancel", name="Cancel the edit of the queued run")
-        self.cancel.setToolTip("The queued run stays as it is")
-        side_by_side = row(8)
-        self.setLayout(side_by_side)
-        for button, share in (
-            (self.run, 3),
-            (self.queue, 2),
-            (self.save, 3),
-            (self.cancel, 2),
-        ):
-            side_by_side.addWidget(button, share)
+        name, tip = "Cancel the edit of the queued run", "The queued run stays as it is"
+        self.cancel = push("Cancel", name=name, tip=tip)
+        parts = (self.run, 3), (self.queue, 2), (self.save, 3), (self.cancel, 2)
+        bar(self, (0, 0, 0, 0), 8, *parts)
         theme.changed.connect(self._tint)
         self._tint()
         self.show_next(State.DISCONNECTED, "", cannot_wait="")

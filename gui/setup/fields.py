@@ -12,15 +12,13 @@ from PySide6.QtWidgets import (
     QComboBox,
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QLineEdit,
     QStyle,
     QStyleOptionFrame,
     QToolButton,
-    QVBoxLayout,
 )
 
-from gui.parts import label
+from gui.parts import STRETCH, column, filled, label, row, say
 from gui.setup.parameter import FieldError, Kind, Parameter, entry_of, text_of
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import exact, parse
@@ -175,11 +173,7 @@ class Field(QFrame):
         name = label(parameter.title, wrap=True)
         name.setToolTip(parameter.help)
         name.setFixedWidth(NAME)
-        row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        row.addWidget(self._mark)
-        row.addWidget(name, 0)
+        across = row(self._mark, name, spacing=6)
         self._editor = editor(parameter)
         self._editor.edited.connect(self._edited)
         name.setBuddy(self._editor)
@@ -188,17 +182,12 @@ class Field(QFrame):
         self._editor.setAccessibleDescription(parameter.help)
         self._editor.setToolTip(parameter.help)
         if isinstance(self._editor, Switch):
-            row.addWidget(self._editor)
-            row.addStretch(1)
+            filled(across, (self._editor, STRETCH))
         else:
-            row.addWidget(self._editor, 1)
+            across.addWidget(self._editor, 1)
         if parameter.kind is Kind.FILE:
-            row.addWidget(self._browse())
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.setSpacing(2)
-        whole.addLayout(row)
-        whole.addWidget(self._reason)
+            across.addWidget(self._browse())
+        column(self, across, self._reason, spacing=2)
         self.set_text(text_of(parameter, value))
 
     @property
@@ -240,8 +229,7 @@ class Field(QFrame):
 
     def show_problem(self, problem: str) -> None:
         """Show why the value cannot be used, "" if it can."""
-        self._reason.setText(problem)
-        self._reason.setVisible(bool(problem))
+        say(self._reason, problem)
         invalid = str(bool(problem)).lower()
         if self._editor.property("invalid") != invalid:
             self._editor.setProperty("invalid", invalid)

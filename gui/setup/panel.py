@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout
+from PySide6.QtWidgets import QFrame, QScrollArea, QWidget
 
 from gui.look.theme import Theme
-from gui.parts import BAR, IconButton, label, line, stack
+from gui.parts import (
+    SCROLL_BAR,
+    STRETCH,
+    IconButton,
+    column,
+    label,
+    line,
+    row,
+    say,
+    scrolling,
+    stack,
+    with_gutter,
+)
 from gui.session.form_plan import Planned
 from gui.session.queue import Queued
 from gui.session.session import Session
 from gui.setup.buttons import Buttons
 from gui.setup.estimate import EstimateView
-from gui.setup.page import Page
+from gui.setup.form import Form
 from gui.setup.parameter import FieldError
 from gui.setup.picker import Picker, about
 from gui.setup.preset_button import PresetButton
+from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
 from gui.setup.strip import Strip
 from gui.setup.subject import Subject
@@ -31,6 +44,10 @@ LOW = 660
 
 SETTLE = 250
 """Milliseconds without a keystroke before the plan is computed anew."""
+
+
+WARNINGS = 3
+"""Warnings shown; the tool tip has them all."""
 
 
 class SetupPanel(QFrame):
@@ -54,8 +71,11 @@ class SetupPanel(QFrame):
         self._timer.timeout.connect(self.plan_now)
         self.picker = Picker()
         self.strip = Strip()
-        self.page = Page(theme)
-        self.form = self.page.form
+        self.about = label("", "muted", wrap=True)
+        self.preview = WaveformPreview(theme)
+        self.form = Form()
+        self.warnings = label("", "warning", wrap=True)
+        self.warnings.hide()
         self.subject = Subject(session, self.form)
         self.star = PresetButton(
             theme, self.form, session.out.resolve().parent / "presets", self.request
@@ -202,7 +222,7 @@ class SetupPanel(QFrame):
 
     def show_head(self, time: float | None) -> None:
         """Put the preview's play-head, where it shows the run in progress."""
-        self.page.preview.show_head(time if self._in_progress else None)
+        self.preview.show_head(time if self._in_progress else None)
 
     @property
     def _unusable(self) -> str:
@@ -233,8 +253,8 @@ class SetupPanel(QFrame):
         self._show_problem(planned.problem)
         self.star.mark()
         if expectation is not None:
-            self.page.preview.show_preview(expectation.preview)
-            self.page.show_warnings(expectation.warnings)
+            self.preview.show_preview(expectation.preview)
+            self._show_warnings(expectation.warnings)
             self.estimate.show_estimate(expectation.estimate)
         self.render_snapshot(self._snapshot)
         then, self._once_planned = self._once_planned, None
@@ -243,12 +263,11 @@ class SetupPanel(QFrame):
 
     def _show_problem(self, problem: str) -> None:
         self._session.plan.problem = problem
-        self.problem.setText(problem)
-        self.problem.setVisible(bool(problem))
+        say(self.problem, problem)
         if problem:
-            self.page.preview.show_preview(None, problem)
+            self.preview.show_preview(None, problem)
             self.estimate.show_estimate(None)
-            self.page.show_warnings(())
+            self._show_warnings(())
 
     # --- what is shown ----------------------------------------------------------------
 
@@ -263,7 +282,7 @@ class SetupPanel(QFrame):
         kind = self.form.protocol
         if kind is not None:
             self.picker.show_protocol(kind)
-            self.page.about.setText(about(kind))
+            self.about.setText(about(kind))
         self._show_queue()
         self.plan_now()
 
@@ -286,25 +305,35 @@ class SetupPanel(QFrame):
         except TactileLabError as error:
             self._show_problem(str(error))
 
+    def _show_warnings(self, warnings: Sequence[str]) -> None:
+        """Show where the bench cannot deliver what is asked."""
+        say(self.warnings, "\n".join(f"⚠ {text}" for text in warnings[:WARNINGS]))
+        self.warnings.setToolTip("\n".join(warnings))
+
+    def _page(self) -> QScrollArea:
+        """The part that scrolls: what the run is, its force, its parameters."""
+        axes = label("mN against s", "small")
+        caption = row(label("WAVEFORM", "section"), STRETCH, axes, spacing=6)
+        inner, title = QWidget(), label("PARAMETERS", "section")
+        shown = (self.about, caption, self.preview, title, self.form, self.warnings)
+        inside = column(inner, *shown, STRETCH, spacing=9)
+        return with_gutter(scrolling(inner), inside)
+
     def _lay_out(self) -> None:
         self.help = IconButton(self._theme, "help", "Help on this panel")
         self._open = IconButton(self._theme, "folder", "Open a scene (Ctrl+O)")
         self._open.clicked.connect(self.scene_wanted)
         self._reset = IconButton(self._theme, "undo", "Reset to defaults")
         self._reset.clicked.connect(self.form.reset)
-        head = QHBoxLayout()
-        head.addWidget(label("Protocol", "title"))
-        head.addStretch(1)
-        head.addWidget(self.star)
-        head.addWidget(self._open)
-        head.addWidget(self._reset)
-        head.addWidget(self.help)
+        title = label("Protocol", "title")
+        head = row(title, STRETCH, self.star, self._open, self._reset, self.help)
         self.problem.hide()
+        page = self._page()
         parts = (
             head,
             self.picker,
             self.strip,
-            self.page,
+            page,
             self.problem,
             line(),
             self.estimate,
@@ -312,5 +341,5 @@ class SetupPanel(QFrame):
             self.queue,
             label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small"),
         )
-        whole = stack(self, parts, self.page)
-        whole.setContentsMargins(14, 10, 14 - BAR, 12)
+        whole = stack(self, parts, page)
+        whole.setContentsMargins(14, 10, 14 - SCROLL_BAR, 12)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QFrame, QWidget
 
 from gui.look.theme import Theme
 from gui.parts import (
+    STRETCH,
     Elided,
     IconButton,
     column,
@@ -54,28 +55,18 @@ class QueueCard(QFrame):
         self.parts: dict[str, QWidget] = {"card": self}
         whole = column(self, spacing=0)
         whole.setContentsMargins(10, 2, 2, 5)
-        top = row(0)
-        top.addWidget(Elided(item.title), 1)
+        top = row((Elided(item.title), 1), spacing=0)
         if editing:
             top.addWidget(label("editing", "pill"))
+        low, name = number < count - 1, item.title
         for icon, words, wanted, told in (
-            ("edit", "Edit {}", not editing, lambda: self.edited.emit(item)),
-            ("up", "Move {} up", number > 0, lambda: self.moved.emit(item, -1)),
-            (
-                "down",
-                "Move {} down",
-                number < count - 1,
-                lambda: self.moved.emit(item, 1),
-            ),
-            (
-                "close",
-                "Take {} out of the queue",
-                True,
-                lambda: self.removed.emit(item),
-            ),
+            ("edit", f"Edit {name}", not editing, lambda: self.edited.emit(item)),
+            ("up", f"Move {name} up", number > 0, lambda: self.moved.emit(item, -1)),
+            ("down", f"Move {name} down", low, lambda: self.moved.emit(item, 1)),
+            ("close", f"Take {name} out of the queue", True, self._take_out),
         ):
             if wanted:
-                button = IconButton(theme, icon, words.format(item.title))
+                button = IconButton(theme, icon, words)
                 button.clicked.connect(told)
                 self.parts[icon] = button
                 top.addWidget(button)
@@ -83,6 +74,9 @@ class QueueCard(QFrame):
                 top.addSpacing(BUTTON)
         whole.addLayout(top)
         whole.addWidget(Elided(cost, "small"))
+
+    def _take_out(self) -> None:
+        self.removed.emit(self.item)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """Edit the run."""
@@ -94,7 +88,7 @@ class QueueCard(QFrame):
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.edited.emit(self.item)
         elif event.key() == Qt.Key.Key_Delete:
-            self.removed.emit(self.item)
+            self._take_out()
         else:
             super().keyPressEvent(event)
 
@@ -112,21 +106,15 @@ class QueueView(QWidget):
         self._theme = theme
         self.cards: list[QueueCard] = []
         self._most = 1
-        whole = column(self, spacing=5)
-        head = QHBoxLayout()
-        head.addWidget(label("QUEUE", "section"))
-        head.addStretch(1)
         self._sum = label("", "small")
-        head.addWidget(self._sum)
-        whole.addLayout(head)
-        self.resume = push("Resume the queue")
-        self.resume.setToolTip("It is held since the last STOP or fault")
+        head = row(label("QUEUE", "section"), STRETCH, self._sum)
+        tip = "It is held since the last STOP or fault"
+        self.resume = push("Resume the queue", tip=tip)
         self.resume.clicked.connect(self.resumed)
-        whole.addWidget(self.resume)
         inner = QWidget()
         self._rows = column(inner, spacing=5)
         self._area = scrolling(inner)
-        whole.addWidget(self._area)
+        column(self, head, self.resume, self._area, spacing=5)
         self.show_queue([], held=False)
 
     def show_queue(

@@ -19,7 +19,7 @@ def test_inputs_are_set_for_all_that_follows(lab) -> None:
     card.offset.setText("0 V")
     card.coupling.setCurrentText("AC")
     inputs.use.click()
-    assert inputs.problem == ""
+    assert inputs.problem.text() == ""
     channel = next(c for c in session.bench.spec.scope.channels if c.signal == "V_C1")
     assert (channel.range, channel.offset, channel.coupling) == (5.0, 0.0, "AC")
     scene = window.setup.request().load()
@@ -35,12 +35,15 @@ def test_unusable_inputs_change_nothing_and_say_why(lab) -> None:
     inputs, before = window.review.manual.inputs, session.bench.spec
     inputs.cards[0].offset.setText("some volts")
     inputs.use.click()
-    assert "some volts" in inputs.problem
+    assert "some volts" in inputs.problem.text()
     inputs.cards[0].offset.setText("-2.5 V")
     inputs.cards[0].range.addItem("3 V", 3.0)
     inputs.cards[0].range.setCurrentIndex(inputs.cards[0].range.findData(3.0))
     inputs.use.click()
-    assert "3 V" in inputs.problem and "none of the scope's" in inputs.problem
+    assert (
+        "3 V" in inputs.problem.text()
+        and "none of the scope's" in inputs.problem.text()
+    )
     assert session.bench.spec is before and session.bench.overrides == ()
 
 
@@ -68,11 +71,11 @@ def test_a_current_that_is_set_while_the_source_opens_is_not_lost(lab) -> None:
     session = lab.session
     session.begin_manual()
     lab.window.render_state()
-    assert "opening" in lab.window.review.manual.doing
+    assert "opening" in lab.window.review.manual.force.text()
     session.manual.hold(0.05)
     lab.until(lambda: abs((session.coil_view().current or 0.0) - 0.05) < 2e-3)
     lab.window.render_state()
-    assert "read back" in lab.window.review.manual.doing
+    assert "read back" in lab.window.review.manual.force.text()
     session.stop("test is over")
     lab.until(lambda: not session.manual.alive)
     assert session.state is State.READY and session.coil_view().verified_off

@@ -64,7 +64,7 @@ def test_run_moves_lanes_and_gives_results(lab) -> None:
     assert source is not None and source.reach > 1.0
     assert not source.trace("V_C1", 0.0, 2.0, 500).empty
     assert [f.label for f in window.screen_.gathering.findings] == ["80 mN", "120 mN"]
-    assert window.review.results.mark.startswith("final")
+    assert window.review.results.mark.text().startswith("final")
     lab.until(lambda: window.header.stop.truth is Truth.OFF)
 
 
@@ -310,9 +310,9 @@ def test_cursors_are_readable_as_text(lab) -> None:
     window = lab.window
     window.centre.tools.toggle_cursors(True)
     window.centre.view.place_cursors(0.2, 0.7)
-    assert "500 ms" in window.centre.tools.readout
+    assert "500 ms" in window.centre.tools.readout.text()
     window.centre.tools.toggle_cursors(False)
-    assert window.centre.tools.readout == ""
+    assert window.centre.tools.readout.text() == ""
 
 
 def test_width_buttons_mark_what_is_seen(lab) -> None:
