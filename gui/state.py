@@ -112,7 +112,6 @@ class Snapshot:
         expected: run time expected, s; None if unknown.
         manual: the coil is driven by hand.
         fault: unacknowledged fault.
-        problem: why Run is off, "" if it is on.
     """
 
     state: State = State.DISCONNECTED
@@ -125,7 +124,6 @@ class Snapshot:
     expected: float | None = None
     manual: bool = False
     fault: Fault | None = None
-    problem: str = ""
 
 
 def truth(state: State, coil: CoilView | None) -> Truth:

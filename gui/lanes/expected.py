@@ -8,6 +8,7 @@ import numpy as np
 
 from gui.lanes.phase import Phase
 from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
 
 
@@ -27,6 +28,12 @@ class Hold:
     label: str
     pause: bool = False
     held: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, trial: Trial, start: float) -> Hold:
+        """A trial that starts at `start` s of the run."""
+        held = trial.hold and (start + trial.hold[0], start + trial.hold[1])
+        return cls(start, start + trial.length, trial.label, trial.pause, held)
 
 
 def starts(holds: list[Hold]) -> FloatArray:

@@ -33,10 +33,15 @@ NAMES = 14
 
 @dataclass
 class Options:
-    """What to draw besides the measured trace."""
+    """What all lanes have in common.
+
+    Attributes:
+        twin: draw what the model expects, too.
+        zoom_box: drag a box to zoom to, instead of the view.
+    """
 
     twin: bool = True
-    band: float = BAND
+    zoom_box: bool = False
 
 
 class LanePainter:
@@ -220,7 +225,7 @@ class LanePainter:
         paint.polyline(painter, frame.x(t), frame.y(f), line)
 
     def _tolerance(self, painter: QPainter, frame: Frame, tokens: Tokens) -> None:
-        half = self.options.band * self.lane.scale
+        half = BAND * self.lane.scale
         top, bottom = frame.y1(half), frame.y1(-half)
         painter.fillRect(
             QRectF(frame.left, top, frame.right - frame.left, bottom - top),

@@ -38,7 +38,6 @@ class LanePlot(QWidget):
         super().__init__()
         self.painter = LanePainter(lane, view, options)
         self.source = Source()
-        self.zoom_box = False
         self._view, self._theme = view, theme
         self._from: tuple[QPoint, float] | None = None
         self._to: QPoint | None = None
@@ -53,12 +52,17 @@ class LanePlot(QWidget):
         """Draw the lane and the zoom box."""
         painter = QPainter(self)
         self.painter.paint(painter, self.size(), self.source, self._theme.tokens)
-        if self.zoom_box and self._from is not None and self._to is not None:
+        if self._boxes and self._from is not None and self._to is not None:
             painter.setPen(Qt.GlobalColor.gray)
             a, b = self._from[0].x(), self._to.x()
             painter.drawRect(min(a, b), 1, abs(b - a), self.height() - 3)
         painter.end()
         self.painted.emit()
+
+    @property
+    def _boxes(self) -> bool:
+        """Whether dragging draws a box to zoom to."""
+        return self.painter.options.zoom_box
 
     def time_at(self, x: float) -> float:
         """Time under a pixel, s."""
@@ -91,7 +95,7 @@ class LanePlot(QWidget):
             self.setCursor(shape)
         elif self._cursor is not None:
             self._view.move_cursor(self._cursor, self.time_at(at.x()))
-        elif self.zoom_box:
+        elif self._boxes:
             self._to = at
             self.update()
         else:
@@ -102,7 +106,7 @@ class LanePlot(QWidget):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End of the drag."""
-        if self.zoom_box and self._from is not None and self._to is not None:
+        if self._boxes and self._from is not None and self._to is not None:
             a, b = self.time_at(self._from[0].x()), self.time_at(self._to.x())
             if abs(self._to.x() - self._from[0].x()) > 4:
                 self.box_zoomed.emit(min(a, b), max(a, b))

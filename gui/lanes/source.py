@@ -172,24 +172,14 @@ class PlanSource(Source):
     """No data yet: the plan and what the model expects of it."""
 
     running = True
+    length = 0.0
+    holds: list[Hold] = []  # noqa: RUF012
+    twin_spikes = NONE
 
     def __init__(self, preview: Preview) -> None:
         self.preview = preview
-
-    @property
-    def length(self) -> float:
-        """Of the plan, s."""
-        return self.preview.length
-
-    @property
-    def holds(self) -> list[Hold]:
-        """Of the plan."""
-        return self.preview.holds
-
-    @property
-    def twin_spikes(self) -> FloatArray:
-        """The model's."""
-        return self.preview.spikes
+        self.length, self.holds = preview.length, preview.holds
+        self.twin_spikes = preview.spikes
 
     def modelled(self, signal: str, start: float, end: float, count: int) -> Trace:
         """The model's."""

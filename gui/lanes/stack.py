@@ -31,7 +31,6 @@ class LaneStack(QFrame):
         self.rows: list[LaneRow] = []
         self.navigator = Navigator(view, theme)
         self.show_residual = True
-        self.zoom_box = False
         self._hidden: set[str] = {"coil_current"}  # the force lane says the same
         self._theme = theme
         self._layout = column(self, spacing=0)
@@ -86,7 +85,6 @@ class LaneStack(QFrame):
             if row.lane.key == "residual":
                 wanted = wanted and self.show_residual
             row.setVisible(wanted)
-            row.plot.zoom_box = self.zoom_box
             if wanted:
                 shown.append(row)
         for row in self.rows:

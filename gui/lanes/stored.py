@@ -45,6 +45,8 @@ class RunSource(Source):
     """
 
     spikes: FloatArray = np.empty(0)
+    length = reach = 0.0
+    holds: list[Hold] = []  # noqa: RUF012
 
     def __init__(self, path: Path) -> None:
         self._run = run = Run.load(path)
@@ -53,10 +55,10 @@ class RunSource(Source):
         self.model: Twin | None = None
         self.fetched = threading.Event()
         self._pyramids = {name: _pyramid(run.signal(name)) for name in run.signals}
-        self._length = max(run.duration, 1e-3)
+        self.length = self.reach = max(run.duration, 1e-3)
         self.spikes = run.spikes["time"].copy()
         self.trials = run.trials
-        self._holds = [_hold(trial) for trial in self.trials]
+        self.holds = [_hold(trial) for trial in self.trials]
         self.simulated = run.simulated
         self.moves_probes = _moves_probes(run)
         self._gain = float(run.attributes.get("newtons_per_ampere", 1.0)) or 1.0
@@ -72,21 +74,6 @@ class RunSource(Source):
         self._lock = threading.Lock()
         self._closed = False
         self._reader: threading.Thread | None = None
-
-    @property
-    def length(self) -> float:
-        """Of the run, s."""
-        return self._length
-
-    @property
-    def reach(self) -> float:
-        """All of it."""
-        return self._length
-
-    @property
-    def holds(self) -> list[Hold]:
-        """Its trials."""
-        return self._holds
 
     @property
     def loop(self) -> FloatArray:

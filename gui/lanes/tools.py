@@ -121,8 +121,7 @@ class Tools(QWidget):
             self.widths.choose(marked)
 
     def _box(self, on: bool) -> None:
-        self._stack.zoom_box = on
-        self._stack.arrange()
+        self._stack.options.zoom_box = on
 
     def _boxed(self, start: float, end: float) -> None:
         self.zoom.setChecked(False)

@@ -45,14 +45,12 @@ QLabel[role="error"] { color: $red; font-size: 12px; }
 QLabel[role="warning"] { color: $amber; font-size: 12px; }
 QLabel[role="big"] { font-size: 18px; font-weight: 600; }
 QLabel[role="bannertitle"] { color: $red; font-weight: 600; }
-QLabel[role="pill-ok"] { background: $green_soft; color: $green; border-radius: 9px;
-  padding: 2px 9px; font-size: 11px; font-weight: 600; }
-QLabel[role="pill-warn"] { background: $amber_soft; color: $amber; border-radius: 9px;
-  padding: 2px 9px; font-size: 11px; font-weight: 600; }
-QLabel[role="pill-bad"] { background: $red_soft; color: $red; border-radius: 9px;
-  padding: 2px 9px; font-size: 11px; font-weight: 600; }
-QLabel[role="pill"] { background: $selected; color: $selected_text; border-radius: 9px;
-  padding: 2px 9px; font-size: 11px; font-weight: 600; }
+QLabel[role^="pill"] { border-radius: 9px; padding: 2px 9px; font-size: 11px;
+  font-weight: 600; }
+QLabel[role="pill-ok"] { background: $green_soft; color: $green; }
+QLabel[role="pill-warn"] { background: $amber_soft; color: $amber; }
+QLabel[role="pill-bad"] { background: $red_soft; color: $red; }
+QLabel[role="pill"] { background: $selected; color: $selected_text; }
 QLabel[role="strip"] { background: $selected; color: $selected_text;
   border-radius: 6px; padding: 5px 9px; font-size: 12px; }
 QLabel[role="strip-warn"] { background: $amber_soft; color: $amber;

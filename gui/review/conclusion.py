@@ -24,7 +24,6 @@ class Concluded:
         tables: for people.
         plots: the protocol's own.
         calibration: file a field calibration wrote; None if there is none.
-        twin: results.json's table of the model beside the run; empty without one.
     """
 
     protocol: str
@@ -33,7 +32,6 @@ class Concluded:
     tables: tuple[Table, ...]
     plots: tuple[Plot, ...]
     calibration: Path | None
-    twin: dict[str, Any]
 
 
 def conclusion_of(folder: Path) -> Concluded:
@@ -57,7 +55,6 @@ def conclusion_of(folder: Path) -> Concluded:
             tables=tuple(_table(table) for table in found.get("tables", ())),
             plots=tuple(Plot.from_dict(plot) for plot in found.get("plots", ())),
             calibration=made if made.is_file() else None,
-            twin=found.get("twin") or {},
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunFolderError(

@@ -5,27 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gui.session.finding import Finding
+from tactile_lab.measurement import FloatArray, MeasuredTrial
 from tactile_lab.plot import Panel, Plot, Series
-
-FloatArray = NDArray[np.float64]
 
 
 def rate_plot(
-    findings: Sequence[Finding], model: Sequence[tuple[float, float]] = ()
+    trials: Sequence[MeasuredTrial], model: Sequence[tuple[float, float]] = ()
 ) -> Plot | None:
     """Peak and final rate of each step against its force; None before one fired.
 
     Args:
-        findings: the steps so far.
+        trials: the steps so far.
         model: force, N, and peak rate, Hz, of the model's steps.
     """
     steps = [
-        (f.level, f.peak_rate or 0.0, f.final_rate or 0.0)
-        for f in findings
-        if f.level is not None
+        (t.level, t.response.peak_rate or 0.0, t.response.final_rate or 0.0)
+        for t in trials
+        if t.level is not None
     ]
     if not any(peak for _, peak, _ in steps):
         return None

@@ -36,10 +36,12 @@ from gui.review.fit_view import FitCards, TwinBars
 from gui.review.live_plots import loop_plot, rate_plot
 from gui.review.plot_view import PlotView
 from gui.review.wording import unbroken
-from gui.session.finding import Finding
 from gui.session.fit import Fit
+from gui.session.steps import cells
 from tactile_lab.conclusion import Table
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.plot import Plot
+from tactile_lab.quantity import count
 from tactile_lab.trace import FloatArray
 
 HEAD, ROW, MOST = 52, 26, 12
@@ -68,7 +70,7 @@ class ResultsView(QWidget):
         self.loop.hide()
         self.answers: list[PlotView] = []
         """Of the report: the protocol's own plots."""
-        self._findings: Sequence[Finding] = ()
+        self._steps: Sequence[MeasuredTrial] = ()
         self._model: tuple[tuple[float, float], ...] = ()
         self._show_rates()
         self.cards = FitCards()
@@ -98,21 +100,21 @@ class ResultsView(QWidget):
         stack(self, (head, page), page, spacing=9)
         self._arrange()
 
-    def show_findings(
-        self, findings: Sequence[Finding], *, total: int, running: bool, whole: bool
+    def show_steps(
+        self, steps: Sequence[MeasuredTrial], *, total: int, running: bool, whole: bool
     ) -> None:
         """Show what the steps so far gave; `whole` is whether the run was completed."""
-        self._findings, self._model = tuple(findings), ()
+        self._steps, self._model = tuple(steps), ()
         self._show_rates()
-        self._fill(findings)
+        self._fill(steps)
         self._arrange()
-        self.mark.setVisible(bool(findings) or running)
-        steps = f"{len(findings)} step{'' if len(findings) == 1 else 's'}"
+        self.mark.setVisible(bool(steps) or running)
+        many = count(len(steps), "step")
         if running:
             of = f" of {total}" if total else ""
-            self.mark.setText(f"preliminary · {len(findings)}{of} steps")
+            self.mark.setText(f"preliminary · {len(steps)}{of} steps")
         else:
-            self.mark.setText(f"{'final' if whole else 'partial'} · {steps}")
+            self.mark.setText(f"{'final' if whole else 'partial'} · {many}")
         set_role(self.mark, "pill-ok" if whole and not running else "pill-warn")
 
     def show_fit(self, found: Fit | None) -> None:
@@ -158,12 +160,12 @@ class ResultsView(QWidget):
             else "No steps yet. Rate, onset, slope and adaptation\n"
             "are told here, step by step, as a run goes on."
         )
-        self.plot.show_plot(rate_plot(self._findings, self._model))
+        self.plot.show_plot(rate_plot(self._steps, self._model))
 
     @property
     def _levelled(self) -> bool:
         """Whether a step so far has a force it is filed under."""
-        return any(f.level is not None for f in self._findings)
+        return any(f.level is not None for f in self._steps)
 
     def _arrange(self) -> None:
         rates = self._fires and not self._loops
@@ -186,18 +188,18 @@ class ResultsView(QWidget):
         self._facts.setVisible(bool(text))
         self.report.setVisible(report)
 
-    def _fill(self, findings: Sequence[Finding]) -> None:
+    def _fill(self, steps: Sequence[MeasuredTrial]) -> None:
         table = self.table
-        if table.rowCount() > len(findings):
+        if table.rowCount() > len(steps):
             table.setRowCount(0)
-        for at in range(table.rowCount(), len(findings)):
+        for at in range(table.rowCount(), len(steps)):
             table.insertRow(at)
-            for where, text in enumerate(findings[at].cells()):
+            for where, text in enumerate(cells(steps[at])):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(RIGHT if where else LEFT)
                 table.setItem(at, where, item)
-        table.setMinimumHeight(HEAD + ROW * min(max(len(findings), 4), MOST))
-        if findings:
+        table.setMinimumHeight(HEAD + ROW * min(max(len(steps), 4), MOST))
+        if steps:
             table.scrollToBottom()
 
     def _set_up_table(self) -> None:

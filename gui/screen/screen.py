@@ -12,7 +12,7 @@ from gui.lanes.compare import Comparison
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.source import LiveSource, PlanSource, Source
 from gui.review.entries import Entry, entries
-from gui.review.gathering import Gathering
+from gui.review.run_results import RunResults
 from gui.screen.panels import Panels
 from gui.screen.records import Records
 from gui.session.form_plan import Planned
@@ -25,7 +25,7 @@ from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
-    from gui.session.agreement import Agreement
+    from gui.session.fit import Agreement
     from tactile_lab.acquisition.ending import Executed
 
 LATER = 1000
@@ -52,8 +52,8 @@ class Screen(QObject):
         super().__init__(panels.centre)
         self._panels = panels
         self.ending = ""
-        self.gathering = Gathering(panels.review.results, panels.session, self)
-        self.gathering.agreed.connect(self._agreed)
+        self.results = RunResults(panels.review.results, panels.session, self)
+        self.results.agreed.connect(self._agreed)
         self._modelled: Source | None = None
         self._ended: Path | None = None
         self._records = records = Records(panels.session, self)
@@ -67,9 +67,9 @@ class Screen(QObject):
         runs.again.connect(self._again)
         runs.compared.connect(records.compare)
         panels.centre.compare_bar.closed.connect(self.close_run)
-        panels.review.results.report_asked.connect(self.gathering.open_report)
+        panels.review.results.report_asked.connect(self.results.open_report)
         panels.review.export.clicked.connect(
-            lambda: self.gathering.open_folder(panels.session.out)
+            lambda: self.results.open_folder(panels.session.out)
         )
         timer = QTimer(self)
         timer.timeout.connect(self.compare_live)
@@ -172,7 +172,7 @@ class Screen(QObject):
 
     def leave_run(self) -> None:
         """Let go of what is from disk on screen."""
-        self.gathering.forget()
+        self.results.forget()
         if self._records.leave():
             self._panels.centre.compare_bar.show_comparison(None)
             self._panels.session.run.name = ""
@@ -205,12 +205,12 @@ class Screen(QObject):
             expectation = session.run.expectation
             steps = expectation.estimate.trials if expectation else 0
             searched = expectation is None or expectation.needs.detect_on is not None
-            self.gathering.begin(steps, fires=searched)
+            self.results.begin(steps, fires=searched)
         self.changed.emit()
 
     def trial_ended(self, outcome: Outcome) -> None:
         """Add a step to the results."""
-        self.gathering.step(outcome, self._panels.session.source)
+        self.results.step(outcome, self._panels.session.source)
 
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
@@ -218,7 +218,7 @@ class Screen(QObject):
         source = self._panels.session.source
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
-        self.gathering.end(done, source)
+        self.results.end(done, source)
         if (done.folder / DATA).exists():  # not where it ended before the first sample
             self._ended = done.folder
             self._records.exchange(done.folder)
@@ -226,14 +226,14 @@ class Screen(QObject):
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""
-        self.gathering.reported(folder, self.run or self._panels.session.source)
+        self.results.reported(folder, self.run or self._panels.session.source)
 
     def take_fetched(self) -> None:
         """Repaint where samples of a run on disk have been read."""
         if self.run is not None and self.run.take_fetched():
             if self.run.has_model and self._modelled is not self.run:
                 self._modelled = self.run
-                self.gathering.compare_with_model(self.run)
+                self.results.compare_with_model(self.run)
             self._panels.centre.refresh(self._lanes())
 
     def compare_live(self) -> None:
@@ -244,7 +244,7 @@ class Screen(QObject):
         session = self._panels.session
         live = session.state is State.RUNNING and session.run.probes == "circuit"
         if live and session.source is not None:
-            self.gathering.compare_with_model(session.source)
+            self.results.compare_with_model(session.source)
 
     # --- inside
 
@@ -288,7 +288,7 @@ class Screen(QObject):
         panels.centre.show_source(source, self._lanes())
         status = str(source.info.get("status"))
         self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
-        self.gathering.stored(source)
+        self.results.stored(source)
         self._show_stored(source)
         self.changed.emit()
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from tactile_lab.planning.plan import Plan
     from tactile_lab.scene.scene import Scene
     from tactile_lab.scene.tables import Record
-    from tactile_lab.trial import Trial
 
 MODELLED = ("V_C1", "V_C2", "V_K", "I_DS")
 SPACING = 1e-3
@@ -35,8 +34,6 @@ class Expectation:
         estimate: its cost.
         preview: what the model expects.
         warnings: where the bench cannot deliver what is asked.
-        leaves_out: (what, why).
-        assumptions: what the numbers rest on.
     """
 
     record: Record
@@ -44,8 +41,6 @@ class Expectation:
     estimate: Estimate
     preview: Preview
     warnings: tuple[str, ...]
-    leaves_out: tuple[tuple[str, str], ...]
-    assumptions: tuple[str, ...]
 
 
 def plan_request(engine: Engine, request: Request) -> Expectation:
@@ -68,8 +63,6 @@ def expect(scene: Scene) -> Expectation:
         estimate=made.estimate,
         preview=_preview(made),
         warnings=made.warnings,
-        leaves_out=made.leaves_out,
-        assumptions=made.assumptions,
     )
 
 
@@ -79,7 +72,7 @@ def _preview(made: Plan) -> Preview:
 
     drive, result = made.timeline, made.preview
     length = drive.duration + BASELINE
-    holds = [_hold(step.start + BASELINE, step.trial) for step in drive.steps]
+    holds = [Hold.of(step.trial, step.start + BASELINE) for step in drive.steps]
     force, none = drive.force.shifted(BASELINE), np.empty(0)
     if result is None:
         return Preview(force, {}, none, holds, length)
@@ -95,14 +88,6 @@ def _preview(made: Plan) -> Preview:
         traces[name] = (at + BASELINE, result.sample(name, at))
     spikes = none if result.spike_times is None else result.spike_times + BASELINE
     return Preview(force, traces, spikes, holds, length)
-
-
-def _hold(start: float, trial: Trial) -> Hold:
-    """A trial that starts at `start` s of the run."""
-    held = None
-    if trial.hold is not None:
-        held = start + trial.hold[0], start + trial.hold[1]
-    return Hold(start, start + trial.length, trial.label, trial.pause, held)
 
 
 def _around(spikes: np.ndarray, length: float) -> np.ndarray:

@@ -7,19 +7,19 @@ away from the window's thread.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gui.lanes.axis import number
+from gui.lanes.lane import BAND
 from gui.lanes.source import Source
-from gui.session.agreement import Agreement
-from gui.session.finding import Finding, finding
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.trace import FloatArray, Trace
 
 if TYPE_CHECKING:
@@ -33,6 +33,29 @@ FULL = 0.1
 
 FULL_TIME = 20e-3
 """Offset of spikes at which a bar is full, s."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well the model follows: measured V_C1 less the model's, root mean square.
+
+    Attributes:
+        error: over the range that was measured (NRMSE).
+        rms: V.
+    """
+
+    error: float
+    rms: float
+
+    @property
+    def text(self) -> str:
+        """The NRMSE as a percentage."""
+        return f"{100 * self.error:.1f} %"
+
+    @property
+    def in_step(self) -> bool:
+        """Whether the residual stays within its band, by and large."""
+        return self.rms <= BAND
 
 
 @dataclass(frozen=True)
@@ -112,12 +135,12 @@ def fit_input(source: Source) -> FitInput:
     )
 
 
-def fit_steps(engine: Engine, steps: tuple[Finding, ...], seen: FitInput) -> Fit:
+def fit_steps(engine: Engine, steps: tuple[MeasuredTrial, ...], seen: FitInput) -> Fit:
     """Fit steps, and compare what was seen with the model; in the engine."""
     return fit(steps, seen)
 
 
-def fit(findings: Sequence[Finding], seen: FitInput) -> Fit:
+def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
     """Fit the steps so far, and compare the run with the model."""
     steps = [f for f in findings if f.level is not None]
     model = [_modelled(f, seen.twin_spikes) for f in steps] if _has_model(seen) else []
@@ -129,7 +152,7 @@ def fit(findings: Sequence[Finding], seen: FitInput) -> Fit:
             _adaptation(steps, model),
             _fall(steps, model),
         )
-    points = tuple((f.level or 0.0, f.peak_rate or 0.0) for f in model)
+    points = tuple((f.level or 0.0, f.response.peak_rate or 0.0) for f in model)
     apart = {
         signal: found
         for signal, (measured, model_) in seen.voltages.items()
@@ -148,16 +171,17 @@ def _has_model(seen: FitInput) -> bool:
     )
 
 
-def _modelled(step: Finding, spikes: FloatArray) -> Finding:
-    inside = spikes[(spikes >= step.start) & (spikes < step.end)] - step.start
-    return finding(step.label, step.level, inside, step.hold, step.start, step.end)
+def _modelled(step: MeasuredTrial, spikes: FloatArray) -> MeasuredTrial:
+    end = step.start + step.duration
+    inside = spikes[(spikes >= step.start) & (spikes < end)] - step.start
+    return replace(step, spike_times=inside)
 
 
 def _card(
     name: str,
-    how: Callable[[Sequence[Finding]], tuple[str, str]],
-    steps: Sequence[Finding],
-    model: Sequence[Finding],
+    how: Callable[[Sequence[MeasuredTrial]], tuple[str, str]],
+    steps: Sequence[MeasuredTrial],
+    model: Sequence[MeasuredTrial],
 ) -> Card:
     try:
         value, spread = how(steps)
@@ -172,37 +196,37 @@ def _card(
     return Card(name, value, spread, beside)
 
 
-def _onset(steps: Sequence[Finding]) -> tuple[str, str]:
-    found = onset([f.level or 0.0 for f in steps], [f.spikes for f in steps])
+def _onset(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
+    found = onset([f.level or 0.0 for f in steps], [f.response.spikes for f in steps])
     low, high = found.silent * 1e3, found.fires * 1e3
     return f"{number(found.middle * 1e3, 0)} mN", f"{low:.4g} to {high:.4g} mN"
 
 
-def _slope(steps: Sequence[Finding]) -> tuple[str, str]:
-    rated = [f for f in steps if f.peak_rate is not None]
+def _slope(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
+    rated = [f for f in steps if f.response.peak_rate is not None]
     found = mean_slope(
-        [f.level or 0.0 for f in rated], [f.peak_rate or 0.0 for f in rated]
+        [f.level or 0.0 for f in rated], [f.response.peak_rate or 0.0 for f in rated]
     )
     half = (found.high - found.value) / 1e3
     return f"{number(found.value / 1e3, 3)} Hz/mN", f"± {number(half, 3)}"
 
 
-def _adaptation(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
+def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Card:
     """Of the newest step that lets it be told."""
     name, why = "Adaptation 1/|β|", "No step has fired."
     for at in range(len(steps) - 1, -1, -1):
         step = steps[at]
-        if step.hold is None or not step.spikes:
+        if step.hold is None or not step.response.spikes:
             continue
         try:
-            found = fit_adaptation(step.times, step.hold).time_constant
+            found = fit_adaptation(step.spike_times, step.hold).time_constant
         except NotIdentifiableError as reason:
             why = _capital(str(reason)) if why == "No step has fired." else why
             continue
         span = f"{found.low:.2g} to {found.high:.2g} s at {step.label}"
         beside = ""
         try:
-            own = fit_adaptation(model[at].times, step.hold) if model else None
+            own = fit_adaptation(model[at].spike_times, step.hold) if model else None
             if own is not None:
                 beside = f"model {own.time_constant.value:.2g} s"
         except NotIdentifiableError:
@@ -211,16 +235,16 @@ def _adaptation(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
     return Card(name, "—", why)
 
 
-def _fall(steps: Sequence[Finding], model: Sequence[Finding]) -> Card:
+def _fall(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Card:
     """Of the largest force that fired."""
-    fell = [at for at, step in enumerate(steps) if step.fall is not None]
+    fell = [at for at, step in enumerate(steps) if step.response.fall is not None]
     if not fell:
         return Card("Fall in the hold", "—", "No step has fired often enough.")
     at = max(fell, key=lambda number_: steps[number_].level or 0.0)
     text = f"at {steps[at].label}"
-    theirs = model[at].fall if model else None
+    theirs = model[at].response.fall if model else None
     beside = "" if theirs is None else f"model {100 * theirs:.0f} %"
-    value = f"{100 * (steps[at].fall or 0.0):.0f} %"
+    value = f"{100 * (steps[at].response.fall or 0.0):.0f} %"
     return Card("Fall in the hold", value, text, beside)
 
 

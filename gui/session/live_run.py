@@ -10,7 +10,6 @@ from PySide6.QtCore import Signal
 
 from gui.lanes.expected import Hold
 from gui.lanes.source import LiveSource
-from gui.session.agreement import Agreement
 from gui.session.live_task import LiveTask
 from gui.session.log import Level, Log
 from gui.session.status import Status
@@ -33,6 +32,7 @@ from tactile_lab.quantity import show
 
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
+    from gui.session.fit import Agreement
 
 LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
 
@@ -226,13 +226,7 @@ class LiveRun(LiveTask):
     def _trial_started(self, source: LiveSource, event: events.TrialStarted) -> None:
         trial, start = event.trial, event.start
         self.trial, self.probes = (event.index, trial.label), trial.probes
-        held = None
-        if trial.hold is not None:
-            held = start + trial.hold[0], start + trial.hold[1]
-        end = start + trial.length
-        source.begin_trial(
-            event.index, Hold(start, end, trial.label, trial.pause, held)
-        )
+        source.begin_trial(event.index, Hold.of(trial, start))
         what = "recovery" if trial.pause else trial.label
         words = f"Step {event.index + 1} · {what} started"
         self._log.add(Level.INFO, "runner", words)

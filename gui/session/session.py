@@ -242,7 +242,6 @@ class Session(QObject):
             expected=self.run.expected,
             manual=self.manual.alive,
             fault=self.status.fault,
-            problem=self.plan.problem,
         )
 
     def poll(self) -> bool:

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from gui.session.agreement import Agreement
-from gui.session.fit import FitInput, fit
+from gui.session.fit import Agreement, FitInput, fit
 from gui.state import Lamp
 from tactile_lab.trace import Trace
 
@@ -48,7 +47,7 @@ def test_a_run_is_compared_between_two_steps_too(lab) -> None:
     """The run of an hour has one step, which does not end."""
     lab.run()
     lab.until(lambda: lab.session.run.agreement is not None)
-    assert lab.window.screen_.gathering.findings == []
+    assert lab.window.screen_.results.steps == []
 
 
 def test_in_step_is_a_residual_within_its_band() -> None:

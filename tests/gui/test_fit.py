@@ -10,22 +10,29 @@ from PySide6.QtWidgets import QLabel
 from gui.lanes.readings import interval_text
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.wording import unbroken
-from gui.session.finding import Finding, finding
 from gui.session.fit import FitInput, fit
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.trace import Trace
 
 HOLD = (0.0, 2.0)
 
 
-def step(level: float, rate: float, number: int) -> Finding:
+def step(level: float, rate: float, number: int) -> MeasuredTrial:
     """A step at `level` N that fires evenly at `rate` Hz from 0.1 s on."""
     times = np.arange(0.1, 2.0, 1 / rate) if rate else np.empty(0)
     label = f"{1e3 * level:.0f} mN"
-    return finding(label, level, times, HOLD, 3.0 * number, 3.0 * number + 3.0)
+    return MeasuredTrial(
+        label=label,
+        level=level,
+        start=3.0 * number,
+        duration=3.0,
+        spike_times=times,
+        hold=HOLD,
+    )
 
 
 STEPS = [step(0.08, 0, 0), step(0.12, 5, 1), step(0.16, 10, 2), step(0.2, 15, 3)]
-TRAIN = np.concatenate([s.start + s.times for s in STEPS])
+TRAIN = np.concatenate([s.start + s.spike_times for s in STEPS])
 
 
 def seen(late: float = 0.0, off: float = 0.0) -> FitInput:

@@ -63,7 +63,7 @@ def test_run_moves_lanes_and_gives_results(lab) -> None:
     source = session.source
     assert source is not None and source.reach > 1.0
     assert not source.trace("V_C1", 0.0, 2.0, 500).empty
-    assert [f.label for f in window.screen_.gathering.findings] == ["80 mN", "120 mN"]
+    assert [f.label for f in window.screen_.results.steps] == ["80 mN", "120 mN"]
     assert window.review.results.mark.text().startswith("final")
     lab.until(lambda: window.header.stop.truth is Truth.OFF)
 

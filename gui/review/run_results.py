@@ -10,13 +10,14 @@ from PySide6.QtGui import QDesktopServices
 
 from gui.lanes.source import LiveSource, Source
 from gui.review.conclusion import conclusion_of
-from gui.review.fitting import Fitting
 from gui.review.results import ResultsView
-from gui.session.finding import Finding, facts_of, loss_text, of_outcome, of_run
-from gui.session.fit import Fit
+from gui.session.fit import Fit, FitInput, fit_input, fit_steps
 from gui.session.session import Session
+from gui.session.steps import facts_of, loss_text, of_outcome, of_run
 from tactile_lab.acquisition.events import RunState
+from tactile_lab.engine.engine import Reply
 from tactile_lab.errors import RunFolderError
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
@@ -24,11 +25,15 @@ if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
 
 
-class Gathering(QObject):
-    """Collects steps and keeps the results view up to date.
+class RunResults(QObject):
+    """Collects steps, has them fitted, and keeps the results view up to date.
+
+    Fits are made by the session's desk: in a thread of this process, they would take
+    more from the frames than their own time. One is on its way at a time; the newest
+    counts.
 
     Attributes:
-        findings: what each step gave.
+        steps: what each of them gave.
         folder: of the run on screen; None before it is on disk.
     """
 
@@ -37,32 +42,34 @@ class Gathering(QObject):
 
     def __init__(self, view: ResultsView, session: Session, parent: QObject) -> None:
         super().__init__(parent)
-        self.findings: list[Finding] = []
+        self.steps: list[MeasuredTrial] = []
         self.folder: Path | None = None
         self._view = view
         self._whole = False
         self._elsewhere = False
         self._total = 0
-        self._fitting = Fitting(session, self)
-        self._fitting.fitted.connect(self._show_fit)
+        self._desk = session.desk
+        self._asked = 0
+        self._fits = False
+        self._next: tuple[tuple[MeasuredTrial, ...], FitInput] | None = None
 
     def begin(self, steps: int, *, fires: bool) -> None:
         """A run of so many steps begins; `fires`: its spikes are looked for."""
-        self.findings, self.folder, self._whole = [], None, False
+        self.steps, self.folder, self._whole = [], None, False
         self._elsewhere = False
         self._total = steps
         self._view.show_kind(fires=fires)
         self._view.show_facts("", report=False)
         self._view.show_statements(())
         self._show(running=True)
-        self._fitting.ask((), None)
+        self._fit(None)
 
     def step(self, outcome: Outcome, source: LiveSource | None) -> None:
         """A step has ended."""
         self._elsewhere |= outcome.trial.probes != "circuit"
         found = of_outcome(outcome)
         if found is not None:
-            self.findings.append(found)
+            self.steps.append(found)
         self._show(running=True)
         self._fit(source)
         if source is not None:
@@ -90,7 +97,7 @@ class Gathering(QObject):
 
     def stored(self, source: RunSource) -> None:
         """A run from disk is on screen."""
-        self.findings, self.folder = of_run(source), source.path
+        self.steps, self.folder = of_run(source), source.path
         self._whole = source.info.get("status") == "complete"
         self._elsewhere = source.moves_probes
         self._view.show_kind(fires="spikes" in source.signals)
@@ -108,8 +115,9 @@ class Gathering(QObject):
         self._fit(source)
 
     def forget(self) -> None:
-        """The run is no longer on screen."""
-        self._fitting.forget()
+        """The run is no longer on screen; a fit on its way no longer counts."""
+        self._asked += 1
+        self._next = None
         self.agreed.emit(None)
 
     def _show_fit(self, found: Fit | None) -> None:
@@ -117,8 +125,31 @@ class Gathering(QObject):
         self.agreed.emit(None if found is None else found.agreement)
 
     def _fit(self, source: Source | None) -> None:
-        """Fit; with the probes elsewhere for a while there is nothing to compare."""
-        self._fitting.ask(self.findings, None if self._elsewhere else source)
+        """Fit the steps, and compare the run with the model beside it.
+
+        With the probes elsewhere for a while there is nothing to compare.
+        """
+        self._asked += 1
+        if source is None or self._elsewhere or len(source.members) > 1:
+            self._next = None
+            self._show_fit(None)
+            return
+        self._next = tuple(self.steps), fit_input(source)
+        self._fit_next()
+
+    def _fit_next(self) -> None:
+        """Have the newest fit made, unless one is on its way."""
+        if self._fits or self._next is None:
+            return
+        (steps, seen), self._next = self._next, None
+        self._fits, asked = True, self._asked
+        self._desk.ask(lambda reply: self._fitted(asked, reply), fit_steps, steps, seen)
+
+    def _fitted(self, asked: int, reply: Reply[Fit]) -> None:
+        self._fits = False
+        if asked == self._asked:
+            self._show_fit(reply.value)
+        self._fit_next()
 
     def open_report(self) -> None:
         """Open the report of the run on screen in the browser."""
@@ -137,8 +168,8 @@ class Gathering(QObject):
             self._view.show_statements(())  # reports of former versions have none
 
     def _show(self, *, running: bool) -> None:
-        self._view.show_findings(
-            self.findings, total=self._total, running=running, whole=self._whole
+        self._view.show_steps(
+            self.steps, total=self._total, running=running, whole=self._whole
         )
 
 

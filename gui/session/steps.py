@@ -1,0 +1,90 @@
+"""What the steps of a run gave, as the results show it; `measurement` computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gui.lanes.axis import number
+from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.quantity import show
+from tactile_lab.trial import Outcome
+
+if TYPE_CHECKING:
+    from gui.lanes.stored import RunSource
+
+
+def cells(step: MeasuredTrial) -> tuple[str, ...]:
+    """One row of the table of steps."""
+    found = step.response
+    return (
+        step.label,
+        str(found.spikes),
+        "—" if found.latency is None else number(found.latency * 1e3, 0),
+        "—" if found.peak_rate is None else number(found.peak_rate, 1),
+        "—" if found.final_rate is None else number(found.final_rate, 1),
+        "—" if found.fall is None else number(100 * found.fall, 0),
+    )
+
+
+def of_outcome(outcome: Outcome) -> MeasuredTrial | None:
+    """What a trial that has just ended gave; None for a pause."""
+    trial = outcome.trial
+    if trial.pause:
+        return None
+    return MeasuredTrial(
+        label=trial.label,
+        level=trial.level,
+        start=outcome.start,
+        duration=trial.length,
+        spike_times=outcome.spike_times,
+        hold=trial.hold,
+    )
+
+
+def of_run(source: RunSource) -> list[MeasuredTrial]:
+    """What each step of a run on disk gave."""
+    found = []
+    for row, hold in zip(source.trials, source.holds, strict=True):
+        if hold.pause:
+            continue
+        inside = (source.spikes >= hold.start) & (source.spikes < hold.end)
+        level = float(row["level"])
+        span = (float(row["hold_start"]), float(row["hold_end"]))
+        found.append(
+            MeasuredTrial(
+                label=hold.label,
+                level=level if level == level else None,
+                start=hold.start,
+                duration=hold.end - hold.start,
+                spike_times=source.spikes[inside] - hold.start,
+                hold=span if span[0] == span[0] else None,
+            )
+        )
+    return found
+
+
+def facts_of(source: RunSource) -> str:
+    """Statements on a run as a whole, as rich text."""
+    info = source.info
+    loss = info.get("loss") or {}
+    sim = "simulated" if source.simulated else "measured"
+    facts = [
+        f"<b>{source.path.name}</b> · {sim}",
+        str(info.get("coil") or "").partition(" | ")[0],
+        f"{show(float(info.get('sample_rate_Hz') or 0), 'S/s')} per channel.",
+    ]
+    facts.append(loss_text(loss))
+    return "<br>".join(fact for fact in facts if fact)
+
+
+def loss_text(loss: Mapping[str, Any]) -> str:
+    """What was lost, as far as it can be told."""
+    samples, spikes = loss.get("samples"), loss.get("spikes")
+    if samples is None:
+        return ""
+    also = "" if spikes is None else f", {spikes} spikes"
+    covered, streamed = loss.get("covered_s"), loss.get("streamed_s")
+    if covered is not None and streamed is not None:
+        also = f"; gaps by design, {covered:.4g} of {streamed:.4g} s covered"
+    return f"Loss: {samples} samples{also}."
