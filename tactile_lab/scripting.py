@@ -16,7 +16,6 @@ from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 from tactile_lab.scene.overrides import Overrides
 from tactile_lab.scene.scene import Scene
-from tactile_lab.signals import BENCH_ONLY
 from tactile_lab.store.catalogue import RunSummary, catalogue
 from tactile_lab.store.run import Run
 from tactile_lab.waveform import Waveform
@@ -165,12 +164,12 @@ def simulate(
             "A scene has a force of its own; give a Circuit with a Waveform, or a "
             "scene with changes of single keys."
         )
-    from tactile_lab.planning.preview import model
+    from tactile_lab.planning.preview import model, modelled
 
     scene = load(what, force)
     drive = timeline(scene, through_coil=False)
-    wanted = keep or [s for s in scene.record.signals if s not in BENCH_ONLY]
-    return model(scene, drive.force, drive.duration, list(wanted), tolerance)
+    wanted = keep or modelled(scene)
+    return model(scene, drive.force, drive.duration, wanted, tolerance)
 
 
 def runs(out: str | Path = "runs", *, protocol: str | None = None) -> list[RunSummary]:

@@ -52,7 +52,7 @@ class UsbtmcLink:
         backend: Any = None,
     ) -> None:
         self.vendor, self.product, self.serial = vendor, product, serial
-        self.timeout = timeout
+        self._milliseconds = max(1, round(timeout * 1e3))
         self._header_once = header_once
         self._backend = backend
         self._device: Any = None
@@ -122,12 +122,10 @@ class UsbtmcLink:
         except NotImplementedError:
             pass  # only Linux has kernel drivers that could be in the way
         usb.util.claim_interface(device, self._interface)
-        self._recovery = Recovery(device, self._interface, _endpoints(interface))
-        self._recovery.clear(self._milliseconds)
-
-    @property
-    def _milliseconds(self) -> int:
-        return max(1, round(self.timeout * 1e3))
+        self._recovery = Recovery(
+            device, self._interface, _endpoints(interface), self._milliseconds
+        )
+        self._recovery.clear()
 
     def write(self, line: str) -> None:
         """Send one line.
@@ -184,7 +182,7 @@ class UsbtmcLink:
     def clear(self) -> None:
         """Have the instrument forget what it was told and wanted to answer."""
         with translating(self.name, self.vendor):
-            self._opened().clear(self._milliseconds)
+            self._opened().clear()
 
     def close(self) -> None:
         """Let go of the instrument; idempotent, also when it is gone."""
@@ -262,13 +260,13 @@ class UsbtmcLink:
         """Bring the link back in step after a failed transfer, if it is still there."""
         with translating(self.name, self.vendor):
             if is_timeout(error):
-                abort(self._tag, self._milliseconds)
+                abort(self._tag)
             elif not is_gone(error):
-                self._opened().clear(self._milliseconds)
+                self._opened().clear()
 
     def _abort_in(self, tag: int) -> None:
         with translating(self.name, self.vendor):
-            self._opened().abort_in(tag, self._milliseconds)
+            self._opened().abort_in(tag)
 
     def _opened(self) -> Recovery:
         if self._recovery is None:

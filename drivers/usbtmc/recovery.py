@@ -26,70 +26,56 @@ class Recovery:
         device: pyusb device.
         interface: its number.
         endpoints: bulk-out and bulk-in.
+        milliseconds: longest wait for one request.
     """
 
-    def __init__(self, device: Any, interface: int, endpoints: tuple[Any, Any]) -> None:
+    def __init__(
+        self,
+        device: Any,
+        interface: int,
+        endpoints: tuple[Any, Any],
+        milliseconds: int,
+    ) -> None:
         self._device = device
         self._interface = interface
+        self._milliseconds = milliseconds
         self.bulk_out = int(endpoints[0].bEndpointAddress)
         self.bulk_in = int(endpoints[1].bEndpointAddress)
         self.packet = int(endpoints[1].wMaxPacketSize)
 
-    def abort_out(self, tag: int, milliseconds: int) -> None:
+    def abort_out(self, tag: int) -> None:
         """Abort what is being sent; clear everything where that is refused."""
-        self._abort(
-            (_INITIATE_ABORT_BULK_OUT, _CHECK_ABORT_BULK_OUT), self.bulk_out, tag,
-            milliseconds,
-        )  # fmt: skip
+        self._abort(_INITIATE_ABORT_BULK_OUT, _CHECK_ABORT_BULK_OUT, self.bulk_out, tag)
         self._device.clear_halt(self.bulk_out)
 
-    def abort_in(self, tag: int, milliseconds: int) -> None:
+    def abort_in(self, tag: int) -> None:
         """Abort what is being answered; clear everything where that is refused."""
-        self._abort(
-            (_INITIATE_ABORT_BULK_IN, _CHECK_ABORT_BULK_IN), self.bulk_in, tag,
-            milliseconds,
-        )  # fmt: skip
+        self._abort(_INITIATE_ABORT_BULK_IN, _CHECK_ABORT_BULK_IN, self.bulk_in, tag)
 
-    def _abort(
-        self, requests: tuple[int, int], endpoint: int, tag: int, milliseconds: int
-    ) -> None:
-        initiate, check = requests
+    def _abort(self, initiate: int, check: int, endpoint: int, tag: int) -> None:
+        inwards = endpoint == self.bulk_in
         try:
-            status = self._control(
-                _TO_ENDPOINT, initiate, tag, endpoint, 2, milliseconds
-            )[0]
-            if status == _SUCCESS:
-                if endpoint == self.bulk_in:
+            if self._control(_TO_ENDPOINT, initiate, tag, endpoint, 2)[0] == _SUCCESS:
+                if inwards:
                     self._flush()
-                self._until_done(
-                    _TO_ENDPOINT, check, endpoint, 8, milliseconds,
-                    flush=endpoint == self.bulk_in,
-                )  # fmt: skip
+                self._until_done(_TO_ENDPOINT, check, endpoint, 8, flush=inwards)
                 return
         except usb.core.USBError as error:
             if not is_stall(error):
                 raise
         # nothing in progress, or aborting is not known: start afresh
-        self.clear(milliseconds)
+        self.clear()
 
-    def clear(self, milliseconds: int) -> None:
+    def clear(self) -> None:
         """Empty both directions and un-halt.
 
         Raises:
             NoReplyError: the instrument stays busy clearing.
         """
+        number = self._interface
         try:
-            self._control(
-                _TO_INTERFACE, _INITIATE_CLEAR, 0, self._interface, 1, milliseconds
-            )
-            self._until_done(
-                _TO_INTERFACE,
-                _CHECK_CLEAR,
-                self._interface,
-                2,
-                milliseconds,
-                flush=True,
-            )
+            self._control(_TO_INTERFACE, _INITIATE_CLEAR, 0, number, 1)
+            self._until_done(_TO_INTERFACE, _CHECK_CLEAR, number, 2, flush=True)
         except usb.core.USBError as error:
             if not is_stall(error):
                 raise
@@ -97,11 +83,10 @@ class Recovery:
         self._device.clear_halt(self.bulk_in)
 
     def _until_done(
-        self, kind: int, check: int, index: int, length: int, milliseconds: int, *,
-        flush: bool,
-    ) -> None:  # fmt: skip
+        self, kind: int, check: int, index: int, length: int, *, flush: bool
+    ) -> None:
         for _ in range(_MOST_CHECKS):
-            reply = self._control(kind, check, 0, index, length, milliseconds)
+            reply = self._control(kind, check, 0, index, length)
             if reply[0] != _PENDING:
                 return
             if flush and reply[1] & 1:
@@ -123,10 +108,9 @@ class Recovery:
                 raise
 
     def _control(
-        self, kind: int, request: int, value: int, index: int, length: int,
-        milliseconds: int,
-    ) -> bytes:  # fmt: skip
+        self, kind: int, request: int, value: int, index: int, length: int
+    ) -> bytes:
         reply = self._device.ctrl_transfer(
-            kind, request, value, index, length, milliseconds
+            kind, request, value, index, length, self._milliseconds
         )
         return bytes(reply) or b"\0"

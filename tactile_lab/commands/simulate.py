@@ -45,16 +45,16 @@ def command(
     Opens no bench and writes nothing: no coil, calibration or limit applies.
     """
     with refusing():
-        from tactile_lab.planning.preview import model
+        from tactile_lab.planning.preview import model, modelled
         from tactile_lab.planning.timeline import timeline
         from tactile_lab.scene.load import load
-        from tactile_lab.signals import BENCH_ONLY
 
         loaded = load(scene, overrides, bench)
         drive = timeline(loaded, through_coil=False)
-        keep = [name for name in loaded.record.signals if name not in BENCH_ONLY]
         with working("solving the model"):
-            result = model(loaded, drive.force, drive.duration, keep, tolerance)
+            result = model(
+                loaded, drive.force, drive.duration, modelled(loaded), tolerance
+            )
         report = answer(loaded, result, samples)
     if as_json:
         for text in report["warnings"]:
@@ -90,12 +90,12 @@ def answer(scene: Scene, result: Result, samples: int | None) -> dict[str, Any]:
 def _sampled(scene: Scene, result: Result, samples: int) -> dict[str, list[float]]:
     import numpy as np
 
-    from tactile_lab.signals import BENCH_ONLY
+    from tactile_lab.planning.preview import modelled
 
     times = np.linspace(0.0, result.duration, samples)
     found = {"time_s": times.tolist()}
-    for name in scene.record.signals:
-        if name not in BENCH_ONLY and name != "spikes":
+    for name in modelled(scene):
+        if name != "spikes":
             found[name] = result.sample(name, times).tolist()
     return found
 

@@ -145,12 +145,11 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
 
 
 def _model(scene: Scene, drive: Timeline) -> Result | None:
-    keep = [name for name in scene.record.signals if name not in BENCH_ONLY]
-    if not keep:
+    if set(scene.record.signals) <= BENCH_ONLY:
         return None
-    from tactile_lab.planning.preview import model
+    from tactile_lab.planning.preview import model, modelled
 
-    return model(scene, drive.force, drive.duration, keep)
+    return model(scene, drive.force, drive.duration, modelled(scene))
 
 
 def _clipped(scene: Scene, needed: Needs, result: Result) -> tuple[str, ...]:

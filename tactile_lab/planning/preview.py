@@ -6,9 +6,15 @@ from collections.abc import Sequence
 
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.scene.scene import Scene
+from tactile_lab.signals import BENCH_ONLY
 from tactile_lab.waveform import Waveform
 
 DEFAULT_TOLERANCE = 1e-9
+
+
+def modelled(scene: Scene) -> list[str]:
+    """Recorded signals that the model knows."""
+    return [name for name in scene.record.signals if name not in BENCH_ONLY]
 
 
 def model(

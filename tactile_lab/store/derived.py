@@ -42,14 +42,10 @@ def table(
     names = (signals,) if isinstance(signals, str) else tuple(signals)
     stored = tuple(name for name in names if name not in DERIVED)
     axis = stored or run.signals[:1]
-    pieces = list(Selection(signals=axis, start=start, end=end, rate=rate).pieces(run))
-    if not pieces:
-        return np.empty(0), {name: np.empty(0) for name in names}
-    time = np.concatenate([times for times, _ in pieces])
-    read = {
-        name: np.concatenate([columns[i] for _, columns in pieces])
-        for i, name in enumerate(axis)
-    }
+    part = Selection(signals=axis, start=start, end=end, rate=rate)
+    time, read = part.read(run)
+    if not time.size:
+        return time, dict.fromkeys(names, time)
     return time, {
         name: _derived(run, name, time) if name in DERIVED else read[name]
         for name in names
@@ -77,10 +73,8 @@ def drain_current_of(run: Run) -> DrainCurrent:
     from tactile_lab.store.export.selection import Selection
 
     step = max(STEP, run.signal("V_C1").interval)
-    pieces = list(Selection(signals=("V_C1",), rate=1 / step).pieces(run))
-    time = np.concatenate([times for times, _ in pieces]) if pieces else np.empty(0)
-    V_C1 = np.concatenate([v for _, (v,) in pieces]) if pieces else np.empty(0)
-    circuit = run.scene.circuit
+    time, read = Selection(signals=("V_C1",), rate=1 / step).read(run)
+    V_C1, circuit = read["V_C1"], run.scene.circuit
     even = np.abs(np.diff(time) - np.median(np.diff(time))) < 0.01 * step
     edges = np.flatnonzero(~even) + 1  # gaps, and last means of fewer samples
     parts = [

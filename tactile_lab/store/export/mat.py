@@ -34,7 +34,6 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
             f"{count:.3g} samples per signal are more than a MAT file holds "
             f"({LARGEST // 8:.3g}). Choose a part with --from and --until, or --rate."
         )
-    pieces = list(selection.pieces(run)) if names else []
     content: dict[str, Any] = {
         "info": {
             "run": run.path.resolve().name,
@@ -42,14 +41,12 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
             "simulated": run.simulated,
         }
     }
-    if pieces:
-        content["time"] = np.concatenate([times for times, _ in pieces])
-    for number, name in enumerate(names):
-        values = [columns[number] for _, columns in pieces] or [np.empty(0)]
-        content[name] = {
-            "values": np.concatenate(values).astype(np.float32),
-            "unit": run.signal(name).unit,
-        }
+    time, read = selection.read(run)
+    if time.size:
+        content["time"] = time
+    for name, values in read.items():
+        unit = run.signal(name).unit
+        content[name] = {"values": values.astype(np.float32), "unit": unit}
     for name in ("gaps", "spikes", "current", "field"):
         rows = selection.rows(getattr(run, name))
         content[name] = {column: rows[column] for column in rows.dtype.fields or ()}

@@ -112,6 +112,15 @@ class Selection:
                     [_averaged(signal[at:stop], count) for signal in signals],
                 )
 
+    def read(self, run: Run) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """Times, s, and the SI values of each signal there, all at once."""
+        pieces = list(self.pieces(run))
+        none = [np.empty(0)]
+        return np.concatenate([times for times, _ in pieces] or none), {
+            name: np.concatenate([columns[i] for _, columns in pieces] or none)
+            for i, name in enumerate(self.names(run))
+        }
+
 
 def _averaged(values: FloatArray, count: int) -> FloatArray:
     """Means of each `count` values; the last may have fewer."""
