@@ -198,8 +198,8 @@ class StoredSignal:
         one, other, mean = (v * self.gain + self.offset for v in (one, other, mean))
         # a negative gain turns smallest into largest
         least, most = np.minimum(one, other), np.maximum(one, other)
-        gap = np.isin(edges, late)
-        gap[0] = True
+        gap = np.zeros(edges.size, np.bool_)
+        gap[np.searchsorted(edges, late)] = gap[0] = True
         time = self.axis.time_of(starts)
         return Trace(time, least, most, mean, gap, width, self.name, self.unit)
 
@@ -211,20 +211,20 @@ class StoredSignal:
         Returns:
             First sample of each, and the bins.
         """
-        number = first + np.arange(len(bins))
+        starts = np.arange(first * BIN, (first + len(bins)) * BIN, BIN)
         cuts = self.axis.first[self.axis.first % BIN > 0]
         cuts = cuts[(cuts > first * BIN) & (cuts < self._length)]
-        cuts = np.unique(cuts[cuts < (first + len(bins)) * BIN])
+        cuts = cuts[cuts < (first + len(bins)) * BIN]
         if cuts.size == 0:
-            return number * BIN, bins
-        torn = np.unique(cuts // BIN)
-        starts = np.union1d(torn * BIN, cuts)
+            return starts, bins
+        torn = np.unique(cuts // BIN) * BIN
+        kept = ~np.isin(starts, torn)
+        begins = np.union1d(torn, cuts)
         stops = np.minimum(
-            np.append(starts[1:], self._length), (starts // BIN + 1) * BIN
+            np.append(begins[1:], self._length), (begins // BIN + 1) * BIN
         )
-        parts = self._parts(starts, stops, bins.dtype)
-        kept = ~np.isin(number, torn)
-        starts = np.concatenate([number[kept] * BIN, starts])
+        parts = self._parts(begins, stops, bins.dtype)
+        starts = np.concatenate([starts[kept], begins])
         order = np.argsort(starts)
         return starts[order], np.concatenate([bins[kept], parts])[order]
 
