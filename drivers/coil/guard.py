@@ -152,12 +152,15 @@ def guard_settings(
     """Everything the guard process needs to know, as plain data."""
     end = wire.send_end
     lines = [*row.stop_lines, row.set_line(0.0), *row.off]
+    # somebody may have put the source under its front panel's control
+    again = [*row.optional, *lines]
     return {
         "owner": os.getpid(),
         "silence": SILENCE,
         "port": port,
         "settings": port_settings(port, wire),
         "send": wire.preamble + end + end.join(lines) + end,
+        "again": wire.preamble + end + end.join(again) + end,
         "query": row.on_query + end,
         "reply_end": wire.reply_end,
         "off_match": row.off_match,

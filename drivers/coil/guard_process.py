@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import select
 import signal
 import sys
 import threading
@@ -29,6 +30,9 @@ RETRY = 0.005
 
 MOST_LINES = 12
 """Lines to read for an answer; echoes and late answers may come before it."""
+
+LOOK = 0.02
+"""Shortest wait between two looks at what the owner said, s."""
 
 STALL = 0.2
 """Lateness of the guard's own waking that excuses one silence, s."""
@@ -57,6 +61,11 @@ class OwnerPipe:
             self.ended = True
             self.changed.notify()
 
+    @property
+    def waiting(self) -> bool:
+        """Whether there is something that this busy process has not come to read."""
+        return os.name == "posix" and bool(select.select([0], [], [], 0)[0])
+
     def _heard(self, word: bytes) -> None:
         if word in (ARM, DISARM):
             self.armed = word == ARM
@@ -77,10 +86,10 @@ def wait_for_danger(owner: OwnerPipe, silence: float) -> str | None:
             if owner.ended:
                 return "the owner died" if owner.armed else None
             left = owner.last + silence - time.monotonic()
-            if owner.armed and left <= 0:
+            if owner.armed and left <= 0 and not owner.waiting:
                 return f"the owner was silent for {silence:g} s"
             asked = time.monotonic()
-            timeout = left if owner.armed else None
+            timeout = max(left, LOOK) if owner.armed else None
             owner.changed.wait(timeout)
             if timeout is not None and time.monotonic() - asked > timeout + STALL:
                 owner.last = time.monotonic()  # it was this process that slept
@@ -109,10 +118,11 @@ def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> 
     """Send and verify output-off, again and again while patience lasts."""
     give_up = time.monotonic() + PATIENCE
     reasons: set[str] = set()
+    lines = "send"
     while time.monotonic() < give_up:
         try:
             with port:
-                port.write(told["send"].encode("ascii"))
+                port.write(told[lines].encode("ascii"))
                 port.write(told["query"].encode("ascii"))
                 answers = []
                 for _ in range(MOST_LINES):
@@ -126,6 +136,7 @@ def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> 
                     answers.append(text)
                 raise OSError(f"not verified off, it answers {answers}")
         except Exception as reason:  # whatever it is, the output may still be on
+            lines = "again"
             if str(reason) not in reasons:
                 reasons.add(str(reason))
                 log.write(f"trying again: {reason}")

@@ -172,9 +172,12 @@ class CoilWire(Conversation[CoilDialect]):
         row = self.dialect
         steps = (*row.stop_lines, row.set_line(0.0), *row.off)
         current: float | None = None
+        disobeys = False
         for left in reversed(range(VERIFICATIONS)):
             if not self.reconnected(trouble, RECONNECT):
                 break
+            if disobeys:  # somebody may have put it under its front panel's control
+                self.offer(row.optional)
             taken = self.insist(steps, trouble)
             self.link.pause(SETTLE)
             try:
@@ -190,7 +193,7 @@ class CoilWire(Conversation[CoilDialect]):
                     continue  # off, but the set-point may be another than 0 A
                 text = f"Output off, {show(current, 'A')} read back."
                 return OffReport(True, current, text + ("" if taken else DOUBT))
-            state = "on" if on else "off"
+            disobeys, state = True, "on" if on else "off"
             trouble.append(f"read-back: output {state}, {show(current, 'A')}")
         return OffReport(False, current, UNKNOWN + " | ".join(dict.fromkeys(trouble)))
 

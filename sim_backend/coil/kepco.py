@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric, one_of
-from sim_backend.serial_line.scpi import Handler, boolean, number
+from sim_backend.serial_line.scpi import Handler, ScpiError, boolean, number
 
 
 def _digits(line: bytes) -> bytes:
@@ -25,6 +25,17 @@ def _commands(source: CoilPanel) -> dict[str, Handler]:
 
     def remote(argument: str) -> None:
         source.remote = boolean(argument)
+        source.local = source.local and not source.remote
+
+    def remotely(act: Handler) -> Handler:
+        """What is refused while the front panel has the source."""
+
+        def run(argument: str) -> str | None:
+            if source.local:
+                raise ScpiError(-221, "Settings conflict")
+            return act(argument)
+
+        return run
 
     return {
         "*IDN?": lambda _: "KEPCO,BIT 4886 20-05,E123456,3.05-1.83",
@@ -34,11 +45,13 @@ def _commands(source: CoilPanel) -> dict[str, Handler]:
         "SYSTem:REMote?": lambda _: str(int(source.remote)),
         "FUNCtion:MODE": one_of(mode, "CURRent", "VOLTage"),
         "FUNCtion:MODE?": lambda _: str(int(source.current_mode)),
-        "[SOURce:]CURRent[:LEVel]": numeric(source.set_current, -amperes, amperes),
+        "[SOURce:]CURRent[:LEVel]": remotely(
+            numeric(source.set_current, -amperes, amperes)
+        ),
         "[SOURce:]CURRent[:LEVel]?": lambda _: f"{source.setpoint:.5f}",
         "[SOURce:]VOLTage[:LEVel]": numeric(source.set_compliance, 0.0, volts),
         "[SOURce:]VOLTage[:LEVel]?": lambda _: f"{source.compliance:.3f}",
-        "OUTPut[:STATe]": lambda argument: source.switch(boolean(argument)),
+        "OUTPut[:STATe]": remotely(lambda argument: source.switch(boolean(argument))),
         "OUTPut[:STATe]?": lambda _: str(int(source.output_on)),
         "MEASure[:SCALar]:CURRent?": lambda _: f"{source.measured_current():.5f}",
         "MEASure[:SCALar]:VOLTage?": lambda _: f"{source.measured_voltage():.4f}",

@@ -51,6 +51,8 @@ class CoilPanel:
         self.output_on = False
         self.current_mode = True
         self.remote = False
+        self.local = False
+        """A person took it to its front panel: the wire may not set it."""
         self.errors: deque[tuple[int, str]] = deque()
         self.list = ListPlayer(clock, self.drive)
         if output_on:

@@ -96,6 +96,18 @@ def test_refuses_to_set_with_the_output_off(bench):
         coil.set_current(0.1)
 
 
+def test_a_source_that_a_person_took_to_its_front_panel_is_switched_off(serial_bench):
+    serial_bench.coil.open()
+    serial_bench.coil.energise()
+    serial_bench.drive(0.3)
+    serial_bench.source.local = True
+    with pytest.raises(InstrumentError, match="-221"):
+        serial_bench.drive(0.4)
+    report = serial_bench.coil.safe_off()
+    assert report.verified, report.text
+    assert not serial_bench.source.output_on and not serial_bench.source.local
+
+
 def test_safe_off_ramps_and_verifies_and_may_be_repeated(bench):
     clock, _plant, far, coil = bench
     coil.open()

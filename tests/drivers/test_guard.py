@@ -131,6 +131,41 @@ def test_off_after_the_owner_is_killed(served, owner, tmp_path):
     assert "the owner died" in log_of(tmp_path)
 
 
+def test_off_though_a_person_took_the_source_to_its_front_panel(
+    served, owner, tmp_path
+):
+    source, _ = served
+    process = owner()
+    source.local = True
+    process.kill()
+    wait_until_off(source)
+    assert source.setpoint == 0.0
+    assert "output verified off" in log_of(tmp_path)
+
+
+STARVED = """
+import os, threading, time
+from drivers.coil import guard_process as guard
+read, write = os.pipe()
+os.dup2(read, 0)
+owner = guard.OwnerPipe()
+owner.armed, owner.last = True, time.monotonic() - 0.55
+os.write(write, guard.BEAT)  # it came while this process did not run
+threading.Timer(0.02, owner.listen).start()
+threading.Timer(0.2, os.write, (write, guard.QUIT)).start()
+print(guard.wait_for_danger(owner, 0.5), flush=True)
+os._exit(0)
+"""
+
+
+def test_an_owner_whose_beats_wait_to_be_read_is_not_hung():
+    """A guard that was itself starved kills no healthy run."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    asked = [sys.executable, "-c", STARVED]
+    done = subprocess.run(asked, capture_output=True, text=True, env=environment)
+    assert done.stdout == "None\n", done.stdout + done.stderr
+
+
 def test_a_hung_owner_is_killed_first(served, owner, tmp_path):
     source, _ = served
     process = owner(silence=SILENCE)
