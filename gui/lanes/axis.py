@@ -42,6 +42,12 @@ def number(value: float, places: int) -> str:
     return printed(text)
 
 
+def numbers(low: float, high: float, at_most: int) -> list[tuple[float, str]]:
+    """Round values in [low, high], ascending, and how they are written on an axis."""
+    places = decimals(step_of(high - low, at_most))
+    return [(value, number(value, places)) for value in ticks(low, high, at_most)]
+
+
 def signed(value: float, places: int) -> str:
     """A difference: with its sign, unless it is zero to so many places."""
     text = number(value, places)

@@ -42,7 +42,11 @@ class Comparison(Source):
 
     Attributes:
         layout: how they share a lane.
+        first: the reference.
     """
+
+    holds: list[Hold] = []  # noqa: RUF012
+    spikes: FloatArray = np.empty(0)
 
     def __init__(self, members: list[Member]) -> None:
         self._members = members
@@ -50,17 +54,14 @@ class Comparison(Source):
         # what every one of the runs stored has a lane
         common = set.intersection(*(set(m.source.signals) for m in members))
         self.signals = tuple(common)
+        self.first = members[0].source
+        self.holds, self.spikes = self.first.holds, self.first.spikes
         self.simulated = any(member.source.simulated for member in members)
 
     @property
     def members(self) -> list[Member]:
         """The runs, shifted as they were aligned."""
         return self._members
-
-    @property
-    def first(self) -> Source:
-        """The reference."""
-        return self.members[0].source
 
     @property
     def reach(self) -> float:
@@ -71,16 +72,6 @@ class Comparison(Source):
     def length(self) -> float:
         """End of the longest, s."""
         return self.reach
-
-    @property
-    def holds(self) -> list[Hold]:
-        """Of the reference."""
-        return self.first.holds
-
-    @property
-    def spikes(self) -> FloatArray:
-        """Of the reference."""
-        return self.first.spikes
 
     def measured(self, signal: str, start: float, end: float, count: int) -> Trace:
         """Of the reference."""

@@ -9,7 +9,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from gui.lanes import paint
-from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.axis import numbers
 from gui.lanes.expected import Hold
 from gui.lanes.paint import Frame
 from gui.lanes.source import Source
@@ -96,19 +96,17 @@ def _names(
 
 def _value_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
     rows = max(2, int((frame.bottom - frame.top) / 21))
-    values = ticks(frame.low, frame.high, rows)
-    if len(values) < 2:  # one number alone says nothing of the scale
-        rows = 5
-        values = ticks(frame.low, frame.high, rows)
-    step = step_of(frame.high - frame.low, rows)
-    places = decimals(step)
-    values = _apart(values, abs(frame.y1(step) - frame.y1(0.0)))
-    heights = [round(frame.y1(value)) + 0.5 for value in values]
+    found = numbers(frame.low, frame.high, rows)
+    if len(found) < 2:  # one number alone says nothing of the scale
+        found = numbers(frame.low, frame.high, 5)
+    heights = [round(frame.y1(value)) + 0.5 for value, _ in found]
+    if len(found) > 2 and abs(frame.y1(found[1][0]) - frame.y1(found[0][0])) < LINE:
+        # told beside each other, they would overlap: both ends
+        found, heights = [found[0], found[-1]], [heights[0], heights[-1]]
     painter.setPen(paint.pen(tokens.grid))
     painter.drawLines([QLineF(frame.left, y, frame.right, y) for y in heights])
-    for value, y in zip(values, heights, strict=True):
+    for (_, words), y in zip(found, heights, strict=True):
         if frame.top + 1 <= y <= frame.bottom + 1:
-            words = number(value, places)
             paint.write(painter, QPointF(AXIS - 8, y), words, tokens.muted, align=1.0)
     painter.setPen(paint.pen(tokens.border_strong))
     painter.drawLine(
@@ -116,25 +114,16 @@ def _value_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
     )
 
 
-def _apart(values: list[float], pixels: float) -> list[float]:
-    """Of ticks `pixels` apart, those that can be told beside each other; both ends."""
-    if pixels >= LINE or len(values) < 2:
-        return values
-    return [values[0], values[-1]]
-
-
 def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens, place: Place) -> None:
     most = max(2, int((frame.right - frame.left) / 90))
-    step = step_of(frame.end - frame.start, most)
-    places = decimals(step)
-    values = ticks(frame.start, frame.end, most)
-    across = [round(frame.x1(value)) + 0.5 for value in values]
+    found = numbers(frame.start, frame.end, most)
+    across = [round(frame.x1(value)) + 0.5 for value, _ in found]
     painter.setPen(paint.pen(tokens.grid))
     painter.drawLines([QLineF(x, 0, x, frame.bottom + 3) for x in across])
     if place.bottom:
-        for value, x in zip(values, across, strict=True):
+        for (value, words), x in zip(found, across, strict=True):
             if value >= -1e-12 and x < frame.right - 14:
-                at, words = QPointF(x, frame.bottom + 13), number(value, places)
+                at = QPointF(x, frame.bottom + 13)
                 paint.write(painter, at, words, tokens.muted, align=0.5)
         painter.setPen(paint.pen(tokens.border_strong))
         y = frame.bottom + 3.5

@@ -19,7 +19,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
-from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.axis import numbers
 from gui.lanes.card import CARD
 from gui.lanes.ground import AXIS, GUTTER
 from gui.lanes.paint import Frame
@@ -79,9 +79,7 @@ class Navigator(QWidget):
         if of == self._run_of and not (source.running and now > self._run_until):
             return
         self._run_of, self._run_until = of, now + GROWS
-        ratio = self.devicePixelRatio()
-        self._run = QPixmap(self.size() * ratio)
-        self._run.setDevicePixelRatio(ratio)
+        self._run = paint.canvas(self)
         painter = QPainter(self._run)
         self._paint_run(painter, self.frame())
         painter.end()
@@ -102,10 +100,8 @@ class Navigator(QWidget):
         self._rate(painter, frame)
         painter.restore()
         most = max(2, int((frame.right - frame.left) / 80))
-        step = step_of(frame.end, most)
-        for value in ticks(0.0, frame.end, most):
+        for value, words in numbers(0.0, frame.end, most):
             at = QPointF(frame.x1(value), frame.bottom + 11)
-            words = number(value, decimals(step))
             paint.write(painter, at, words, tokens.muted, align=0.5)
 
     def _force(self, painter: QPainter, frame: Frame) -> None:
@@ -164,9 +160,8 @@ class Navigator(QWidget):
         elif abs(at - right) <= 5:
             part = "right"
         elif not left < at < right:
-            self._view.show_span(
-                self._time(at) - self._view.width / 2, self._view.width
-            )
+            width = self._view.width
+            self._view.show_span(self._time(at) - width / 2, width)
         self._grabbed = (part, self._time(at), self._view.start, self._view.end)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:

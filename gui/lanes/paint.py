@@ -17,10 +17,12 @@ from PySide6.QtGui import (
     QColor,
     QPainter,
     QPen,
+    QPixmap,
     QPolygonF,
     QStaticText,
     QTransform,
 )
+from PySide6.QtWidgets import QWidget
 
 from gui.look.fonts import sized
 from tactile_lab.trace import FloatArray, Trace, middle
@@ -74,6 +76,15 @@ class Frame:
         return QRectF(
             self.left, self.top, self.right - self.left, self.bottom - self.top
         )
+
+
+def canvas(widget: QWidget) -> QPixmap:
+    """A clear picture of a widget's size, as fine as its screen."""
+    ratio = widget.devicePixelRatio()
+    made = QPixmap(widget.size() * ratio)
+    made.setDevicePixelRatio(ratio)
+    made.fill(Qt.GlobalColor.transparent)
+    return made
 
 
 def polygon(x: FloatArray, y: FloatArray) -> QPolygonF:

@@ -202,15 +202,17 @@ class LiveSource(Source):
 
     Attributes:
         model: the twin beside the run, as far as it has come.
+        holds: the trials so far.
     """
 
     running = True
+    holds: list[Hold] = []  # noqa: RUF012
 
     def __init__(self, preview: Preview | None, newtons_per_ampere: float) -> None:
         self.preview = preview
         self.aligned = None if preview is None else Aligned(preview)
         self.model = Twin()
-        self._holds: list[Hold] = []
+        self.holds = []
         self._phase = Phase.none()
         self._carried: tuple[object, ...] = ()
         self._twin_spikes = NONE
@@ -221,11 +223,6 @@ class LiveSource(Source):
         self._slow = {name: Readings() for name in ("force", "field")}
         self._spikes = np.empty(1024)
         self._spike_count = 0
-
-    @property
-    def holds(self) -> list[Hold]:
-        """The trials so far."""
-        return self._holds
 
     @property
     def reach(self) -> float:

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPolygonF, QStaticText
 from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
-from gui.lanes.axis import decimals, nice_range, number, step_of, ticks
+from gui.lanes.axis import nice_range, numbers
 from gui.lanes.paint import Frame
 from gui.look.fonts import sized
 from gui.look.theme import Theme
@@ -328,8 +328,7 @@ def _numbers(low: float, high: float, log: bool) -> list[tuple[float, str]]:
     if log:
         powers = range(int(np.ceil(low)), int(np.floor(high)) + 1)
         return [(float(p), f"1e{p}".replace("-", "−")) for p in powers]
-    places = decimals(step_of(high - low, 5))
-    return [(value, number(value, places)) for value in ticks(low, high, 5)]
+    return numbers(low, high, 5)
 
 
 def _pieces(x: FloatArray, y: FloatArray) -> list[slice]:

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from gui.lanes import paint
-from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.lanes.axis import numbers
 from gui.lanes.expected import Preview
 from gui.lanes.paint import Frame
 from gui.look.fonts import sized
@@ -54,11 +54,7 @@ class WaveformPreview(QWidget):
         """Draw the plan, and the play-head on it."""
         of = (self._preview, self._problem, self.size(), self._theme.tokens)
         if of != self._drawn_of:
-            self._drawn_of = of
-            ratio = self.devicePixelRatio()
-            self._drawn = QPixmap(self.size() * ratio)
-            self._drawn.setDevicePixelRatio(ratio)
-            self._drawn.fill(Qt.GlobalColor.transparent)
+            self._drawn_of, self._drawn = of, paint.canvas(self)
             drawing = QPainter(self._drawn)
             self._draw_plan(drawing)
             drawing.end()
@@ -101,23 +97,16 @@ class WaveformPreview(QWidget):
         frame = Frame(
             LEFT, self.width() - RIGHT, 18, HEIGHT - 20, 0.0, preview.length, low, high
         )
-        step = step_of(high - low, 3)
-        for value in ticks(low, high, 3):
+        for value, text in numbers(low, high, 3):
             y = round(frame.y1(value)) + 0.5
             painter.setPen(paint.pen(tokens.grid))
             painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
             painter.setPen(QColor(tokens.muted))
-            painter.drawText(
-                QRectF(0, y - 8, 32, 16),
-                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                number(value, decimals(step)),
-            )
-        for value in ticks(0.0, preview.length, 6):
-            painter.drawText(
-                QRectF(frame.x1(value) - 30, frame.bottom + 3, 60, 14),
-                Qt.AlignmentFlag.AlignHCenter,
-                number(value, decimals(step_of(preview.length, 6))),
-            )
+            side = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            painter.drawText(QRectF(0, y - 8, 32, 16), side, text)
+        for value, text in numbers(0.0, preview.length, 6):
+            place = QRectF(frame.x1(value) - 30, frame.bottom + 3, 60, 14)
+            painter.drawText(place, Qt.AlignmentFlag.AlignHCenter, text)
         count = max(50, self.width())
         drawn = Trace.line(preview.force.time, force).thin(count)
         soft = QColor(tokens.force)
