@@ -150,11 +150,9 @@ class IconButton(QToolButton):
 class Segments(QFrame):
     """A row of exclusive choices; `group.idClicked` tells which."""
 
-    def __init__(
-        self, choices: list[str], name: str, *, role: str = "segments"
-    ) -> None:
+    def __init__(self, choices: list[str], name: str) -> None:
         super().__init__()
-        self.setProperty("role", role)
+        self.setProperty("role", "segments")
         self.setAccessibleName(name)
         row = bar(self, (2, 2, 2, 2), 1)
         self.group = QButtonGroup(self)

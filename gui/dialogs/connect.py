@@ -30,7 +30,6 @@ from gui.parts import (
     scrolling,
 )
 from gui.review.conclusion import conclusion_of
-from gui.session.form_plan import Planned
 from gui.session.log import Level
 from gui.session.session import Session
 from gui.state import State, minutes
@@ -159,9 +158,9 @@ class Connect(Overlay):
         self.run_asked.emit(scene)
         self._follow()
 
-    def _planned(self, planned: Planned) -> None:
-        if self._running and planned.problem:
-            self._end(planned.problem)
+    def _planned(self) -> None:
+        if self._running and self.session.plan.problem:
+            self._end(self.session.plan.problem)
 
     def _trial_ended(self, outcome: object) -> None:
         source = self.session.source

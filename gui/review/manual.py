@@ -171,4 +171,4 @@ class ManualView(QWidget):
             *(label("Oscilloscope inputs", "title"), self.inputs, line()),
             *(self.check, STRETCH),
         )
-        column(self, *parts, spacing=9)
+        self.rows = column(self, *parts, spacing=9)

@@ -38,20 +38,12 @@ class ReviewPanel(QFrame):
         self.manual = ManualView(theme)
         self.export = IconButton(theme, "export", "Open the run's folder")
         self.help = IconButton(theme, "help", "Help on this panel")
-        manual = scrolling(self.manual)
-        inside = self.manual.layout()
-        assert inside is not None
-        with_gutter(manual, inside)
+        manual = with_gutter(scrolling(self.manual), self.manual.rows)
         self._pages = QStackedWidget()
         self._tabs = QButtonGroup(self)
         head = row(spacing=2)
-        for number, (name, page) in enumerate(
-            (
-                ("Results", self.results),
-                ("Runs", self.runs),
-                ("Manual", manual),
-            )
-        ):
+        pages = {"Results": self.results, "Runs": self.runs, "Manual": manual}
+        for number, (name, page) in enumerate(pages.items()):
             tab = QToolButton()
             tab.setText(name)
             tab.setCheckable(True)

@@ -15,7 +15,6 @@ from gui.review.entries import Entry, entries
 from gui.review.run_results import RunResults
 from gui.screen.panels import Panels
 from gui.screen.records import Records
-from gui.session.form_plan import Planned
 from gui.session.log import Level
 from gui.state import State
 from tactile_lab.engine.threads import start
@@ -185,13 +184,14 @@ class Screen(QObject):
 
     # --- told by the session
 
-    def plan_arrived(self, planned: Planned) -> None:
+    def plan_arrived(self) -> None:
         """Show the plan in the lanes, unless a run is on screen."""
         session = self._panels.session
-        if planned.expectation is None or self._busy or self.run is not None:
+        expectation = session.plan.expectation
+        if expectation is None or self._busy or self.run is not None:
             return
         if session.source is None:
-            source = PlanSource(planned.expectation.preview)
+            source = PlanSource(expectation.preview)
             self._panels.centre.show_source(source, self._lanes())
 
     def follow_run(self, source: LiveSource) -> None:

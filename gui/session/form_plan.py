@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
@@ -15,30 +14,23 @@ if TYPE_CHECKING:
     from gui.session.expectation import Expectation
 
 
-@dataclass(frozen=True, eq=False)
-class Planned:
-    """A request was planned: what it will do, or why it cannot be run."""
-
-    request: Request
-    expectation: Expectation | None
-    problem: str
-
-
 class FormPlan(QObject):
     """Has the engine plan what the form asks for.
 
     Attributes:
+        request: that was planned last.
         expectation: None until it is computed.
         problem: why the form cannot be run, "" if it can.
     """
 
-    arrived = Signal(object)
-    """The newest request was `Planned`."""
+    arrived = Signal()
+    """The newest request was planned, or cannot be."""
 
     def __init__(self, link: Link) -> None:
         super().__init__()
         self._link = link
         self._newest: Request | None = None
+        self.request: Request | None = None
         self.expectation: Expectation | None = None
         self.problem = ""
 
@@ -51,5 +43,6 @@ class FormPlan(QObject):
 
     def _take(self, request: Request, reply: Reply[Expectation]) -> None:
         if request is self._newest:
+            self.request = request
             self.expectation, self.problem = reply.value, reply.problem
-            self.arrived.emit(Planned(request, reply.value, reply.problem))
+            self.arrived.emit()

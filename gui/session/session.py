@@ -84,7 +84,7 @@ class Session(QObject):
         self.status.faulted.connect(self.queue.hold)
         self.bench.ready.connect(self.queue.next)
         self.run.completed.connect(self.queue.next)
-        self.plan.arrived.connect(lambda planned: self.status.changed.emit())
+        self.plan.arrived.connect(self.status.changed)
         self.run.begun.connect(self._show_live)
         self.monitor.begun.connect(self._show_live)
         self.monitor.ended.connect(self._start_after_monitor)

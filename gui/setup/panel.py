@@ -19,10 +19,10 @@ from gui.parts import (
     row,
     say,
     scrolling,
+    set_role,
     stack,
     with_gutter,
 )
-from gui.session.form_plan import Planned
 from gui.session.queue import Queued
 from gui.session.session import Session
 from gui.setup.buttons import Buttons
@@ -33,7 +33,6 @@ from gui.setup.picker import Picker, about
 from gui.setup.preset_button import PresetButton
 from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
-from gui.setup.strip import Strip
 from gui.setup.subject import Subject
 from gui.state import Snapshot, State, run_problem
 from tactile_lab.engine.request import Request
@@ -63,14 +62,14 @@ class SetupPanel(QFrame):
         self._session, self._theme = session, theme
         self._snapshot = Snapshot()
         self._in_progress = False
-        self._planned_for: Request | None = None
         self._once_planned: Callable[[], None] | None = None
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(SETTLE)
         self._timer.timeout.connect(self.plan_now)
         self.picker = Picker()
-        self.strip = Strip()
+        self.strip = label("", "strip", wrap=True)
+        self.strip.hide()
         self.about = label("", "muted", wrap=True)
         self.preview = WaveformPreview(theme)
         self.form = Form()
@@ -170,7 +169,7 @@ class SetupPanel(QFrame):
         """Take up a waiting run's parameters into the form."""
         problem = self.subject.edit(item)
         if problem:
-            self.strip.say(problem, warning=True)
+            self._show_strip(problem, warning=True)
         elif self.form.fields:
             self.form.fields[0].setFocus()
 
@@ -208,9 +207,8 @@ class SetupPanel(QFrame):
         self._reset.setEnabled(not busy or editing)
         self.star.setEnabled(not busy or editing)
         self.picker.setEnabled(not busy and not editing)
-        self.strip.show_subject(
-            self.subject, self._session, locked=busy, shown=self._in_progress
-        )
+        told = self.subject.words(locked=busy, shown=self._in_progress)
+        self._show_strip(told, warning=bool(told) and told == self.subject.lost)
         if editing:
             self.buttons.show_edit(self._unusable)
         else:
@@ -240,17 +238,16 @@ class SetupPanel(QFrame):
 
     def _is_planned(self, then: Callable[[], None]) -> bool:
         """Whether the plan is that of the form; if not, `then` follows it."""
-        planned = self._planned_for == self.request()
-        if not planned or self._session.plan.expectation is None:
+        plan = self._session.plan
+        if plan.request != self.request() or plan.expectation is None:
             self.plan_now()
             self._once_planned = then
             return False
         return True
 
-    def _planned(self, planned: Planned) -> None:
-        expectation = planned.expectation
-        self._planned_for = planned.request
-        self._show_problem(planned.problem)
+    def _planned(self) -> None:
+        expectation = self._session.plan.expectation
+        self._show_problem(self._session.plan.problem)
         self.star.mark()
         if expectation is not None:
             self.preview.show_preview(expectation.preview)
@@ -304,6 +301,11 @@ class SetupPanel(QFrame):
             self.open_scene(scene)
         except TactileLabError as error:
             self._show_problem(str(error))
+
+    def _show_strip(self, words: str, *, warning: bool) -> None:
+        """Say above the form whose parameters it shows; "" says nothing."""
+        set_role(self.strip, "strip-warn" if warning else "strip")
+        say(self.strip, words)
 
     def _show_warnings(self, warnings: Sequence[str]) -> None:
         """Show where the bench cannot deliver what is asked."""

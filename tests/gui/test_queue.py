@@ -118,7 +118,7 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
     shorter = session.queue.items[1].expectation.estimate.duration
     QTest.mouseClick(setup.queue.cards[1], Qt.MouseButton.LeftButton)
     assert setup.form.field("hold").text == "2 s"
-    assert "two, 2 of 3" in setup.strip.words
+    assert "two, 2 of 3" in setup.strip.text()
     assert not setup.run.isVisible() and setup.buttons.save.isVisible()
     type_into(setup.form.field("hold"), "7 s")
     setup.buttons.save.click()
@@ -153,7 +153,7 @@ def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
     assert setup.form.field("hold").text == "3 s"
     type_into(setup.form.field("hold"), "9 s")
     setup.edit(session.queue.items[0])
-    assert "First save or cancel" in setup.strip.words
+    assert "First save or cancel" in setup.strip.text()
     assert setup.form.field("hold").text == "9 s", "nothing typed is lost by a click"
     setup.buttons.cancel.click()
     assert setup.form.texts() == before
@@ -176,14 +176,14 @@ def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
     session.status.enter(State.READY)
     session.queue.next()
     assert started == ["one"]
-    assert "one has started with the parameters it had" in setup.strip.words
-    assert "Your changes stay" in setup.strip.words
+    assert "one has started with the parameters it had" in setup.strip.text()
+    assert "Your changes stay" in setup.strip.text()
     assert setup.form.field("hold").text == "8 s" and setup.buttons.run.isVisible()
     busy(lab)
     setup.edit(session.queue.items[0])
     assert setup.form.field("hold").text == "2 s"
     session.queue.remove(session.queue.items[0])
-    assert "two was taken out" in setup.strip.words
+    assert "two was taken out" in setup.strip.text()
     assert setup.form.field("hold").text == "8 s", "nothing was changed: back again"
     idle(lab)
 
@@ -248,7 +248,7 @@ def test_scene_opened_during_an_edit_leaves_the_queued_run_alone(lab) -> None:
     type_into(setup.form.field("hold"), "9 s")
     setup.open_scene(str(lab.folder / "short.toml"))
     assert setup.subject.edited is None and session.queue.items[0].request == asked
-    assert "one waits unchanged" in setup.strip.words
+    assert "one waits unchanged" in setup.strip.text()
     idle(lab)
 
 

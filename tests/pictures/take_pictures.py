@@ -113,7 +113,7 @@ def _manual(stage: Stage) -> None:
     panel.current.selectAll()
     QTest.keyClicks(panel.current, "250 mA")
     panel.set.click()
-    stage.until(lambda: panel.now == "250 mA")
+    stage.until(lambda: panel.now.text() == "250 mA")
     panel.read.click()
     stage.until(lambda: not session.bench.reading)
     stage.live(0.5)
