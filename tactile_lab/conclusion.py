@@ -118,12 +118,13 @@ class Conclusion:
 
     @property
     def text(self) -> str:
-        """Sentences and tables for a terminal; no trailing newline."""
+        """Sentences and tables, an empty line between them, for a terminal."""
         tables = (
             "\n".join(part for part in (t.title, t.text, t.note) if part)
             for t in self.tables
         )
-        return "\n".join((*self.sentences, *tables))
+        parts = ("\n".join(self.sentences), *tables)
+        return "\n\n".join(part for part in parts if part)
 
     @property
     def plain(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -71,6 +72,7 @@ def facts_of(source: RunSource) -> str:
     sim = "simulated" if source.simulated else "measured"
     facts = [
         f"<b>{source.path.name}</b> · {sim}",
+        html.escape(str(info.get("reason") or "")),
         str(info.get("coil") or "").partition(" | ")[0],
         f"{show(float(info.get('sample_rate_Hz') or 0), 'S/s')} per channel.",
     ]

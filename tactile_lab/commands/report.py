@@ -45,7 +45,8 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
         print_json(results(written.findings))
         return
     say(trials_table(written.findings.run).text)
+    say()
     if text := written.findings.conclusion.text:
-        say(text)
+        say(f"{text}\n")
     say(f"figure  {written.png}")
     say(f"report  {written.html}")

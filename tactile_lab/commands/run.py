@@ -296,7 +296,7 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
         say(trials_table(run).text)
         say()
         if text := report.findings.conclusion.text:
-            say(text)
+            say(f"{text}\n")
         say(
             f"{done.duration:.1f} s of experiment in {took:.1f} s "
             f"({done.took:.1f} s of it running)."

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import ParameterError, TactileLabError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.quantity import show
@@ -52,6 +52,8 @@ def report(
         bad += verdict.startswith("**")
         lines.append(line)
         say(f"{name}: {verdict}")
+    if not lines:
+        raise ParameterError(f"There is no case with {' or '.join(names)} in its name.")
     heads = ["case", "stiffness ratio", "truth", "ours", "error (s)", "time"]
     return "\n".join(
         [

@@ -38,6 +38,11 @@ def test_a_number_that_measures_nothing_is_refused(tactile_lab):
         assert answer.code == 2 and "not in the range" in answer.err
 
 
+def test_cases_that_are_none_are_refused(tactile_lab):
+    answer = tactile_lab("validate", "stability", "--ours", "--case", "nonsense")
+    assert answer.code == 2 and "no case with nonsense" in answer.err
+
+
 def test_a_scene_that_is_none_is_refused(tactile_lab):
     answer = tactile_lab("validate", "accuracy", "--scene", "nonsense")
     assert answer.code == 2

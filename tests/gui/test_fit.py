@@ -1,6 +1,8 @@
 """Fits of the steps so far beside the model: numbers from trains made to order."""
 
 import re
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from gui.lanes.readings import interval_text
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.wording import unbroken
 from gui.session.fit import FitInput, fit
+from gui.session.steps import facts_of
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.trace import Trace
 
@@ -114,3 +117,10 @@ def test_bars_are_named_as_the_lanes_are(lab) -> None:
     assert "V<sub>C1</sub>" in texts and "Spikes" in texts
     assert "V_C1" in bars.accessibleName()
     bars.close()
+
+
+def test_a_stored_run_that_ended_early_says_why():
+    info = {"reason": "OSError: <usb> gone", "coil": "Output off, 0 A read back."}
+    source = SimpleNamespace(path=Path("runs/one"), simulated=False, info=info)
+    assert "<br>OSError: &lt;usb&gt; gone<br>Output off" in facts_of(source)
+    assert "None" not in facts_of(SimpleNamespace(**{**vars(source), "info": {}}))

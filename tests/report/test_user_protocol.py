@@ -90,7 +90,8 @@ def test_an_old_run_concludes_and_draws_by_the_file_it_keeps(made):
     assert "V_C1 alone." in page and "<h2>Falls</h2>" in page
     assert (made / "summary.png").exists() and report.png.exists()
     said = CliRunner().invoke(cli, ["report", str(made)]).stdout
-    assert found["statements"][0] in said and "Falls" in said
+    assert f"\n\n{found['statements'][0]}\n\nFalls\n" in said
+    assert "\n\nfigure  " in said
 
 
 def test_the_window_reads_the_same_drawings(made):
