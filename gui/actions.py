@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from gui.dialogs.closing import Closing
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
+from gui.stop_anywhere import StopAnywhere
 
 
 @dataclass(frozen=True)
@@ -53,14 +54,12 @@ class Actions(QObject):
         self, window: QWidget, panels: Panels, screen: Screen, closing: Closing
     ) -> None:
         super().__init__(window)
-        self._window, self._panels = window, panels
-        self._screen, self._closing = screen, closing
+        self._window, self._panels, self._screen = window, panels, screen
         self.keys = self._all()
-        self._shortcuts: list[QShortcut] = []
         for key in self.keys:
             for keys in () if key.single else key.keys:
                 self._bind(keys, key)
-        self._bind_stop()
+        StopAnywhere(window, panels.header.stop, closing, panels.session)
         panels.header.help_asked.connect(lambda: self.show_help())
         for button, topic in (
             (panels.setup.help, "Protocol"),
@@ -74,25 +73,9 @@ class Actions(QObject):
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
 
-    def _bind_stop(self) -> None:
-        escape = QShortcut(QKeySequence("Esc"), self._window)
-        escape.activated.connect(self.escape)
-        stop = QShortcut(QKeySequence("F12"), self._window)
-        stop.setContext(Qt.ShortcutContext.ApplicationShortcut)
-        stop.activated.connect(lambda: self._panels.session.stop("STOP by F12"))
-        self._shortcuts += [escape, stop]
-
-    def escape(self) -> None:
-        """STOP; in the closing question: keep running."""
-        if self._closing.isVisible():
-            self._closing.keep.click()
-        else:
-            self._panels.session.stop("STOP by Esc")
-
     def _bind(self, keys: str, key: Key) -> None:
         shortcut = QShortcut(QKeySequence(keys), self._window)
         shortcut.activated.connect(lambda: key.act())
-        self._shortcuts.append(shortcut)
 
     def take_key(self, event: QKeyEvent) -> bool:
         """A key no widget wanted; whether it was one of the single ones."""
@@ -194,7 +177,7 @@ class Actions(QObject):
         """Export what the lanes show."""
         from gui.dialogs.saving import export_view
 
-        export_view(self._panels, self._screen.run)
+        export_view(self._panels, self._screen)
 
     def show_help(self, topic: str = "") -> None:
         """Show the shortcut list and the help of the panels, at a topic."""

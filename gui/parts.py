@@ -6,10 +6,18 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
+from PySide6.QtGui import (
+    QPainter,
+    QPaintEvent,
+    QPalette,
+    QPen,
+    QResizeEvent,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import (
     QBoxLayout,
     QButtonGroup,
+    QComboBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
@@ -145,6 +153,14 @@ class IconButton(QToolButton):
         tokens = self._theme.tokens
         colour = tokens.header_muted if self._on_header else tokens.muted
         self.setIcon(icon(self._icon, colour, tokens.selected_text))
+
+
+class Combo(QComboBox):
+    """A list that drops down; the wheel scrolls what it stands in, never its value."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Leave the wheel to the page."""
+        event.ignore()
 
 
 class Segments(QFrame):

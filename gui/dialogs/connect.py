@@ -6,12 +6,14 @@ them, STOP stops them, their run folder is kept. The pages only watch.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from gui.ask_file import ask_file
 from gui.dialogs.bench_text import save_bench, show_bench, start_choice
 from gui.dialogs.calibrating import Calibrating
 from gui.dialogs.instruments import Instruments
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
     from gui.screen.panels import Panels
     from gui.screen.screen import Screen
     from tactile_lab.acquisition.ending import Executed
+
+BENCHES = "Bench files (*.toml)"
 
 PAGE = 540
 """Height of a page where the window is high enough, px."""
@@ -236,30 +240,35 @@ class Connect(Overlay):
     # --- files
 
     def _ask_and_save(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save the bench file", "bench.toml", "Bench files (*.toml)"
+        ask_file(
+            self,
+            "Save the bench file",
+            self.save_to,
+            kinds=BENCHES,
+            start="bench.toml",
+            save=True,
         )
-        if name:
-            self.save_to(Path(name))
 
     def _ask_and_open(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(
-            self, "Open a bench file", "", "Bench files (*.toml)"
-        )
-        if name:
-            self.hide()
-            self.session.connect_bench(name)
+        ask_file(self, "Open a bench file", self._connect_to, kinds=BENCHES)
+
+    def _connect_to(self, path: Path) -> None:
+        self.hide()
+        self.session.connect_bench(str(path))
 
     def _ask_and_use(self, calibration: Path | None) -> None:
         spec = self.session.bench.spec
         if calibration is None or spec is None:
             return
         start = "bench.toml" if spec.path is None else str(spec.path)
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save the calibrated bench", start, "Bench files (*.toml)"
+        ask_file(
+            self,
+            "Save the calibrated bench",
+            partial(self.use_calibration, calibration),
+            kinds=BENCHES,
+            start=start,
+            save=True,
         )
-        if name:
-            self.use_calibration(calibration, Path(name))
 
     def _prepare_force(self) -> None:
         self.hide()

@@ -6,13 +6,23 @@ from collections.abc import Mapping
 from typing import Any
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from drivers.attached import attached, try_out
 from gui.dialogs.attached import Attached
 from gui.dialogs.bench_text import BY_PERSON, Choice
 from gui.look.theme import Theme
-from gui.parts import STRETCH, column, label, line, line_edit, push, row, set_role
+from gui.parts import (
+    STRETCH,
+    Combo,
+    column,
+    label,
+    line,
+    line_edit,
+    push,
+    row,
+    set_role,
+)
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.instruments.dialects import dialect_ids
@@ -41,11 +51,11 @@ class Instruments(QWidget):
             wrap=True,
         )
         self.attached = Attached(theme)
-        self.coil_port, self.coil_row = self._ports("Coil source port"), QComboBox()
-        self.meter_port, self.meter_row = self._ports("Teslameter port"), QComboBox()
+        self.coil_port, self.coil_row = self._ports("Coil source port"), Combo()
+        self.meter_port, self.meter_row = self._ports("Teslameter port"), Combo()
         self.coil_row.addItems(dialect_ids("coil"))
         self.meter_row.addItems([*dialect_ids("field meter"), BY_PERSON])
-        self.scope = QComboBox()
+        self.scope = Combo()
         for driver in driver_names(ScopeDriver):
             self.scope.addItem(SCOPES.get(driver, driver), driver)
         self.scope.addItem("none", "")
@@ -148,7 +158,7 @@ class Instruments(QWidget):
         answer.setText(text)
         answer.show()
 
-    def _test(self, role: str, port: QComboBox, row: QComboBox) -> None:
+    def _test(self, role: str, port: Combo, row: Combo) -> None:
         address, dialect = port.currentText().strip(), row.currentText()
         if not address:
             self._show_test(role, False, "Choose or write a port first.")
@@ -169,8 +179,8 @@ class Instruments(QWidget):
         for widget in (self.meter_port, self.test_meter):
             widget.setEnabled(row != BY_PERSON)
 
-    def _ports(self, name: str) -> QComboBox:
-        made = QComboBox()
+    def _ports(self, name: str) -> Combo:
+        made = Combo()
         made.setEditable(True)
         made.setCurrentText("")
         made.setAccessibleName(name)

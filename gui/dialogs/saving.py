@@ -10,8 +10,8 @@ import numpy as np
 from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
-from PySide6.QtWidgets import QFileDialog
 
+from gui.ask_file import ask_file
 from gui.lanes.card import CARD
 from gui.lanes.compare import MARKS
 from gui.lanes.lane import Lane
@@ -28,6 +28,7 @@ from tactile_lab.trace import FloatArray
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels
+    from gui.screen.screen import Screen
 
 TITLE = 34
 CSV_POINTS = 20_000
@@ -35,14 +36,14 @@ CSV_POINTS = 20_000
 
 def save_scene(panels: Panels) -> None:
     """Ask where, and write the form as a scene with every key expanded."""
-    name, _ = QFileDialog.getSaveFileName(
+    ask_file(
         panels.centre.window(),
         "Save the scene",
-        f"{panels.setup.kind_name}.toml",
-        "Scenes (*.toml)",
+        lambda path: write_scene(panels, path),
+        kinds="Scenes (*.toml)",
+        start=f"{panels.setup.kind_name}.toml",
+        save=True,
     )
-    if name:
-        write_scene(panels, Path(name))
 
 
 def write_scene(panels: Panels, path: Path) -> None:
@@ -55,16 +56,16 @@ def write_scene(panels: Panels, path: Path) -> None:
         panels.session.log.add(Level.GOOD, "scene", f"Saved {path}")
 
 
-def export_view(panels: Panels, run: Source | None) -> None:
-    """Ask where, and export what the lanes show; `run` is from disk."""
-    name, _ = QFileDialog.getSaveFileName(
+def export_view(panels: Panels, screen: Screen) -> None:
+    """Ask where, and export what the lanes show by then."""
+    ask_file(
         panels.centre.window(),
         "Export this view",
-        "view.png",
-        "Picture (*.png *.svg);;Table (*.csv)",
+        lambda path: write_view(panels, screen.run, path),
+        kinds="Picture (*.png *.svg);;Table (*.csv)",
+        start="view.png",
+        save=True,
     )
-    if name:
-        write_view(panels, run, Path(name))
 
 
 def write_view(panels: Panels, run: Source | None, path: Path) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QFrame, QLineEdit, QWidget
+from PySide6.QtWidgets import QFrame, QLineEdit, QWidget
 
-from gui.parts import STRETCH, column, empty, label, push, row, say
+from gui.parts import STRETCH, Combo, column, empty, label, push, row, say
 from gui.setup.parameter import toml
 from tactile_lab.bench import Channel
 from tactile_lab.errors import QuantityError, SceneError
@@ -27,12 +27,12 @@ class InputCard(QFrame):
         self.setProperty("role", "card")
         self._table, self._bits = table, bits
         name = f"{table.input} · {table.signal}"
-        self.range = QComboBox()
+        self.range = Combo()
         for value in ranges:
             self.range.addItem(f"±{show(value, 'V')}", value)
         self.range.setCurrentIndex(self.range.findData(table.range))
         self.offset = QLineEdit(exact(table.offset, "V"))
-        self.coupling = QComboBox()
+        self.coupling = Combo()
         self.coupling.addItems(["DC", "AC"])
         self.coupling.setCurrentText(table.coupling)
         self._sees = label("", "small")

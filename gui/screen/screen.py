@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer, Signal
-from PySide6.QtWidgets import QFileDialog
 
+from gui.ask_file import ask_file
 from gui.lanes.compare import Comparison
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.source import LiveSource, PlanSource, Source
@@ -92,22 +92,22 @@ class Screen(QObject):
 
     def ask_scene(self) -> None:
         """Let the user choose a scene, and open it."""
-        name, _ = QFileDialog.getOpenFileName(
+        ask_file(
             self._panels.centre.window(),
             "Open a scene",
-            "",
-            "Scenes and protocols (*.toml *.py)",
+            self.open_path,
+            kinds="Scenes and protocols (*.toml *.py)",
         )
-        if name:
-            self.open_path(Path(name))
 
     def ask_run(self) -> None:
         """Let the user choose a run, and open it."""
-        name = QFileDialog.getExistingDirectory(
-            self._panels.centre.window(), "Open a run", str(self._panels.session.out)
+        ask_file(
+            self._panels.centre.window(),
+            "Open a run",
+            self.open_path,
+            start=str(self._panels.session.out),
+            folder=True,
         )
-        if name:
-            self.open_path(Path(name))
 
     def open_path(self, path: Path) -> None:
         """Open a scene, a protocol file, a run folder or a run's data file."""
@@ -335,6 +335,6 @@ class Screen(QObject):
 
     def _list(self, found: list[Entry]) -> None:
         self._panels.review.runs.show_entries(found)
-        self._panels.centre.empty.show_recent(
+        self._panels.centre.show_recent(
             [(f"{e.title} · {e.started} · {e.status}", e.folder) for e in found[:4]]
         )

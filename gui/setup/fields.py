@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from decimal import Decimal
+from pathlib import Path
 
 from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
-    QFileDialog,
     QFrame,
     QLineEdit,
     QStyle,
@@ -18,7 +17,8 @@ from PySide6.QtWidgets import (
     QToolButton,
 )
 
-from gui.parts import STRETCH, column, filled, label, row, say
+from gui.ask_file import ask_file
+from gui.parts import STRETCH, Combo, column, filled, label, row, say
 from gui.setup.parameter import FieldError, Kind, Parameter, entry_of, text_of
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import exact, parse
@@ -121,7 +121,7 @@ class Switch(QCheckBox):
         self.setChecked(text == "True")
 
 
-class Choice(QComboBox):
+class Choice(Combo):
     """One of several words."""
 
     edited = Signal()
@@ -248,9 +248,11 @@ class Field(QFrame):
         return button
 
     def _choose_file(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, self.parameter.title)
-        if name:
-            self.set_text(name)
+        ask_file(self, self.parameter.title, self._take_file)
+
+    def _take_file(self, path: Path) -> None:
+        if self._editor.isEnabled():  # it may have been locked meanwhile
+            self.set_text(str(path))
             self.changed.emit()
 
     def _edited(self) -> None:

@@ -7,17 +7,17 @@ import inspect
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
-    QComboBox,
     QStyle,
     QStyleOptionComboBox,
     QStylePainter,
 )
 
+from gui.parts import Combo
 from tactile_lab.plugins import protocol_class, protocol_names, scene_path
 from tactile_lab.trial import Protocol
 
 
-class Picker(QComboBox):
+class Picker(Combo):
     """All protocols, and the one in the form where that is of the user's own."""
 
     picked = Signal(str)

@@ -1,0 +1,79 @@
+"""Asking for a file while everything else goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+
+
+def ask_file(
+    parent: QWidget,
+    title: str,
+    then: Callable[[Path], object],
+    *,
+    kinds: str = "",
+    start: str = "",
+    save: bool = False,
+    folder: bool = False,
+) -> None:
+    """Ask for a file, or a folder; nobody waits for the answer.
+
+    The dialog is not modal, and Qt's own: a modal one, or one of the desktop's, would
+    keep clicks and keys from STOP. So would what Qt asks itself about a file that is
+    there already, or is not.
+
+    Args:
+        parent: whose window it belongs to; it goes with it.
+        title: of the dialog.
+        then: gets the path, if one is chosen.
+        kinds: endings offered, as `QFileDialog` takes them.
+        start: folder, or file, that is proposed; "" is where one was last.
+        save: the file need not exist.
+        folder: an existing folder is asked for.
+    """
+    for other in parent.window().findChildren(QFileDialog):
+        other.close()
+    dialog = QFileDialog(parent, title, "", kinds)
+    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.setFileMode(
+        QFileDialog.FileMode.Directory if folder else QFileDialog.FileMode.AnyFile
+    )
+    if save:
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
+    if folder:
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.setDirectory(start)
+    elif start:
+        dialog.selectFile(start)
+
+    def chosen(name: str) -> None:
+        if save and Path(name).exists():
+            _ask_to_replace(parent.window(), Path(name), then)
+        else:
+            then(Path(name))
+
+    dialog.fileSelected.connect(chosen)
+    dialog.show()
+
+
+def _ask_to_replace(
+    window: QWidget, path: Path, then: Callable[[Path], object]
+) -> None:
+    buttons = QMessageBox.StandardButton
+    box = QMessageBox(
+        QMessageBox.Icon.Warning,
+        "Replace the file?",
+        f"{path.name} exists already.\nDo you want to replace it?",
+        buttons.Yes | buttons.No,
+        window,
+    )
+    box.setModal(False)
+    box.setDefaultButton(buttons.No)
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    box.accepted.connect(lambda: then(path))
+    box.show()

@@ -1,0 +1,77 @@
+"""STOP from anywhere: its button and its keys act whatever else is open."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt
+from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import QApplication, QWidget
+
+from gui.dialogs.closing import Closing
+from gui.dialogs.overlay import Overlay
+from gui.header.stop import StopButton
+from gui.session.session import Session
+
+
+class StopAnywhere(QObject):
+    """Sees every key and click of the program before what is open takes it.
+
+    - F12 is STOP.
+    - Esc is STOP while anything drives the coil. In the question asked on closing it
+      keeps running. Else it closes what is open; where nothing is, it is STOP.
+    - A press on the button STOP acts, also where it would only close a menu.
+
+    Args:
+        window: what has the button; cards cover it, menus and dialogs are its own.
+        stop: the button.
+        closing: the question in which Esc is not STOP.
+        session: is stopped.
+    """
+
+    def __init__(
+        self, window: QWidget, stop: StopButton, closing: Closing, session: Session
+    ) -> None:
+        super().__init__(window)
+        self._window, self._stop = window, stop
+        self._closing, self._session = closing, session
+        application = QApplication.instance()
+        if application is not None:
+            application.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Act, and keep the event from what is open; whether that was done."""
+        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
+            if event.key() == Qt.Key.Key_F12:
+                return self._act("STOP by F12")
+            return event.key() == Qt.Key.Key_Escape and self._escape()
+        if isinstance(event, QMouseEvent) and self._meant_for_stop(event):
+            return self._act("STOP in the window")
+        return False
+
+    def _act(self, reason: str) -> bool:
+        self._session.stop(reason)
+        while (menu := QApplication.activePopupWidget()) is not None and menu.close():
+            pass
+        return True
+
+    def _escape(self) -> bool:
+        if self._closing.isVisible():
+            self._closing.keep.click()
+            return True
+        if not self._session.busy:
+            cards = [c for c in self._window.findChildren(Overlay) if c.isVisible()]
+            if cards:
+                cards[-1].hide()
+                return True
+            if not self._window.isActiveWindow() or QApplication.activePopupWidget():
+                return False  # Qt closes it
+        return self._act("STOP by Esc")
+
+    def _meant_for_stop(self, event: QMouseEvent) -> bool:
+        """Whether it presses STOP while a menu would take the press."""
+        if event.type() != QEvent.Type.MouseButtonPress:
+            return False
+        left = event.button() == Qt.MouseButton.LeftButton
+        if not left or QApplication.activePopupWidget() is None:
+            return False
+        area = QRect(self._stop.mapToGlobal(QPoint()), self._stop.size())
+        return area.contains(event.globalPosition().toPoint())
