@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QSettings, QTimer
+from PySide6.QtCore import QSettings, QSize, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gui.look import fonts
@@ -16,6 +16,9 @@ from gui.look.theme import Theme
 from gui.session.session import Session
 from gui.window import Window
 from tactile_lab.engine.threads import start
+
+FRAME = QSize(8, 40)
+"""Room for what the desktop draws around the window, px."""
 
 
 def application(arguments: Sequence[str] = ()) -> QApplication:
@@ -54,6 +57,7 @@ def main(
     chosen.apply()
     session = Session(out)
     window = Window(session, chosen, QSettings())
+    window.resize(window.size().boundedTo(window.screen().availableSize() - FRAME))
     window.show()
     _close_on_signals(window)
     QTimer.singleShot(0, lambda: begin(window, target, bench))

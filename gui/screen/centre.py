@@ -117,6 +117,7 @@ class Centre(QWidget):
 
     def show_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
         """Show another source, whole; `lanes`: None keeps those shown."""
+        self.tools.freeze.setChecked(False)
         self._show_lanes(lanes)
         self.stack.show_source(source)
         self.view.set_now(source.reach, source.length)
@@ -125,6 +126,7 @@ class Centre(QWidget):
 
     def follow_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
         """Show a source that grows, and follow it."""
+        self.tools.freeze.setChecked(False)
         self._show_lanes(lanes)
         self.stack.show_source(source)
         self.view.clear_cursors()
@@ -133,6 +135,7 @@ class Centre(QWidget):
 
     def exchange_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
         """Show another source of the same data: view and ranges stay."""
+        self.tools.freeze.setChecked(False)
         self.view.set_now(source.reach, source.length)
         self._show_lanes(lanes)
         self.stack.exchange_source(source)
@@ -156,6 +159,11 @@ class Centre(QWidget):
         self.empty.setVisible(wanted)
         if wanted:
             self._place()
+
+    def show_recent(self, folders: list[tuple[str, Path]]) -> None:
+        """Offer recent runs on the card, which grows with them."""
+        self.empty.show_recent(folders)
+        self._place()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Keep the card in the middle."""

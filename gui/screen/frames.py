@@ -6,6 +6,7 @@ import time
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
+from gui.lanes.source import LiveSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.state import State
@@ -36,11 +37,18 @@ class Frames(QObject):
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
         self._timer.start(FAST)
+        panels.centre.tools.freeze.toggled.connect(self.freeze)
 
     @property
     def interval(self) -> int:
         """Milliseconds between frames now."""
         return self._timer.interval()
+
+    def freeze(self, on: bool) -> None:
+        """Let the lanes stand still; acquisition goes on, and they catch up later."""
+        self.frozen = on
+        if not on and self._screen.live is not None:
+            self._show_newest(self._screen.live)
 
     def stop(self) -> None:
         """End the loop."""
@@ -55,13 +63,17 @@ class Frames(QObject):
         source, seen = self._screen.live, not panels.centre.window().isMinimized()
         if source is not None and seen and not self.frozen:
             if source.running or moved:
-                panels.centre.view.set_now(source.reach, source.length)
-                panels.centre.stack.refresh()
+                self._show_newest(source)
         self._screen.take_fetched()
         if now - self._numbers >= NUMBERS:
             self._numbers = now
             self._show_numbers()
         self._keep_budget(time.perf_counter() - begun)
+
+    def _show_newest(self, source: LiveSource) -> None:
+        centre = self._panels.centre
+        centre.view.set_now(source.reach, source.length)
+        centre.stack.refresh()
 
     def _show_numbers(self) -> None:
         panels, session = self._panels, self._panels.session
