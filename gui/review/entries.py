@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from tactile_lab.store.folder import is_live
+
 SHOWN = 60
 """Most runs listed at once."""
 
@@ -51,7 +53,7 @@ def entries(out: Path) -> list[Entry]:
                     file.parent,
                     str(info.get("title") or info.get("protocol") or "run"),
                     str(info.get("scene") or ""),
-                    str(info["status"]),
+                    _status(file.parent, str(info["status"])),
                     _when(str(info.get("started") or "")),
                     float(info.get("duration_s") or info.get("planned_s") or 0.0),
                     bool(info.get("simulated")),
@@ -60,6 +62,11 @@ def entries(out: Path) -> list[Entry]:
         except (OSError, ValueError, KeyError, TypeError):
             continue
     return found
+
+
+def _status(folder: Path, said: str) -> str:
+    """As in `run.json`; "cut short" where a running run has no writer."""
+    return "cut short" if said == "running" and not is_live(folder) else said
 
 
 def _when(text: str) -> str:

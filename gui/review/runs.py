@@ -40,6 +40,7 @@ PILLS = {
     "complete": ("ok", "pill-ok"),
     "running": ("running", "pill"),
     "aborted": ("aborted", "pill-warn"),
+    "cut short": ("cut short", "pill-bad"),
     "recovered": ("recovered", "pill-warn"),
     "faulted": ("fault", "pill-bad"),
 }

@@ -8,8 +8,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
 from gui.look.theme import Theme
-from gui.review.entries import Entry
+from gui.review.entries import Entry, entries
 from gui.review.runs import RunsView
+from tactile_lab.store.folder import RunFolder
 
 ENTRIES = [
     Entry(Path("a"), "Pulses", "demo", "complete", "today 10:00", 18.0, True),
@@ -67,3 +68,17 @@ def test_two_or_three_are_compared(runs: RunsView) -> None:
         QTest.keyClick(card, Qt.Key.Key_Space)
         assert runs.compare.isEnabled() is (count >= 2)
     assert runs.ticked() == ENTRIES
+
+
+def test_a_run_whose_program_died_is_listed_as_cut_short(
+    app: QApplication, tmp_path: Path
+) -> None:
+    run = RunFolder.create(tmp_path, "pulses", {"title": "Pulses"})
+    assert [entry.status for entry in entries(tmp_path)] == ["running"]
+    run._log.close()  # what the kernel does when the process dies
+    found = entries(tmp_path)
+    assert [entry.status for entry in found] == ["cut short"]
+    view = RunsView(Theme("light"))
+    view.show_entries(found)
+    view.filter.group.button(3).click()
+    assert "cut short" in texts(view) and len(view.cards) == 1, "among the faults"
