@@ -31,7 +31,8 @@ class ConnectedBench(QObject):
     Attributes:
         choice: "sim" or a bench file; None while there is none.
         spec: what the file says, with what was changed.
-        found: who answered; None before, and where somebody did not.
+        found: who answered; None before, and where somebody did not, or the coil
+            was not verified off.
         overrides: ``bench.key=value`` texts that change the file.
         request: a run that needs every instrument.
         field: as read last, T.
@@ -53,12 +54,12 @@ class ConnectedBench(QObject):
 
     def connect_to(self, choice: str) -> None:
         """Ask the instruments of a bench who they are."""
-        self.choice = choice
         try:
             self.spec = load_bench(choice)
         except (TactileLabError, OSError) as error:
             self._status.set_fault("The bench cannot be used.", str(error))
             return
+        self.choice = choice
         self.overrides, self.found = (), None
         self.request = bench_request(choice, self.spec)
         self._status.coil.use(None)
@@ -134,10 +135,12 @@ class ConnectedBench(QObject):
             self._log.add(Level.ERROR, "bench", " ".join(words))
             if self.found is None:
                 self.spec = self.choice = None
+            self.found = None
             status.set_fault(*words)
             return
         broken = [one for one in found.found if one.problem]
-        self.found = None if broken else found
+        unknown = found.off is not None and not found.off.verified
+        self.found = None if broken or unknown else found
         coil = self.spec.coil if self.spec is not None else None
         has_coil = coil is not None and any(one.role == "coil" for one in found.found)
         status.coil.use(coil.limits if has_coil and coil is not None else None)
@@ -147,7 +150,7 @@ class ConnectedBench(QObject):
                 self._log.add(Level.ERROR, one.role, one.problem)
             else:
                 self._log.add(Level.GOOD, one.role, one.identity)
-        if found.off is not None and not found.off.verified:
+        if found.off is not None and unknown:
             status.set_fault("The coil's state is unknown.", found.off.text)
         elif broken:
             names = " and ".join(ROLES[one.role].lower() for one in broken)

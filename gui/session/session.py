@@ -196,11 +196,13 @@ class Session(QObject):
             self.bench.check()
 
     def acknowledge(self) -> None:
-        """The user has read the fault."""
+        """The user has read the fault; who is still there, and the coil, is asked."""
         if self.state is State.FAULT:
             self.status.fault = None
-            known = self.bench.found is not None
-            self.status.enter(State.READY if known else State.DISCONNECTED)
+            if self.bench.found is not None:
+                self.bench.check()
+            else:
+                self.status.enter(State.DISCONNECTED)
 
     # --- what the window shows
 

@@ -161,7 +161,7 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     session.status.enter(State.FAULT)
     assert dialog.wiring.progress.text() == "The coil source is gone."
     session.acknowledge()
-    assert dialog.wiring.check.isEnabled()
+    lab.until(dialog.wiring.check.isEnabled)
     said = {"V_C1": {"ok": True, "text": "4.35 V at rest"},
             "V_C2": {"ok": False, "text": "0 V at rest: open probe"}}  # fmt: skip
     made = concluded(

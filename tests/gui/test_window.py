@@ -3,14 +3,22 @@
 import gc
 import sys
 import threading
+from itertools import product
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPointF, QSize, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import QMimeData, QPoint, QPointF, QSize, Qt, QUrl
+from PySide6.QtGui import QDropEvent, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPushButton, QToolButton
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QComboBox,
+    QLineEdit,
+    QPushButton,
+    QToolButton,
+)
 
+from gui.dialogs.help import Help
 from gui.dialogs.saving import table
 from gui.lanes.source import PlanSource
 from gui.session.queue import Queued
@@ -120,6 +128,9 @@ def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:
     window.banner.acknowledge.click()
     assert session.state is not State.FAULT
     assert window.header.stop.truth is Truth.UNKNOWN, "reading a fault verifies nothing"
+    assert not window.setup.run.isEnabled(), "and nothing runs beside it"
+    lab.until(lambda: session.state is State.READY)
+    assert window.header.stop.truth is Truth.OFF, "the instruments were asked"
 
 
 def test_reconnecting_makes_the_coil_known_again(lab) -> None:
@@ -479,3 +490,55 @@ def test_record_keeps_what_the_monitor_saw(lab) -> None:
     session.show_monitor(False)
     lab.until(lambda: not session.monitor.alive)
     lab.until(lambda: not window.centre.monitor_bar.isVisible())
+
+
+def test_freeze_holds_the_lanes_while_acquisition_goes_on(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    view = window.centre.view
+    lab.until(lambda: view.now > 0)
+    window.page.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_Space)
+    seen = view.now
+    lab.until(lambda: session.source.reach > seen + 1.0)
+    assert view.now == seen
+    window.centre.tools.freeze.click()
+    lab.until(lambda: view.now > seen + 1.0)
+
+
+def test_another_run_is_not_frozen(lab) -> None:
+    window = lab.window
+    window.centre.tools.freeze.setChecked(True)
+    lab.run()
+    lab.until(lambda: window.centre.view.now > 0)
+    assert not window.centre.tools.freeze.isChecked()
+
+
+def test_the_wheel_changes_no_choice(lab) -> None:
+    window = lab.window
+    window.actions_.connect_dialog()
+    choices = [box for box in window.findChildren(QComboBox) if box.count() > 1]
+    assert len(choices) >= 4
+    before = [box.currentText() for box in choices]
+    for box, way in product(choices, (-120, 120)):
+        turned = QWheelEvent(
+            QPointF(5, 5), QPointF(box.mapToGlobal(QPoint(5, 5))), QPoint(),
+            QPoint(0, way), Qt.MouseButton.NoButton,
+            Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+        )  # fmt: skip
+        lab.app.sendEvent(box, turned)
+        assert not turned.isAccepted(), "the page scrolls"
+    assert [box.currentText() for box in choices] == before
+
+
+def test_esc_closes_a_card_between_runs_and_is_stop_in_one(lab) -> None:
+    window, session = lab.window, lab.session
+    window.actions_.show_help()
+    card = window.findChild(Help)
+    QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
+    assert not card.isVisible() and session.state is State.READY
+    lab.run()
+    window.actions_.show_help()
+    QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
+    assert session.state is State.ABORTING
+    card.hide()
