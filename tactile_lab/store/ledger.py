@@ -66,7 +66,7 @@ class Written:
     """What a ledger says was written.
 
     Attributes:
-        declared: see `Ledger`; empty where not even that was written.
+        declared: see `Ledger`; empty where not even that was written, or can be read.
         rows: of each table.
         chunks: of each dataset of samples, by number: (offset, bytes, samples, CRC-32).
             One that was written again, fuller, has several, the newest last.
@@ -78,7 +78,7 @@ class Written:
 
 
 def read_ledger(path: Path) -> Written:
-    """Read the ledger up to the first torn entry; nothing where there is no file."""
+    """Read every entry that is as it was written; nothing where there is no file."""
     declared = b""
     rows: defaultdict[str, list[Any]] = defaultdict(list)
     chunks: defaultdict[str, Any] = defaultdict(lambda: defaultdict(list))
@@ -92,6 +92,17 @@ def read_ledger(path: Path) -> Written:
     return Written(declared, rows, chunks)
 
 
+def goes_on(path: Path) -> bool:
+    """Whether more follows the first entry, even where that cannot be read."""
+    if not path.exists():
+        return False
+    with path.open("rb") as file:
+        head = file.read(_HEAD.size)
+    first = _HEAD.unpack(head)[2] if len(head) == _HEAD.size else 0
+    whole: int = _HEAD.size + _CRC.size + first
+    return path.stat().st_size > whole
+
+
 def _entries(path: Path) -> Iterator[tuple[str, int, bytes]]:
     """(dataset, first row or chunk, bytes) of each entry."""
     with path.open("rb") as file:
@@ -99,6 +110,5 @@ def _entries(path: Path) -> Iterator[tuple[str, int, bytes]]:
             dataset, first, size = _HEAD.unpack_from(head)
             data = file.read(size)
             (crc,) = _CRC.unpack_from(head, _HEAD.size)
-            if zlib.crc32(data, zlib.crc32(head[: _HEAD.size])) != crc:
-                return
-            yield dataset.rstrip(b"\0").decode(), first, data
+            if zlib.crc32(data, zlib.crc32(head[: _HEAD.size])) == crc:
+                yield dataset.rstrip(b"\0").decode(), first, data

@@ -26,11 +26,14 @@ from tactile_lab.store.folder import (
     write_json,
 )
 from tactile_lab.store.layout import RECORDS, create_channel
-from tactile_lab.store.ledger import LEDGER, Written, read_ledger
+from tactile_lab.store.ledger import LEDGER, Written, goes_on, read_ledger
 from tactile_lab.store.run import Run
 
 KEPT = "data.killed.h5"
 """What the file is called that the crash left."""
+
+EMPTY = 1 << 18
+"""Bytes that no data file has before its first sample."""
 
 OF_SAMPLES = {"segments": "first", "gaps": "sample", "overrange": "sample"}
 """Tables about samples, and the column that tells which; lost ones are dropped."""
@@ -78,6 +81,7 @@ def recover(path: Path) -> Recovered:
     killed = path / KEPT if (path / KEPT).exists() else path / DATA
     written = read_ledger(path / LEDGER)
     if not written.declared or not killed.exists():
+        _refuse_if_there_may_be_samples(path, killed)
         return _without_samples(path, info)
     check_space(path, killed.stat().st_size + RESERVE)
     new = path / "data.recovering.h5"
@@ -93,6 +97,22 @@ def recover(path: Path) -> Recovered:
     recovery = _derive(path, samples, dropped)
     (path / LEDGER).unlink()
     return recovery
+
+
+def _refuse_if_there_may_be_samples(path: Path, killed: Path) -> None:
+    """Call no run empty whose ledger is damaged: what it says could still be mended.
+
+    Raises:
+        RunFolderError: there is more than a run without samples leaves.
+    """
+    size = killed.stat().st_size if killed.exists() else 0
+    if size > EMPTY or goes_on(path / LEDGER):
+        raise RunFolderError(
+            f"{path} cannot be recovered: the beginning of {LEDGER} is damaged or "
+            f"gone, but {killed.name} has {size} bytes and may hold samples. Nothing "
+            f"was changed. Keep {killed.name} and {LEDGER}, and put an undamaged copy "
+            "of the ledger in its place."
+        )
 
 
 def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:

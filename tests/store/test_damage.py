@@ -232,6 +232,32 @@ def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, tmp_path, after):
         recover(path)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+@pytest.mark.parametrize("byte", [3, 25, 33, 37, 200])
+def test_a_run_is_not_called_empty_because_its_ledger_is_damaged(tmp_path, byte):
+    path, _ = killed(tmp_path, after=150 * 1024)
+    ledger = bytearray((path / "ledger.bin").read_bytes())
+    ledger[byte] ^= 0x10
+    (path / "ledger.bin").write_bytes(ledger)
+    before = {file.name: file.read_bytes() for file in path.iterdir() if file.is_file()}
+    with pytest.raises(RunFolderError, match=r"may hold samples\. Nothing was changed"):
+        recover(path)
+    assert before == {f.name: f.read_bytes() for f in path.iterdir() if f.is_file()}
+    ledger[byte] ^= 0x10  # the copy that somebody had
+    (path / "ledger.bin").write_bytes(ledger)
+    assert recover(path).samples >= 149 * 1024
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+def test_one_damaged_entry_of_the_ledger_does_not_end_it(tmp_path):
+    path, acknowledged = killed(tmp_path, after=60 * 1024)
+    ledger = bytearray((path / "ledger.bin").read_bytes())
+    at = ledger.index(b"current".ljust(24, b"\0"))  # the first row of a table
+    ledger[at + 40] ^= 0x10
+    (path / "ledger.bin").write_bytes(ledger)
+    assert recover(path).samples >= acknowledged - 1024
+
+
 def test_a_living_run_is_left_alone(bench, recorder, folder):
     bench.play(recorder, bench.codes(5000), 500)
     with pytest.raises(RunFolderError, match="still being recorded"):
