@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from gui.look.theme import Theme
 from gui.parts import column, empty, label, panel, say, sign
@@ -47,11 +47,6 @@ class Attached(QWidget):
         )
         self._found = found
         self._show()
-
-    @property
-    def texts(self) -> list[str]:
-        """Everything that is shown, row by row."""
-        return [one.text() for one in self._card.findChildren(QLabel) if one.text()]
 
     def _show(self) -> None:
         empty(self._rows)

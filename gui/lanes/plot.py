@@ -44,6 +44,16 @@ class Options:
     zoom_box: bool = False
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """What is drawn on, where, of what, and in which colours."""
+
+    painter: QPainter
+    frame: Frame
+    source: Source
+    tokens: Tokens
+
+
 class LanePainter:
     """Paints one lane onto anything that paints: a widget, a picture, an SVG."""
 
@@ -84,17 +94,18 @@ class LanePainter:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         rows = lane.raster or source.stacks(lane)
         ground(painter, frame, source, tokens, Place(self.top, self.bottom, not rows))
+        on = Drawing(painter, frame, source, tokens)
         painter.save()
         painter.setClipRect(QRectF(frame.left, 0, right - frame.left, bottom + 4))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
         if len(runs) > 1:
-            self._runs(painter, frame, source, runs, tokens)
+            self._runs(on, runs)
         else:
-            self._traces(painter, frame, source, runs[0], twin, tokens)
+            self._traces(on, runs[0], twin)
         painter.restore()
-        self._cursors(painter, frame, tokens, size)
+        self._cursors(on)
         if len(runs) == 1:
-            self._tag(painter, frame, source, tokens)
+            self._tag(on)
 
     def _fit(self, traces: list[Trace], source: Source, room: float) -> None:
         """Choose the value range: round, and steady while the data allows it.
@@ -129,15 +140,9 @@ class LanePainter:
         if low < now[0] or high > now[1] or roomy or now == (0.0, 1.0):
             self.range = wanted
 
-    def _runs(
-        self,
-        painter: QPainter,
-        frame: Frame,
-        source: Source,
-        runs: list[Trace],
-        tokens: Tokens,
-    ) -> None:
+    def _runs(self, on: Drawing, runs: list[Trace]) -> None:
         """Several runs, each in its colour; stacked ones in rows of their own."""
+        painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         raster = self.lane.raster
         rows: list[tuple[float, float]] = []
         if raster or source.stacks(self.lane):
@@ -158,24 +163,17 @@ class LanePainter:
             shown = run if self.lane.key == "V_K" else run.means()
             paint.trace(painter, own, shown, line)
 
-    def _traces(
-        self,
-        painter: QPainter,
-        frame: Frame,
-        source: Source,
-        measured: Trace,
-        twin: Trace,
-        tokens: Tokens,
-    ) -> None:
+    def _traces(self, on: Drawing, measured: Trace, twin: Trace) -> None:
+        painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         lane, force = self.lane, self.lane.key == "force"
         colour = tokens.trace(lane.key)
         if lane.raster:
-            self._raster(painter, frame, source, tokens)
+            self._raster(on)
         elif lane.symmetric:
-            self._tolerance(painter, frame, tokens)
+            self._tolerance(on)
         elif force:
             paint.outline(painter, frame, measured, colour, tokens.plot)
-            self._plan(painter, frame, source, tokens)
+            self._plan(on)
             measured = Trace.nothing()
         if lane.averaged:
             spiky = lane.key == "V_K"
@@ -193,27 +191,25 @@ class LanePainter:
             paint.trace(painter, frame, twin, paint.pen(tokens.twin))
             paint.trace(painter, frame, measured, paint.pen(colour))
         if lane.valued and not force:
-            self._dots(painter, frame, measured, colour)
+            self._dots(on, measured, colour)
         if source.running and frame.start <= source.reach <= frame.end:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
             at = round(frame.x1(source.reach)) + 0.5
             painter.setPen(paint.pen(tokens.border_strong))
             painter.drawLine(QPointF(at, 0), QPointF(at, frame.bottom + 3))
 
-    def _dots(
-        self, painter: QPainter, frame: Frame, measured: Trace, colour: str
-    ) -> None:
+    def _dots(self, on: Drawing, measured: Trace, colour: str) -> None:
         """Mark rates, and samples where they lie apart: between them nobody looked."""
+        frame = on.frame
         inside = (measured.time >= frame.start) & (measured.time <= frame.end)
         x, y = frame.x(measured.time[inside]), frame.y(measured.mean[inside])
         rates = self.lane.key == "rate" and x.size <= DOTS
         samples = bool(np.all((measured.low == measured.high)[inside]))
         if rates or (samples and x.size > 1 and np.diff(x).min() >= APART):
-            paint.dots(painter, x, y, colour)
+            paint.dots(on.painter, x, y, colour)
 
-    def _plan(
-        self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
-    ) -> None:
+    def _plan(self, on: Drawing) -> None:
+        frame, source = on.frame, on.source
         time, force = source.planned(frame.start, frame.end)
         if not source.running or time.size < 2:
             return
@@ -221,10 +217,11 @@ class LanePainter:
         at = np.interp(source.reach, time, force)
         t = np.concatenate([[source.reach], time[ahead]])
         f = np.concatenate([[at], force[ahead]]) * self.lane.scale
-        line = QPen(QColor(tokens.trace("force")), 1, Qt.PenStyle.DashLine)
-        paint.polyline(painter, frame.x(t), frame.y(f), line)
+        line = QPen(QColor(on.tokens.trace("force")), 1, Qt.PenStyle.DashLine)
+        paint.polyline(on.painter, frame.x(t), frame.y(f), line)
 
-    def _tolerance(self, painter: QPainter, frame: Frame, tokens: Tokens) -> None:
+    def _tolerance(self, on: Drawing) -> None:
+        painter, frame, tokens = on.painter, on.frame, on.tokens
         half = BAND * self.lane.scale
         top, bottom = frame.y1(half), frame.y1(-half)
         painter.fillRect(
@@ -235,9 +232,8 @@ class LanePainter:
         for y in (top, bottom):
             painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
 
-    def _raster(
-        self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
-    ) -> None:
+    def _raster(self, on: Drawing) -> None:
+        painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         two = self.options.twin and source.twin_spikes.size > 0
         names = ("meas.", "model") if two else ("meas.",)
@@ -250,14 +246,12 @@ class LanePainter:
             first, last = np.searchsorted(times, [frame.start, frame.end])
             paint.bars(painter, frame, times[first:last], span, paint.pen(colour))
 
-    def _cursors(
-        self, painter: QPainter, frame: Frame, tokens: Tokens, size: QSize
-    ) -> None:
+    def _cursors(self, on: Drawing) -> None:
         if self.view.cursors is None:
             return
-        for name, time, colour in zip(
-            "AB", self.view.cursors, (tokens.accent, tokens.V_C1), strict=True
-        ):
+        painter, frame, tokens = on.painter, on.frame, on.tokens
+        colours = tokens.accent, tokens.V_C1
+        for name, time, colour in zip("AB", self.view.cursors, colours, strict=True):
             x = frame.x1(time)
             if not frame.left <= x <= frame.right:
                 continue
@@ -271,10 +265,9 @@ class LanePainter:
                 painter.setFont(sized(11, QFont.Weight.Bold))
                 painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
 
-    def _tag(
-        self, painter: QPainter, frame: Frame, source: Source, tokens: Tokens
-    ) -> None:
+    def _tag(self, on: Drawing) -> None:
         """The value at the right edge of the data in view, beside where it is."""
+        painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         if not self.lane.valued:
             return
         edge = source.right_edge(self.view)

@@ -50,11 +50,6 @@ class FitCards(QWidget):
             frame.setToolTip(spoken)
         self.setVisible(bool(cards))
 
-    @property
-    def texts(self) -> list[tuple[str, str]]:
-        """Names and values shown."""
-        return [(name.text(), value.text()) for _, name, value, _ in self._labels]
-
 
 class TwinBars(QWidget):
     """One bar per signal: short is good."""

@@ -60,11 +60,6 @@ class LiveTask(QObject):
         if self.task is not None:
             self.task.say(act, *arguments, **named)
 
-    def wait_for_end(self, timeout: float) -> None:
-        """Block until it has ended, at most `timeout` s."""
-        if self.task is not None:
-            self.task.join(timeout)
-
     def take(self, event: TaskEvent) -> None:
         """Take what the task told."""
         if isinstance(event, Ended):

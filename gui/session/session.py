@@ -6,7 +6,6 @@ window's timer calls `poll`, which hands over all that the engine told. Nothing 
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -251,14 +250,6 @@ class Session(QObject):
         self.link.poll()
         self.desk.poll()
         return self.source is not None and self.source.take_new()
-
-    def wait_for_end(self, timeout: float) -> bool:
-        """Block until nothing drives the coil any more, at most `timeout` s."""
-        until = time.monotonic() + timeout
-        for task in (self.run, self.manual):
-            task.wait_for_end(max(0.0, until - time.monotonic()))
-        self.poll()
-        return not self.busy
 
     def close(self) -> None:
         """Let go of the engine; nothing drives a coil any more."""

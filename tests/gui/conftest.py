@@ -146,7 +146,7 @@ def opened(
     yield lab
     if session.busy:
         session.stop("tests are over")
-        session.wait_for_end(LONGEST)
+        lab.until(lambda: not session.busy)
     lab.until(lambda: session.link.idle)
     session.status.fault = None
     window.close()
