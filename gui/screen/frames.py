@@ -39,11 +39,6 @@ class Frames(QObject):
         self._timer.start(FAST)
         panels.centre.tools.freeze.toggled.connect(self.freeze)
 
-    @property
-    def interval(self) -> int:
-        """Milliseconds between frames now."""
-        return self._timer.interval()
-
     def freeze(self, on: bool) -> None:
         """Let the lanes stand still; acquisition goes on, and they catch up later."""
         self.frozen = on
