@@ -39,8 +39,8 @@ def command(
 ) -> None:
     """Export RUN as CSV (SI, units in the header), MATLAB or NWB file."""
     with refusing():
-        from tactile_lab.store.export.selection import Selection
         from tactile_lab.store.run import Run
+        from tactile_lab.store.selection import Selection
 
         selection = Selection(
             signals=signals or None,

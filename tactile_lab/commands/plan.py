@@ -61,8 +61,7 @@ def command(
     Opens no instrument, and writes nothing but the preview if that is asked for.
     """
     with refusing():
-        from tactile_lab.planning.plan import plan
-        from tactile_lab.planning.text import text
+        from tactile_lab.planning.plan import plan, text
         from tactile_lab.scene.load import load
 
         if picture is not None:

@@ -20,7 +20,8 @@ from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.store.run import Records, Run
+from tactile_lab.store.run import Run
+from tactile_lab.store.stored_run import Records
 
 FloatArray = NDArray[np.float64]
 

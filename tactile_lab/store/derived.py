@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent, drain_current
-
-if TYPE_CHECKING:
-    from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+from tactile_lab.store.stored_run import StoredRun
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +20,7 @@ STEP = 1e-3
 
 
 def table(
-    run: Run,
+    run: StoredRun,
     start: float,
     end: float | None,
     signals: Sequence[str] | None,
@@ -34,8 +32,6 @@ def table(
         RunFolderError: a signal is neither stored nor derived, or needs one that is
             not stored.
     """
-    from tactile_lab.store.export.selection import Selection
-
     if signals is None:  # a folder without a scene knows no force
         known = (run.path / "scene.toml").exists()
         signals = (*run.signals, "force") if known else run.signals
@@ -52,7 +48,7 @@ def table(
     }
 
 
-def _derived(run: Run, name: str, time: FloatArray) -> FloatArray:
+def _derived(run: StoredRun, name: str, time: FloatArray) -> FloatArray:
     if name == "force":
         return run.force.at(time)
     if name == "I_DS":
@@ -63,15 +59,13 @@ def _derived(run: Run, name: str, time: FloatArray) -> FloatArray:
     return values[np.searchsorted(rates["time"], time, side="right")]
 
 
-def drain_current_of(run: Run) -> DrainCurrent:
+def drain_current_of(run: StoredRun) -> DrainCurrent:
     """I_DS by Eq. (16) from the stored V_C1; NaN where samples are missing.
 
     Raises:
         RunFolderError: V_C1 was not stored, or there are too few samples of it.
         SceneError: the run's scene, which knows the divider, cannot be read any more.
     """
-    from tactile_lab.store.export.selection import Selection
-
     step = max(STEP, run.signal("V_C1").interval)
     time, read = Selection(signals=("V_C1",), rate=1 / step).read(run)
     V_C1, circuit = read["V_C1"], run.scene.circuit

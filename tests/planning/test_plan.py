@@ -6,8 +6,7 @@ import pytest
 
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
-from tactile_lab.planning.plan import plan
-from tactile_lab.planning.text import text
+from tactile_lab.planning.plan import plan, text
 from tactile_lab.scene.load import load
 
 

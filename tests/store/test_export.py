@@ -10,8 +10,8 @@ import scipy.io
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export import csv as to_csv
 from tactile_lab.store.export import mat as to_mat
-from tactile_lab.store.export.selection import Selection
 from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 

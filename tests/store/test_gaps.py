@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from tactile_lab.store.certificate import certify
 from tactile_lab.store.export import csv, mat, nwb
-from tactile_lab.store.export.selection import Selection
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
 from tactile_lab.store.verify import verify
 
 RECORDS = st.lists(

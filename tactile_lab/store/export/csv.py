@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.store.export.selection import Selection
 from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
 
 UNITS = {
     "gaps": {"start": "s", "end": "s"},

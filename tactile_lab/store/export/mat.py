@@ -9,8 +9,8 @@ import numpy as np
 import scipy.io
 
 from tactile_lab.errors import RunFolderError
-from tactile_lab.store.export.selection import Selection
 from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
 
 LARGEST = 2_000_000_000
 """Bytes one variable of a MAT file of version 5 can have."""

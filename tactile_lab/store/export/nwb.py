@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.errors import RunFolderError
-from tactile_lab.store.export.selection import Selection
 from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
 
 UNITS = {"V": "volts", "A": "amperes", "T": "tesla", "N": "newtons"}
 """What NWB calls SI units."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import show
-from tactile_lab.store.run import Run
+from tactile_lab.store.stored_run import StoredRun
 
 PIECE = 1 << 18
 """Rows handled at a time."""
@@ -35,7 +35,7 @@ class Selection:
     end: float | None = None
     rate: float | None = None
 
-    def check(self, run: Run) -> None:
+    def check(self, run: StoredRun) -> None:
         """Refuse what the run does not have, before a file is touched.
 
         Raises:
@@ -54,7 +54,7 @@ class Selection:
                 "that begins before it ends."
             )
 
-    def names(self, run: Run) -> tuple[str, ...]:
+    def names(self, run: StoredRun) -> tuple[str, ...]:
         """Signals to export.
 
         Raises:
@@ -82,7 +82,7 @@ class Selection:
             )
         return count
 
-    def spans(self, run: Run) -> list[tuple[int, int]]:
+    def spans(self, run: StoredRun) -> list[tuple[int, int]]:
         """(first, one past last) sample of each stretch without a gap."""
         names = self.names(run)
         if not names or not run.samples:
@@ -97,7 +97,7 @@ class Selection:
             return table[(table["time"] >= self.start) & (table["time"] < end)]
         return table[(table["end"] > self.start) & (table["start"] < end)]
 
-    def pieces(self, run: Run) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
+    def pieces(self, run: StoredRun) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
         """(times, one array of SI values per signal), a bounded piece at a time."""
         signals = [run.signal(name) for name in self.names(run)]
         for first, last in self.spans(run):
@@ -112,7 +112,7 @@ class Selection:
                     [_averaged(signal[at:stop], count) for signal in signals],
                 )
 
-    def read(self, run: Run) -> tuple[FloatArray, dict[str, FloatArray]]:
+    def read(self, run: StoredRun) -> tuple[FloatArray, dict[str, FloatArray]]:
         """Times, s, and the SI values of each signal there, all at once."""
         pieces = list(self.pieces(run))
         none = [np.empty(0)]

@@ -1,0 +1,334 @@
+"""Reads a run back: arrays with units, loaded only as far as they are indexed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.quantity import count, show
+from tactile_lab.spikes.detection import Detection
+from tactile_lab.store.applied import (
+    BIN_TIME,
+    AppliedCurrent,
+    Shunt,
+    applied_current,
+    held,
+)
+from tactile_lab.store.data_file import open_data
+from tactile_lab.store.folder import DATA, is_live, read_info
+from tactile_lab.store.layout import BIN
+from tactile_lab.store.signal import Axis, StoredSignal
+from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.scene.scene import Scene
+
+FloatArray = NDArray[np.float64]
+Records = NDArray[Any]
+
+
+class StoredRun:
+    """One run on disk, running, complete or cut short.
+
+    Attributes:
+        path: the folder.
+        info: what `run.json` says.
+    """
+
+    def __init__(self, path: Path, info: dict[str, Any], file: h5py.File) -> None:
+        self.path = path
+        self.info = info
+        self._file = file
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Open the run in folder `path` for reading, also while it is written.
+
+        Raises:
+            RunFolderError: not a run folder, or its data cannot be read.
+        """
+        path = Path(path)
+        info = read_info(path)
+        file = path / DATA
+        if not file.exists():
+            raise RunFolderError(
+                f"{path} has no {DATA}: the run ended ({info['status']}) before the "
+                "first sample was stored."
+            )
+        try:
+            live = info["status"] == "running" and is_live(path)
+            opened = open_data(file, live=live)
+            try:
+                opened.attrs["schema"], opened["events"]  # the last that was declared
+            except BaseException:
+                opened.close()
+                raise
+        except (OSError, KeyError, RuntimeError) as error:
+            raise RunFolderError(
+                f"{file} cannot be read: {error}. A run that was cut short before its "
+                "first sample has nothing to read; else `tactile-lab verify` says "
+                "where the file is damaged."
+            ) from error
+        return cls(path, info, opened)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def refresh(self) -> None:
+        """See what a living writer has added since."""
+        self.info = read_info(self.path)
+
+        def renew(name: str, node: Any) -> None:
+            if isinstance(node, h5py.Dataset):
+                node.refresh()
+
+        self._file.visititems(renew)
+
+    @property
+    def status(self) -> str:
+        """Running, complete, aborted, faulted or recovered."""
+        return str(self.info["status"])
+
+    @property
+    def simulated(self) -> bool:
+        """Whether physics was computed."""
+        return bool(self._file.attrs["simulated"])
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Calibration and other constants of the run."""
+        return dict(self._file.attrs)
+
+    @property
+    def gapless(self) -> bool:
+        """Whether a missing sample is a lost sample: not from a scope that polls."""
+        return "record" not in self._file.attrs
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals stored sample by sample."""
+        group = self._file.get("samples")
+        return () if group is None else tuple(group)
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """Names of the signals that have checksums or a pyramid."""
+        groups = (self._file.get(kind) for kind in ("checks", "pyramid"))
+        return tuple(sorted({name for group in groups for name in group or ()}))
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel that all channels have, checksum included."""
+        lengths = [self.stored(name) for name in self.signals]
+        return min(lengths, default=0)
+
+    def signal(self, name: str) -> StoredSignal:
+        """A stored signal by name, such as "V_C1".
+
+        Raises:
+            RunFolderError: the run did not store it.
+        """
+        if name not in self.signals:
+            raise RunFolderError(
+                f"{self.path} stores no {name}; it stores "
+                f"{', '.join(self.signals) or 'no samples'}."
+            )
+        samples, _, pyramid = self.column(name)
+        return StoredSignal(name, samples, pyramid, self.samples, self.axis)
+
+    def column(self, name: str) -> tuple[h5py.Dataset, h5py.Dataset, h5py.Dataset]:
+        """Datasets of one channel as stored: samples, checks, pyramid."""
+        kinds = ("samples", "checks", "pyramid")
+        samples, checks, pyramid = (self._file[f"{kind}/{name}"] for kind in kinds)
+        return samples, checks, pyramid
+
+    @property
+    def axis(self) -> Axis:
+        """Where stored samples lie in time."""
+        rows = self.records("segments")
+        return Axis(
+            rows["first"].copy(),
+            rows["time"].copy(),
+            rows["interval"] * (1.0 + rows["drift"]),
+        )
+
+    @property
+    def duration(self) -> float:
+        """End of the newest sample, trial or reading, s on the run's axis."""
+        ends = [0.0]
+        if self.samples:
+            ends.append(float(self.axis.time_of(float(self.samples))))
+        for name, column in (("trials", "end"), ("current", "time")):
+            rows = self.records(name)[column]
+            if rows.size:
+                ends.append(float(rows[-1]))
+        return max(ends)
+
+    def records(self, name: str) -> Records:
+        """A table of fixed records by name; see `layout.RECORDS` for its fields."""
+        rows: Records = self._file[name][()]
+        return rows
+
+    def table(self, name: str) -> h5py.Dataset:
+        """A table as the file holds it, unread."""
+        return self._file[name]
+
+    @property
+    def spikes(self) -> Records:
+        """Detected spikes: sample, time (s), amplitude (SI), width (s)."""
+        rows = self.records("spikes")
+        attrs = self._file["spikes"].attrs
+        kind = np.dtype([(n, "f8") for n in ("sample", "time", "amplitude", "width")])
+        spikes = np.empty(rows.size, kind)
+        axis = self.axis
+        spikes["sample"] = rows["sample"]
+        spikes["time"] = rows["time"]
+        if axis.first.size:
+            spikes["time"] = axis.time_of(rows["sample"])
+        gain, offset = attrs.get("gain", np.nan), attrs.get("offset", np.nan)
+        if attrs.get("kind") == "reset":
+            gain, offset = 2 * gain, 0.0  # half the fall is stored, see ResetDetector
+        spikes["amplitude"] = rows["amplitude"] * gain + offset
+        step = axis.step[0] if axis.step.size else np.nan
+        spikes["width"] = rows["width"] * step
+        return spikes
+
+    @property
+    def detection(self) -> Detection | None:
+        """How spikes were detected; None where nothing was searched."""
+        attrs = self._file["spikes"].attrs
+        if "signal" not in attrs:
+            return None
+        return Detection(
+            signal=str(attrs["signal"]),
+            threshold=int(attrs["threshold"]),
+            hysteresis=int(attrs["hysteresis"]),
+            refractory=int(attrs["refractory"]),
+            polarity=1 if attrs["polarity"] > 0 else -1,
+            kind="reset" if attrs["kind"] == "reset" else "crossing",
+            span=int(attrs["span"]),
+        )
+
+    @property
+    def gaps(self) -> Records:
+        """Times without samples while the scope streamed: start, end (s), missing."""
+        rows = self.records("gaps")
+        gaps = np.empty(rows.size, [("start", "f8"), ("end", "f8"), ("missing", "i8")])
+        interval = float(self.attributes.get("interval", 0.0))
+        gaps["start"] = rows["time"] - rows["missing"] * interval
+        gaps["end"], gaps["missing"] = rows["time"], rows["missing"]
+        return gaps
+
+    @property
+    def trials(self) -> Records:
+        """Trials: index, start, end (s), level (N), hold, spikes, label (bytes)."""
+        return self.records("trials")
+
+    @property
+    def current(self) -> Records:
+        """Applied current: time (s), setpoint and measured (A; NaN where not read)."""
+        return self.records("current")
+
+    @property
+    def shunt(self) -> Shunt | None:
+        """Reads the recorded coil current between two times; None without one."""
+        if "coil_current" not in self.signals:
+            return None
+        signal = self.signal("coil_current")
+        # whole bins of the run's pyramid where they are fine enough
+        together = min(BIN, max(1, round(BIN_TIME / signal.interval)))
+
+        def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
+            part = signal.between(start, end)
+            cells = max(1, (part.stop - part.start) // together)
+            found = signal.trace(part.start, part.stop, cells=cells)
+            # the last may be short
+            return found.time[:-1] + found.width / 2, found.mean[:-1]
+
+        return seen
+
+    @property
+    def applied(self) -> AppliedCurrent:
+        """The coil current: levels as read back, edges where the shunt saw them."""
+        rows = self.current
+        return applied_current(
+            rows["time"], rows["setpoint"], rows["measured"], self.shunt
+        )
+
+    @property
+    def scene(self) -> Scene:
+        """The resolved scene that was run.
+
+        Raises:
+            SceneError: it cannot be read any more.
+        """
+        from tactile_lab.scene.load import load
+
+        return load(self.path / "scene.toml")
+
+    @property
+    def force(self) -> Waveform:
+        """The force that the applied current gives by the run's calibration, N.
+
+        Raises:
+            SceneError: the run's scene cannot be read any more.
+        """
+        magnet = self.scene.bench.magnet
+        current = held(self.applied.steps, self.duration)
+        return magnet.force_for(current, beyond="hold")
+
+    @property
+    def field(self) -> Records:
+        """Teslameter readings: time (s), field (T)."""
+        return self.records("field")
+
+    @property
+    def events(self) -> Records:
+        """What happened: time (s), kind and text (bytes, UTF-8)."""
+        return self.records("events")
+
+    @property
+    def rate(self) -> Records:
+        """Instantaneous rate: time of each spike from the second on, s, and 1/ISI, Hz.
+
+        It holds from that time to the next; before the second spike it is 0.
+        """
+        times = self.spikes["time"]
+        found = np.empty(max(times.size - 1, 0), [("time", "f8"), ("rate", "f8")])
+        found["time"], found["rate"] = times[1:], 1.0 / np.diff(times)
+        return found
+
+    def stored(self, name: str) -> int:
+        """Samples of one channel that have a checksum."""
+        samples, checks, _ = self.column(name)
+        checked = int(checks["samples"].sum(dtype=np.int64))
+        return min(checked, int(samples.shape[0]))
+
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"<Run {self.path.name}: closed>"
+        kind = "simulated" if self.simulated else "measured"
+        trials, spikes = len(self.trials), len(self.table("spikes"))
+        return (
+            f"<Run of {self.info.get('scene') or self.path.name}: {self.status}, "
+            f"{kind}, {show(self.duration, 's')}, {count(trials, 'trial')}, "
+            f"{count(spikes, 'spike')}; {', '.join(self.signals) or 'no samples'}>"
+        )
