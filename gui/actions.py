@@ -21,7 +21,7 @@ from gui.stop_anywhere import StopAnywhere
 
 
 @dataclass(frozen=True)
-class Key:
+class Shortcut:
     """One shortcut.
 
     Attributes:
@@ -73,7 +73,7 @@ class Actions(QObject):
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
 
-    def _bind(self, keys: str, key: Key) -> None:
+    def _bind(self, keys: str, key: Shortcut) -> None:
         shortcut = QShortcut(QKeySequence(keys), self._window)
         shortcut.activated.connect(lambda: key.act())
 
@@ -86,44 +86,52 @@ class Actions(QObject):
                 return True
         return False
 
-    def _all(self) -> list[Key]:
+    def _all(self) -> list[Shortcut]:
         panels = self._panels
         tools, view = panels.centre.tools, panels.centre.view
         form = panels.setup.form
         return [
-            Key(("Ctrl+R",), "Run", panels.setup.start),
-            Key(("Ctrl+Return",), "Queue; save a queued run", panels.setup.enqueue),
-            Key(("Space",), "Freeze the display", tools.freeze.toggle, single=True),
-            Key(("F",), "Follow", tools.follow.click, single=True),
-            Key(("A",), "Fit the whole run", view.show_all, single=True),
-            Key(("Z",), "Zoom to a box", tools.zoom.toggle, single=True),
-            Key(("C",), "Cursors", tools.cursors.click, single=True),
-            Key(("1",), "Grab cursor A", lambda: tools.bring(0), single=True),
-            Key(("2",), "Grab cursor B", lambda: tools.bring(1), single=True),
-            Key(("M",), "Model", tools.twin.toggle, single=True),
-            Key(("Shift+M",), "Residual", tools.residual.toggle, single=True),
-            Key(("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True),
-            Key(("-",), "Zoom out", lambda: view.zoom(1 / 1.5), single=True),
-            Key(("Left",), "Earlier", lambda: self._nudge(-1), single=True),
-            Key(("Right",), "Later", lambda: self._nudge(1), single=True),
-            Key(("Home",), "Start of the run", self._home, single=True),
-            Key(("End",), "End of the run", lambda: view.set_follow(True), single=True),
-            Key(("N",), "Note", panels.centre.log.note.setFocus, single=True),
-            Key(("Ctrl+O",), "Open a scene", self._screen.ask_scene),
-            Key(("Ctrl+Shift+O",), "Open a run", self._screen.ask_run),
-            Key(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
-            Key(("Ctrl+E",), "Export the view", lambda: self.export_view()),
-            Key(("Ctrl+F",), "Search runs", self._search),
-            Key(("Ctrl+1",), "Results", lambda: self._tab(0)),
-            Key(("Ctrl+2",), "Runs", lambda: self._tab(1)),
-            Key(("Ctrl+3",), "Manual", lambda: self._tab(2)),
-            Key(("Ctrl+Z",), "Undo in the form", form.undo_edit),
-            Key(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.redo_edit),
-            Key(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
-            Key(("F8",), "Fold the right panel", lambda: self._fold(panels.review)),
-            Key(("F11",), "Lanes only", self._focus),
-            Key(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
-            Key(
+            Shortcut(("Ctrl+R",), "Run", panels.setup.start),
+            Shortcut(
+                ("Ctrl+Return",), "Queue; save a queued run", panels.setup.enqueue
+            ),
+            Shortcut(
+                ("Space",), "Freeze the display", tools.freeze.toggle, single=True
+            ),
+            Shortcut(("F",), "Follow", tools.follow.click, single=True),
+            Shortcut(("A",), "Fit the whole run", view.show_all, single=True),
+            Shortcut(("Z",), "Zoom to a box", tools.zoom.toggle, single=True),
+            Shortcut(("C",), "Cursors", tools.cursors.click, single=True),
+            Shortcut(("1",), "Grab cursor A", lambda: tools.bring(0), single=True),
+            Shortcut(("2",), "Grab cursor B", lambda: tools.bring(1), single=True),
+            Shortcut(("M",), "Model", tools.twin.toggle, single=True),
+            Shortcut(("Shift+M",), "Residual", tools.residual.toggle, single=True),
+            Shortcut(("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True),
+            Shortcut(("-",), "Zoom out", lambda: view.zoom(1 / 1.5), single=True),
+            Shortcut(("Left",), "Earlier", lambda: self._nudge(-1), single=True),
+            Shortcut(("Right",), "Later", lambda: self._nudge(1), single=True),
+            Shortcut(("Home",), "Start of the run", self._home, single=True),
+            Shortcut(
+                ("End",), "End of the run", lambda: view.set_follow(True), single=True
+            ),
+            Shortcut(("N",), "Note", panels.centre.log.note.setFocus, single=True),
+            Shortcut(("Ctrl+O",), "Open a scene", self._screen.ask_scene),
+            Shortcut(("Ctrl+Shift+O",), "Open a run", self._screen.ask_run),
+            Shortcut(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
+            Shortcut(("Ctrl+E",), "Export the view", lambda: self.export_view()),
+            Shortcut(("Ctrl+F",), "Search runs", self._search),
+            Shortcut(("Ctrl+1",), "Results", lambda: self._tab(0)),
+            Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
+            Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),
+            Shortcut(("Ctrl+Z",), "Undo in the form", form.undo_edit),
+            Shortcut(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.redo_edit),
+            Shortcut(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
+            Shortcut(
+                ("F8",), "Fold the right panel", lambda: self._fold(panels.review)
+            ),
+            Shortcut(("F11",), "Lanes only", self._focus),
+            Shortcut(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
+            Shortcut(
                 ("?", "F1"),
                 "Help and shortcuts",
                 lambda: self.show_help(),

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QLabel
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import bar, label, lines, push
-from gui.state import Fault
+from gui.state import FaultNotice
 
 
 class Banner(QFrame):
@@ -33,7 +33,7 @@ class Banner(QFrame):
         self.acknowledge.clicked.connect(self.acknowledged)
         self.hide()
 
-    def show_fault(self, fault: Fault | None) -> None:
+    def show_fault(self, fault: FaultNotice | None) -> None:
         """Show a fault, or hide."""
         self.setVisible(fault is not None)
         if fault is not None:

@@ -11,7 +11,7 @@ STALE = 1.5
 """Seconds without a word from a live coil's source after which its state is unknown."""
 
 
-class State(Enum):
+class WindowState(Enum):
     """The one state of the window."""
 
     DISCONNECTED = "no bench"
@@ -22,7 +22,7 @@ class State(Enum):
     FAULT = "fault"
 
 
-class Truth(Enum):
+class CoilKnowledge(Enum):
     """What is known about the coil, from read-back, never from commands."""
 
     NONE = "none"
@@ -90,7 +90,7 @@ class InstrumentView:
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultNotice:
     """What went wrong, and what to do now."""
 
     title: str
@@ -114,7 +114,7 @@ class Snapshot:
         fault: unacknowledged fault.
     """
 
-    state: State = State.DISCONNECTED
+    state: WindowState = WindowState.DISCONNECTED
     bench: str = ""
     simulated: bool = False
     title: str = "No bench connected"
@@ -123,24 +123,26 @@ class Snapshot:
     elapsed: float = 0.0
     expected: float | None = None
     manual: bool = False
-    fault: Fault | None = None
+    fault: FaultNotice | None = None
 
 
-def truth(state: State, coil: CoilView | None) -> Truth:
+def truth(state: WindowState, coil: CoilView | None) -> CoilKnowledge:
     """What may be claimed about the coil.
 
     A live coil whose source has been silent for longer than `STALE` is unknown, and so
     is one whose switching off could not be verified.
     """
     if coil is None:
-        return Truth.NONE
+        return CoilKnowledge.NONE
     if coil.output is None or (not coil.output and coil.verified_off is False):
-        return Truth.UNKNOWN
+        return CoilKnowledge.UNKNOWN
     if not coil.output:
-        return Truth.OFF
+        return CoilKnowledge.OFF
     if coil.age > STALE:
-        return Truth.UNKNOWN
-    return Truth.FALLING if state is State.ABORTING else Truth.LIVE
+        return CoilKnowledge.UNKNOWN
+    return (
+        CoilKnowledge.FALLING if state is WindowState.ABORTING else CoilKnowledge.LIVE
+    )
 
 
 @dataclass(frozen=True)
@@ -164,37 +166,37 @@ def milliamperes(current: float | None) -> str:
     return printed(f"{number} mA")
 
 
-def stop_text(state: State, coil: CoilView | None) -> StopText:
+def stop_text(state: WindowState, coil: CoilView | None) -> StopText:
     """What STOP says, from the read-back."""
     what = truth(state, coil)
-    if what is Truth.NONE or coil is None:
+    if what is CoilKnowledge.NONE or coil is None:
         return StopText("STOP", "no coil source")
     now = milliamperes(coil.current)
-    if what is Truth.UNKNOWN:
+    if what is CoilKnowledge.UNKNOWN:
         return StopText("COIL STATE UNKNOWN", "switch off at the source")
-    if what is Truth.FALLING:
+    if what is CoilKnowledge.FALLING:
         return StopText("STOPPING", f"{now} → 0")
-    if what is Truth.LIVE:
+    if what is CoilKnowledge.LIVE:
         if coil.current is None or coil.read_age > STALE:
             sent = milliamperes(coil.setpoint)
             return StopText("STOP · COIL OFF", f"{sent} sent, not read back")
         return StopText("STOP · COIL OFF", f"{now} live")
-    if state is State.FAULT:
+    if state is WindowState.FAULT:
         return StopText("COIL IS OFF", f"{now} verified")
     return StopText("STOP", f"coil is off · {now}")
 
 
 def run_problem(snapshot: Snapshot, *, form_problem: str) -> str:
     """Why a run cannot start now, "" if it can."""
-    if snapshot.state is State.DISCONNECTED:
+    if snapshot.state is WindowState.DISCONNECTED:
         return "No bench is connected."
-    if snapshot.state is State.CONNECTING:
+    if snapshot.state is WindowState.CONNECTING:
         return "The bench is still connecting."
-    if snapshot.state is State.RUNNING:
+    if snapshot.state is WindowState.RUNNING:
         return "A run is in progress; use Queue to have this one follow."
-    if snapshot.state is State.ABORTING:
+    if snapshot.state is WindowState.ABORTING:
         return "The run is being stopped."
-    if snapshot.state is State.FAULT:
+    if snapshot.state is WindowState.FAULT:
         return "Acknowledge the fault first."
     if snapshot.manual:
         return "The coil is driven by hand; switch it off first."
@@ -204,23 +206,23 @@ def run_problem(snapshot: Snapshot, *, form_problem: str) -> str:
 def clock_text(snapshot: Snapshot) -> tuple[str, str]:
     """The state in capitals and the clock below it."""
     word = {
-        State.DISCONNECTED: "NO BENCH",
-        State.CONNECTING: "CONNECTING",
-        State.READY: "READY",
-        State.RUNNING: "RUNNING",
-        State.ABORTING: "STOPPING",
-        State.FAULT: "FAULT",
+        WindowState.DISCONNECTED: "NO BENCH",
+        WindowState.CONNECTING: "CONNECTING",
+        WindowState.READY: "READY",
+        WindowState.RUNNING: "RUNNING",
+        WindowState.ABORTING: "STOPPING",
+        WindowState.FAULT: "FAULT",
     }[snapshot.state]
-    if snapshot.state is State.DISCONNECTED:
+    if snapshot.state is WindowState.DISCONNECTED:
         return word, "connect to start"
-    if snapshot.state is State.CONNECTING:
+    if snapshot.state is WindowState.CONNECTING:
         return word, "asking the instruments"
     elapsed = minutes(snapshot.elapsed, tenths=True)
-    if snapshot.state in (State.RUNNING, State.ABORTING):
+    if snapshot.state in (WindowState.RUNNING, WindowState.ABORTING):
         if snapshot.expected is None:
             return word, elapsed
         return word, f"{elapsed} / {minutes(snapshot.expected)}"
-    if snapshot.state is State.FAULT:
+    if snapshot.state is WindowState.FAULT:
         return word, f"stopped at {elapsed}"
     if snapshot.manual:
         return word, "coil by hand"

@@ -29,7 +29,7 @@ from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.session.session import Session
 from gui.setup.panel import SetupPanel
-from gui.state import Snapshot, State
+from gui.state import Snapshot, WindowState
 from gui.tab_order import move_on
 
 NARROW = 1280
@@ -89,12 +89,12 @@ class Window(QMainWindow):
         if self._bench_changed():
             self.review.manual.show_bench(self.session.bench.spec)
         self.centre.show_empty(
-            snapshot.state in (State.DISCONNECTED, State.CONNECTING)
+            snapshot.state in (WindowState.DISCONNECTED, WindowState.CONNECTING)
             and self.screen_.run is None
         )
         tools = self.centre.tools
         watching = self.session.monitor.alive
-        tools.monitor.setEnabled(watching or snapshot.state is State.READY)
+        tools.monitor.setEnabled(watching or snapshot.state is WindowState.READY)
         if focus is not None and not (focus.isEnabled() and focus.isVisible()):
             # what had it is locked or gone: Space shall not press what comes next
             self.page.setFocus()
@@ -155,7 +155,7 @@ class Window(QMainWindow):
         if not self._leaving or self.session.busy or self.session.monitor.alive:
             return
         self._leaving = False
-        if self.session.state is not State.FAULT:
+        if self.session.state is not WindowState.FAULT:
             self.close()
         else:
             self.closing.say(

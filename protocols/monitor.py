@@ -13,7 +13,7 @@ from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
 
-class Monitor(Protocol):
+class NoForce(Protocol):
     """No force at all: V_C1, V_C2 and the rate, live, until stopped or `duration`."""
 
     name: ClassVar[str] = "monitor"

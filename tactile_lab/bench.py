@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from tactile_lab.clock import Clock
 from tactile_lab.quantity import Unit
-from tactile_lab.table import Table
+from tactile_lab.table import SceneTable
 
 COPPER = 0.00393
 """Temperature coefficient of copper's resistance at 20 C, 1/K."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoilLimits(Table):
+class CoilLimits(SceneTable):
     """What the coil and its source may be asked to do: ``[coil.limits]``.
 
     Attributes:
@@ -144,7 +144,7 @@ class CoilCapability:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Channel(Table):
+class Channel(SceneTable):
     """One scope input and what is wired to it: an entry of ``[[scope.channels]]``.
 
     Attributes:

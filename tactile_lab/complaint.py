@@ -51,7 +51,7 @@ def validated(
     """What a file holds as the noun it describes.
 
     Args:
-        kind: a `tactile_lab.table.Table`, or a pydantic model.
+        kind: a `tactile_lab.table.SceneTable`, or a pydantic model.
         table: as the file has it; quantities are texts, lists are tuples.
         at: keys under which it was found.
         blame: names the origin of a key.

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_lab.calibration import Calibration, CalibrationFile
 from tactile_lab.errors import LimitError, ParameterError
 from tactile_lab.quantity import Unit, show
-from tactile_lab.table import Table
+from tactile_lab.table import SceneTable
 from tactile_lab.waveform import Waveform
 
 MU_0 = 1.25663706127e-6
@@ -45,7 +45,7 @@ class ForceUncertainty:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Magnet(Table):
+class Magnet(SceneTable):
     """The electromagnet, the magnet on the cantilever and the distance between them.
 
     It is the table ``[magnet]`` of a bench file.

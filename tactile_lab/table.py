@@ -1,9 +1,9 @@
 """Tables of a scene or bench file: plain dataclasses, validated in place.
 
-A noun that a file can describe is a frozen dataclass that inherits `Table`; units and
-limits stand at its fields (``current: Annotated[float, Unit("A", above=0.0)]``). Made
-in Python it is what it is given; `tactile_lab.complaint.validated` makes one of what a
-file holds. Nothing here loads pydantic before a file is read.
+A noun that a file can describe is a frozen dataclass that inherits `SceneTable`; units
+and limits stand at its fields (``current: Annotated[float, Unit("A", above=0.0)]``).
+Made in Python it is what it is given; `tactile_lab.complaint.validated` makes one of
+what a file holds. Nothing here loads pydantic before a file is read.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ INTERNAL = {"internal": True}
 """Metadata of a dataclass field that no file may set."""
 
 
-class Table:
+class SceneTable:
     """What a table of a file describes: strict, unknown keys refused."""
 
     __pydantic_config__: ClassVar[Any] = {

@@ -13,7 +13,7 @@ from drivers.picoscope.ring import StreamRing
 from drivers.picoscope.sample_count import SampleCount
 from drivers.picoscope.sdk import INPUTS, RANGES, TIME_UNITS
 from drivers.picoscope.setup import configure, ring_samples, streaming_interval
-from drivers.picoscope.unit import Unit
+from drivers.picoscope.unit import ScopeUnit
 from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import LinkLostError, RefusedError, SamplesLostError
@@ -81,7 +81,7 @@ class PicoScope(Opened):
         lag_tolerance: float | None = None,
     ) -> None:
         self._clock = clock
-        self._unit = Unit(
+        self._unit = ScopeUnit(
             library, serial, allow_usb2=allow_usb2, allow_usb_power=allow_usb_power
         )
         self._poll_interval = poll_interval

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from drivers.picoscope import status
 from drivers.picoscope.sdk import COUPLINGS, INPUTS, RANGES, TIME_UNITS
-from drivers.picoscope.unit import Unit
+from drivers.picoscope.unit import ScopeUnit
 from tactile_lab.bench import Channel
 from tactile_lab.errors import LimitError
 
@@ -39,7 +39,9 @@ def ring_samples(interval: float) -> int:
     return min(max(wanted, _LEAST_RING), _MOST_RING)
 
 
-def configure(unit: Unit, channels: Sequence[Channel], inputs: Sequence[str]) -> None:
+def configure(
+    unit: ScopeUnit, channels: Sequence[Channel], inputs: Sequence[str]
+) -> None:
     """Set the used inputs, switch the others off, and the trigger too.
 
     Raises:
@@ -60,7 +62,7 @@ def configure(unit: Unit, channels: Sequence[Channel], inputs: Sequence[str]) ->
     unit.do("Switching the trigger off", "ps3000aSetSimpleTrigger", 0, 0, 0, 2, 0, 0)
 
 
-def _switch_off(unit: Unit, name: str) -> None:
+def _switch_off(unit: ScopeUnit, name: str) -> None:
     code = unit.call(
         "ps3000aSetChannel", INPUTS.index(name), 0, COUPLINGS["DC"], RANGES[5.0], 0.0
     )
@@ -69,7 +71,7 @@ def _switch_off(unit: Unit, name: str) -> None:
         raise status.failure(code, f"Switching input {name} off")
 
 
-def _check_offset(unit: Unit, channel: Channel) -> None:
+def _check_offset(unit: ScopeUnit, channel: Channel) -> None:
     if channel.offset == 0:
         return
     most, least = ctypes.c_float(), ctypes.c_float()

@@ -17,7 +17,7 @@ from tactile_lab.errors import LimitError, RefusedError
 _MOST_ACKNOWLEDGEMENTS = 4
 
 
-class Unit:
+class ScopeUnit:
     """A PicoScope's handle.
 
     Args:

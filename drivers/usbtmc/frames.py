@@ -15,7 +15,7 @@ _LAYOUT = struct.Struct("<BBBxIB3x")
 
 
 @dataclass(frozen=True)
-class Header:
+class FrameHeader:
     """A bulk header.
 
     Attributes:
@@ -37,7 +37,7 @@ class Header:
         )
 
     @classmethod
-    def unpack(cls, raw: bytes) -> Header:
+    def unpack(cls, raw: bytes) -> FrameHeader:
         """The header at the start of `raw`.
 
         Raises:
@@ -60,13 +60,13 @@ class Header:
 def message_out(tag: int, payload: bytes, end: bool = True) -> bytes:
     """DEV_DEP_MSG_OUT with `payload`, padded with zeros to a multiple of 4."""
     pad = -len(payload) % 4
-    header = Header(DEV_DEP_MSG_OUT, tag, len(payload), end)
+    header = FrameHeader(DEV_DEP_MSG_OUT, tag, len(payload), end)
     return header.pack() + payload + bytes(pad)
 
 
 def request_in(tag: int, size: int) -> bytes:
     """REQUEST_DEV_DEP_MSG_IN for at most `size` message bytes."""
-    return Header(DEV_DEP_MSG_IN, tag, size, False).pack()
+    return FrameHeader(DEV_DEP_MSG_IN, tag, size, False).pack()
 
 
 def next_tag(tag: int) -> int:

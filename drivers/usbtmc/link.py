@@ -12,7 +12,7 @@ from drivers.usbtmc.errors import is_gone, is_timeout, translated, translating
 from drivers.usbtmc.frames import (
     DEV_DEP_MSG_IN,
     HEADER,
-    Header,
+    FrameHeader,
     block_payload,
     block_size,
     message_out,
@@ -213,7 +213,7 @@ class UsbtmcLink:
             raise translated(error, self.name, self.vendor) from error
         raw = self._bulk_in(HEADER)
         try:
-            header = Header.unpack(raw)
+            header = FrameHeader.unpack(raw)
             if header.message != DEV_DEP_MSG_IN or header.tag != tag:
                 raise BadReplyError(
                     f"{self.name} answered request {tag} with message "

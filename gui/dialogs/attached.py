@@ -13,7 +13,7 @@ from gui.parts import column, empty, label, panel, say, sign
 TOP = Qt.AlignmentFlag.AlignTop
 
 
-class Attached(QWidget):
+class AttachedList(QWidget):
     """A row per port or device: where, what it answered, which row or driver fits."""
 
     def __init__(self, theme: Theme) -> None:

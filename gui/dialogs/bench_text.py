@@ -23,7 +23,7 @@ PRINTED = {"-": "−", "Ohm": "Ω", "^2": "²"}
 
 
 @dataclass
-class Choice:
+class BenchChoice:
     """What the user chose; texts as they stand in a bench file, "" for not used.
 
     Attributes:
@@ -51,21 +51,21 @@ class Choice:
     base: dict[str, Any] = field(default_factory=dict)
 
 
-def start_choice() -> Choice:
+def start_choice() -> BenchChoice:
     """The built-in bench's wiring and geometry, with no instrument chosen."""
-    choice = Choice()
+    choice = BenchChoice()
     _take_over(choice, _built_in())
     return choice
 
 
-def show_bench(choice: Choice, spec: BenchSpec) -> None:
+def show_bench(choice: BenchChoice, spec: BenchSpec) -> None:
     """Let `choice` start from a bench; a simulated one gives no name and no port."""
     if not spec.simulated:
         choice.name = spec.name
     _take_over(choice, dumped(spec))
 
 
-def bench_text(choice: Choice) -> str:
+def bench_text(choice: BenchChoice) -> str:
     """The bench file that `choice` describes."""
     base = choice.base
     kept = ("notes", "hand_set")
@@ -103,7 +103,7 @@ def bench_text(choice: Choice) -> str:
     return tomli_w.dumps(data)
 
 
-def save_bench(choice: Choice, path: Path) -> BenchSpec:
+def save_bench(choice: BenchChoice, path: Path) -> BenchSpec:
     """Write the bench file and read it back.
 
     Raises:
@@ -121,7 +121,7 @@ def save_bench(choice: Choice, path: Path) -> BenchSpec:
     return spec
 
 
-def _take_over(choice: Choice, data: dict[str, Any]) -> None:
+def _take_over(choice: BenchChoice, data: dict[str, Any]) -> None:
     choice.base = data
     scope = data.get("scope", {})
     choice.channels = [
@@ -171,7 +171,9 @@ def _typed(text: Any) -> Any:
     return text
 
 
-def _channel(choice: Choice, row: tuple[str, str, str, str, str]) -> dict[str, Any]:
+def _channel(
+    choice: BenchChoice, row: tuple[str, str, str, str, str]
+) -> dict[str, Any]:
     where, signal, full, offset, shunt = map(_typed, row)
     known = choice.base.get("scope", {}).get("channels", ())
     base = next((dict(one) for one in known if one["signal"] == signal), {})

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
-from gui.dialogs.bench_text import Choice
+from gui.dialogs.bench_text import BenchChoice
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, line, line_edit, push, row
 from gui.review.conclusion import Concluded
@@ -34,7 +34,7 @@ class Calibrating(QWidget):
     force_asked = Signal()
     use_asked = Signal(object)
 
-    def __init__(self, choice: Choice, theme: Theme) -> None:
+    def __init__(self, choice: BenchChoice, theme: Theme) -> None:
         super().__init__()
         self._choice = choice
         self._file: Path | None = None

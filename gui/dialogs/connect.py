@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from gui.ask_file import ask_file
 from gui.dialogs.bench_text import save_bench, show_bench, start_choice
 from gui.dialogs.calibrating import Calibrating
-from gui.dialogs.instruments import Instruments
+from gui.dialogs.instruments import InstrumentsPage
 from gui.dialogs.overlay import Overlay
 from gui.dialogs.wiring import Wiring
 from gui.look.theme import Theme
@@ -32,9 +32,9 @@ from gui.parts import (
     scrolling,
 )
 from gui.review.conclusion import conclusion_of
-from gui.session.log import Level
+from gui.session.log import Severity
 from gui.session.session import Session
-from gui.state import State, minutes
+from gui.state import WindowState, minutes
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import protocol_checking
@@ -74,7 +74,7 @@ class Connect(Overlay):
         self._running = ""
         self._wiring, self._field = (protocol_checking(w) for w in ("wiring", "field"))
         self._ended = {self._wiring: "", self._field: ""}
-        self.instruments = Instruments(self._choice, theme)
+        self.instruments = InstrumentsPage(self._choice, theme)
         self.wiring = Wiring(self._choice, theme)
         self.calibration = Calibrating(self._choice, theme)
         self.name = line_edit("Name of the bench", text=self._choice.name)
@@ -132,7 +132,7 @@ class Connect(Overlay):
             self._say(str(error))
             return False
         self._say("")
-        self.session.log.add(Level.GOOD, "bench", f"Saved {path}")
+        self.session.log.add(Severity.GOOD, "bench", f"Saved {path}")
         self.hide()
         self.session.connect_bench(str(path))
         return True
@@ -149,7 +149,9 @@ class Connect(Overlay):
             self._say(str(error))
             return False
         self._say("")
-        self.session.log.add(Level.GOOD, "bench", f"Saved {path} with its calibration")
+        self.session.log.add(
+            Severity.GOOD, "bench", f"Saved {path} with its calibration"
+        )
         self.session.connect_bench(str(path))
         self.show_bench()
         return True
@@ -200,11 +202,11 @@ class Connect(Overlay):
         """Say where the run is that a page asked for, or why there can be none."""
         session = self.session
         if self._running:
-            if session.state is State.FAULT:
+            if session.state is WindowState.FAULT:
                 self._end(
                     session.status.fault.title if session.status.fault else "Fault"
                 )
-            elif session.state is State.RUNNING and session.run.trial is not None:
+            elif session.state is WindowState.RUNNING and session.run.trial is not None:
                 index, words = session.run.trial
                 left = ""
                 if session.run.expected is not None:
@@ -213,9 +215,9 @@ class Connect(Overlay):
                 self._say_progress(f"Step {index + 1}: {words}{left}", busy=True)
             return
         reason = {
-            State.READY: "",
-            State.DISCONNECTED: "Connect a bench first.",
-            State.CONNECTING: "The bench is still connecting.",
+            WindowState.READY: "",
+            WindowState.DISCONNECTED: "Connect a bench first.",
+            WindowState.CONNECTING: "The bench is still connecting.",
         }.get(session.state, "Another run is in progress.")
         if session.manual.alive:
             reason = "The coil is driven by hand; switch it off first."

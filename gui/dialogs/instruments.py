@@ -9,8 +9,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from drivers.attached import attached, try_out
-from gui.dialogs.attached import Attached
-from gui.dialogs.bench_text import BY_PERSON, Choice
+from gui.dialogs.attached import AttachedList
+from gui.dialogs.bench_text import BY_PERSON, BenchChoice
 from gui.look.theme import Theme
 from gui.parts import (
     STRETCH,
@@ -33,13 +33,13 @@ SCOPES = {"ps3000a": "PicoScope 3000", "usbtmc": "USBTMC (SCPI)"}
 """Titles of drivers that ship; any other bears its name."""
 
 
-class Instruments(QWidget):
+class InstrumentsPage(QWidget):
     """Ports and devices with what answered; a row for each role."""
 
     found = Signal(object)
     tested = Signal(str, bool, str)
 
-    def __init__(self, choice: Choice, theme: Theme) -> None:
+    def __init__(self, choice: BenchChoice, theme: Theme) -> None:
         super().__init__()
         self._choice = choice
         self._looked = False
@@ -50,7 +50,7 @@ class Instruments(QWidget):
             "muted",
             wrap=True,
         )
-        self.attached = Attached(theme)
+        self.attached = AttachedList(theme)
         self.coil_port, self.coil_row = self._ports("Coil source port"), Combo()
         self.meter_port, self.meter_row = self._ports("Teslameter port"), Combo()
         self.coil_row.addItems(dialect_ids("coil"))
@@ -95,7 +95,7 @@ class Instruments(QWidget):
         self.serial.setText(choice.scope_serial)
         self.library.setText(choice.scope_library)
 
-    def take(self) -> Choice:
+    def take(self) -> BenchChoice:
         """The choice as it stands."""
         choice = self._choice
         choice.coil_port = self.coil_port.currentText().strip()

@@ -21,7 +21,7 @@ from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.tokens import LIGHT, Tokens
-from gui.session.log import Level
+from gui.session.log import Severity
 from gui.setup.parameter import FieldError
 from tactile_lab.errors import TactileLabError
 from tactile_lab.trace import FloatArray
@@ -51,9 +51,11 @@ def write_scene(panels: Panels, path: Path) -> None:
     try:
         path.write_text(panels.setup.request().load().to_toml(), encoding="utf-8")
     except (TactileLabError, FieldError, OSError) as error:
-        panels.session.log.add(Level.ERROR, "scene", f"{path} was not saved: {error}")
+        panels.session.log.add(
+            Severity.ERROR, "scene", f"{path} was not saved: {error}"
+        )
     else:
-        panels.session.log.add(Level.GOOD, "scene", f"Saved {path}")
+        panels.session.log.add(Severity.GOOD, "scene", f"Saved {path}")
 
 
 def export_view(panels: Panels, screen: Screen) -> None:
@@ -85,10 +87,10 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
             raise OSError(f"{path} cannot be written as a picture; end it in .png.")
     except OSError as error:
         panels.session.log.add(
-            Level.ERROR, "export", f"The view was not exported: {error}"
+            Severity.ERROR, "export", f"The view was not exported: {error}"
         )
     else:
-        panels.session.log.add(Level.GOOD, "export", f"View exported to {path}")
+        panels.session.log.add(Severity.GOOD, "export", f"View exported to {path}")
 
 
 def picture(stack: LaneStack, title: str, scale: int = 2) -> QImage:

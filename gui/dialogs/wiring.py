@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gui.dialogs.bench_text import Choice
+from gui.dialogs.bench_text import BenchChoice
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, empty, label, push, row, say, set_role, sign
 from gui.review.conclusion import Concluded
@@ -25,7 +25,7 @@ class Wiring(QWidget):
 
     check_asked = Signal()
 
-    def __init__(self, choice: Choice, theme: Theme) -> None:
+    def __init__(self, choice: BenchChoice, theme: Theme) -> None:
         super().__init__()
         self._choice, self._theme = choice, theme
         self._concluded: Concluded | None = None

@@ -12,15 +12,15 @@ from gui.look import tokens as look
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import STRETCH, Elided, IconButton, bar, filled, label, lines, row
-from gui.state import Snapshot, State, clock_text
+from gui.state import Snapshot, WindowState, clock_text
 
 _CLOCK_COLOURS = {
-    State.DISCONNECTED: look.LAMP_GREY,
-    State.CONNECTING: look.LAMP_AMBER,
-    State.READY: look.LAMP_GREEN,
-    State.RUNNING: look.LAMP_BLUE,
-    State.ABORTING: look.LAMP_AMBER,
-    State.FAULT: look.LAMP_RED,
+    WindowState.DISCONNECTED: look.LAMP_GREY,
+    WindowState.CONNECTING: look.LAMP_AMBER,
+    WindowState.READY: look.LAMP_GREEN,
+    WindowState.RUNNING: look.LAMP_BLUE,
+    WindowState.ABORTING: look.LAMP_AMBER,
+    WindowState.FAULT: look.LAMP_RED,
 }
 
 
@@ -49,7 +49,7 @@ class Header(QFrame):
         self._state.setMinimumWidth(112)
         self._clock = label("", "hsub")
         self._chips: list[Chip] = []
-        self._shown: State | None = None
+        self._shown: WindowState | None = None
         self._chip_row = row(spacing=6)
         self._buttons = [
             IconButton(theme, name, words, role="hflat", on_header=True)

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from gui.look import tokens as look
 from gui.look.fonts import sized
-from gui.state import CoilView, State, StopText, Truth, stop_text, truth
+from gui.state import CoilKnowledge, CoilView, StopText, WindowState, stop_text, truth
 
 WIDTH, HEIGHT = 228, 52
 
@@ -32,14 +32,14 @@ class StopButton(QAbstractButton):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setToolTip("Coil to 0 A, output off, verified by read-back (Esc, F12)")
-        self._truth = Truth.NONE
+        self._truth = CoilKnowledge.NONE
         self._fault = False
         self._words = StopText("STOP", "no coil source")
         self.setAccessibleName(self._words.spoken)
         self.setAccessibleDescription("Switches the coil off. Keys: Escape, F12.")
 
     @property
-    def truth(self) -> Truth:
+    def truth(self) -> CoilKnowledge:
         """What the button claims about the coil."""
         return self._truth
 
@@ -48,9 +48,9 @@ class StopButton(QAbstractButton):
         """The two lines shown."""
         return self._words
 
-    def show_coil(self, state: State, coil: CoilView | None) -> None:
+    def show_coil(self, state: WindowState, coil: CoilView | None) -> None:
         """Render from the coil as read back."""
-        shown = truth(state, coil), state is State.FAULT, stop_text(state, coil)
+        shown = truth(state, coil), state is WindowState.FAULT, stop_text(state, coil)
         if shown != (self._truth, self._fault, self._words):
             self._truth, self._fault, self._words = shown
             self.setText(self._words.spoken)
@@ -72,7 +72,7 @@ class StopButton(QAbstractButton):
         if len(title) >= 17:
             text.setRight(WIDTH - 10)
         painter.drawText(text, Qt.AlignmentFlag.AlignVCenter, title)
-        small = self._truth is Truth.UNKNOWN
+        small = self._truth is CoilKnowledge.UNKNOWN
         painter.setFont(sized(11 if small else 12, QFont.Weight.DemiBold))
         painter.drawText(
             QRectF(54, 27, WIDTH - 60, 17),
@@ -93,13 +93,13 @@ class StopButton(QAbstractButton):
     def _body(self, painter: QPainter, body: QRectF) -> str:
         """Fill the button; the colour of its ink."""
         down = self.isDown()
-        if self._truth is Truth.UNKNOWN:
+        if self._truth is CoilKnowledge.UNKNOWN:
             painter.setPen(QPen(QColor(look.HAZARD_YELLOW), 2))
             painter.setBrush(QColor(look.HAZARD_YELLOW))
             painter.drawRoundedRect(body, 9, 9)
             self._stripes(painter, body)
             return look.HAZARD_BLACK
-        if self._truth is Truth.LIVE:
+        if self._truth is CoilKnowledge.LIVE:
             fill = QLinearGradient(0, 0, 0, HEIGHT)
             fill.setColorAt(0, QColor(look.STOP_RED_PRESSED if down else "#DB2A3F"))
             fill.setColorAt(1, QColor(look.STOP_RED_PRESSED if down else look.STOP_RED))
@@ -107,19 +107,19 @@ class StopButton(QAbstractButton):
             painter.setBrush(QBrush(fill))
             painter.drawRoundedRect(body, 9, 9)
             return "#FFFFFF"
-        if self._truth is Truth.FALLING:
+        if self._truth is CoilKnowledge.FALLING:
             painter.setPen(QPen(QColor(look.LAMP_AMBER), 1.5))
             painter.setBrush(QColor("#3A2606"))
             painter.drawRoundedRect(body, 9, 9)
             painter.setBrush(QBrush(QColor("#6B4708"), Qt.BrushStyle.BDiagPattern))
             painter.drawRoundedRect(body, 9, 9)
             return "#FFD58A"
-        if self._truth is Truth.OFF and self._fault:
+        if self._truth is CoilKnowledge.OFF and self._fault:
             painter.setPen(QPen(QColor(look.LAMP_RED), 1.5))
             painter.setBrush(QColor(look.STOP_DARK_RED))
             painter.drawRoundedRect(body, 9, 9)
             return "#FFFFFF"
-        grey = self._truth is Truth.NONE
+        grey = self._truth is CoilKnowledge.NONE
         painter.setPen(QPen(QColor("#44546A" if grey else "#B44150"), 1.5))
         painter.setBrush(QColor("#2A1A22" if down else "#161F2B"))
         painter.drawRoundedRect(body, 9, 9)
@@ -162,12 +162,12 @@ class StopButton(QAbstractButton):
         painter.setBrush(QColor(ink))
         painter.drawPolygon(QPolygonF([QPointF(cx + x, cy + y) for x, y in corners]))
         hole = {
-            Truth.UNKNOWN: look.HAZARD_YELLOW,
-            Truth.LIVE: look.STOP_RED,
-            Truth.FALLING: "#3A2606",
+            CoilKnowledge.UNKNOWN: look.HAZARD_YELLOW,
+            CoilKnowledge.LIVE: look.STOP_RED,
+            CoilKnowledge.FALLING: "#3A2606",
         }.get(self._truth, look.STOP_DARK_RED if self._fault else "#161F2B")
         painter.setBrush(QColor(hole))
-        if self._truth is Truth.UNKNOWN:
+        if self._truth is CoilKnowledge.UNKNOWN:
             painter.setPen(QColor(hole))
             painter.setFont(sized(19, QFont.Weight.Bold))
             painter.drawText(

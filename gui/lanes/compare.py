@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gui.lanes.expected import Hold, starts
+from gui.lanes.expected import Stretch, starts
 from gui.lanes.lane import Lane
 from gui.lanes.source import Member, Source
 from tactile_lab.trace import FloatArray, Trace
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gui.lanes.view import TimeView
 
 
-class Layout(Enum):
+class ComparisonRows(Enum):
     """How compared runs share a lane."""
 
     STACK = "stack oscillating channels, lay slow ones over each other"
@@ -45,12 +45,12 @@ class Comparison(Source):
         first: the reference.
     """
 
-    holds: list[Hold] = []  # noqa: RUF012
+    holds: list[Stretch] = []  # noqa: RUF012
     spikes: FloatArray = np.empty(0)
 
     def __init__(self, members: list[Member]) -> None:
         self._members = members
-        self.layout = Layout.STACK
+        self.layout = ComparisonRows.STACK
         # what every one of the runs stored has a lane
         common = set.intersection(*(set(m.source.signals) for m in members))
         self.signals = tuple(common)
@@ -127,7 +127,7 @@ class Comparison(Source):
 
     def stacks(self, lane: Lane) -> bool:
         """Whether the runs lie above each other in a lane."""
-        return self.layout is not Layout.OVERLAY and lane.key in STACKED
+        return self.layout is not ComparisonRows.OVERLAY and lane.key in STACKED
 
     def subtracts(self, lane: Lane) -> bool:
         """Whether the reference is taken from the runs in a lane.
@@ -135,7 +135,7 @@ class Comparison(Source):
         Not from the rate: that of a run is not defined at another run's spikes.
         """
         slow = lane.key not in STACKED and lane.key != "rate"
-        return self.layout is Layout.DIFFERENCE and slow
+        return self.layout is ComparisonRows.DIFFERENCE and slow
 
     def shown(self, lane: Lane, start: float, end: float, count: int) -> list[Trace]:
         """Each run's trace in a lane's unit, on the common time."""

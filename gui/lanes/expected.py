@@ -13,7 +13,7 @@ from tactile_lab.waveform import Waveform
 
 
 @dataclass(frozen=True)
-class Hold:
+class Stretch:
     """A stretch of the run that has a name, such as "120 mN", in run time, s.
 
     Attributes:
@@ -30,18 +30,18 @@ class Hold:
     held: tuple[float, float] | None = None
 
     @classmethod
-    def of(cls, trial: Trial, start: float) -> Hold:
+    def of(cls, trial: Trial, start: float) -> Stretch:
         """A trial that starts at `start` s of the run."""
         held = trial.hold and (start + trial.hold[0], start + trial.hold[1])
         return cls(start, start + trial.length, trial.label, trial.pause, held)
 
 
-def starts(holds: list[Hold]) -> FloatArray:
+def starts(holds: list[Stretch]) -> FloatArray:
     """When each of them starts, s."""
     return np.array([hold.start for hold in holds])
 
 
-def settled(times: FloatArray, holds: list[Hold]) -> np.ndarray:
+def settled(times: FloatArray, holds: list[Stretch]) -> np.ndarray:
     """Which of `times`, ascending, lie where the force stands still."""
     inside = np.zeros(times.size, dtype=bool)
     for hold in holds:
@@ -66,7 +66,7 @@ class Preview:
     force: Waveform
     traces: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     spikes: FloatArray = field(default_factory=lambda: np.empty(0))
-    holds: list[Hold] = field(default_factory=list)
+    holds: list[Stretch] = field(default_factory=list)
     length: float = 0.0
 
 

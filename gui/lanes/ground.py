@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QPainter
 
 from gui.lanes import paint
 from gui.lanes.axis import numbers
-from gui.lanes.expected import Hold
+from gui.lanes.expected import Stretch
 from gui.lanes.paint import Frame
 from gui.lanes.source import Source
 from gui.look.tokens import Tokens
@@ -63,14 +63,14 @@ def ground(
         _names(painter, holds, tokens)
 
 
-def _visible(source: Source, frame: Frame) -> list[tuple[Hold, float, float]]:
+def _visible(source: Source, frame: Frame) -> list[tuple[Stretch, float, float]]:
     """Holds in view with their left and right ends, px.
 
     Where they are too many to be told apart, one that spans them all.
     """
     holds = [h for h in source.holds if h.end > frame.start and h.start < frame.end]
     if len(holds) * CLOSE > frame.right - frame.left:
-        holds = [Hold(holds[0].start, holds[-1].end, "")]
+        holds = [Stretch(holds[0].start, holds[-1].end, "")]
     return [
         (
             hold,
@@ -82,7 +82,7 @@ def _visible(source: Source, frame: Frame) -> list[tuple[Hold, float, float]]:
 
 
 def _names(
-    painter: QPainter, holds: list[tuple[Hold, float, float]], tokens: Tokens
+    painter: QPainter, holds: list[tuple[Stretch, float, float]], tokens: Tokens
 ) -> None:
     """Names of the holds, over the grid."""
     for hold, left, right in holds:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gui.lanes.expected import Aligned, Hold, Preview, settled, starts
+from gui.lanes.expected import Aligned, Preview, Stretch, settled, starts
 from gui.lanes.lane import Lane
 from gui.lanes.phase import Phase, phase
 from gui.lanes.rate import rate_of
-from gui.lanes.twin import Twin
+from gui.lanes.twin import TwinTraces
 from tactile_lab.pyramid import Pyramid
 from tactile_lab.trace import FloatArray, Trace
 
@@ -74,7 +74,7 @@ class Source:
         return self.reach
 
     @property
-    def holds(self) -> list[Hold]:
+    def holds(self) -> list[Stretch]:
         """Named stretches, ascending."""
         return []
 
@@ -173,7 +173,7 @@ class PlanSource(Source):
 
     running = True
     length = 0.0
-    holds: list[Hold] = []  # noqa: RUF012
+    holds: list[Stretch] = []  # noqa: RUF012
     twin_spikes = NONE
 
     def __init__(self, preview: Preview) -> None:
@@ -206,12 +206,12 @@ class LiveSource(Source):
     """
 
     running = True
-    holds: list[Hold] = []  # noqa: RUF012
+    holds: list[Stretch] = []  # noqa: RUF012
 
     def __init__(self, preview: Preview | None, newtons_per_ampere: float) -> None:
         self.preview = preview
         self.aligned = None if preview is None else Aligned(preview)
-        self.model = Twin()
+        self.model = TwinTraces()
         self.holds = []
         self._phase = Phase.none()
         self._carried: tuple[object, ...] = ()
@@ -305,7 +305,7 @@ class LiveSource(Source):
         found = np.array(self._loop, dtype=np.float64).reshape(-1, 3)
         return found[settled(found[:, 0], self.holds), 1:]
 
-    def begin_trial(self, index: int, hold: Hold) -> None:
+    def begin_trial(self, index: int, hold: Stretch) -> None:
         """A trial starts; the preview is moved to where it really starts."""
         if not self.holds or self.holds[-1].start < hold.start:
             self.holds.append(hold)

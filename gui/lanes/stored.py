@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from gui.lanes.expected import Hold, settled
+from gui.lanes.expected import Stretch, settled
 from gui.lanes.source import Source
-from gui.lanes.twin import MARGIN, Look, Twin
+from gui.lanes.twin import MARGIN, Look, TwinTraces
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import SceneError
 from tactile_lab.pyramid import FINE, Pyramid
@@ -46,13 +46,13 @@ class RunSource(Source):
 
     spikes: FloatArray = np.empty(0)
     length = reach = 0.0
-    holds: list[Hold] = []  # noqa: RUF012
+    holds: list[Stretch] = []  # noqa: RUF012
 
     def __init__(self, path: Path) -> None:
         self._run = run = Run.load(path)
         self.path: Path = path
         self.info: dict[str, Any] = run.info
-        self.model: Twin | None = None
+        self.model: TwinTraces | None = None
         self.fetched = threading.Event()
         self._pyramids = {name: _pyramid(run.signal(name)) for name in run.signals}
         self.length = self.reach = max(run.duration, 1e-3)
@@ -89,7 +89,7 @@ class RunSource(Source):
 
     def add_twin(self, whole: ModelPart, look: Look) -> None:
         """Put the twin beside the data; `look` has a part of it computed closely."""
-        self.model = Twin(look)
+        self.model = TwinTraces(look)
         self.model.add(whole)
         self.fetched.set()
 
@@ -199,12 +199,12 @@ def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:
     }
 
 
-def _hold(trial: Any) -> Hold:
+def _hold(trial: Any) -> Stretch:
     start, end = float(trial["start"]), float(trial["end"])
     label = bytes(trial["label"]).decode("utf-8", "replace").rstrip("\0")
     begin, stop = float(trial["hold_start"]), float(trial["hold_end"])
     held = None if begin != begin else (start + begin, start + stop)
-    return Hold(start, end, label, bool(trial["pause"]), held)
+    return Stretch(start, end, label, bool(trial["pause"]), held)
 
 
 def _moves_probes(run: Run) -> bool:

@@ -20,7 +20,7 @@ Look = Callable[[float, float, int], None]
 """Has the model computed between two times, s, in so many cells."""
 
 
-class Twin:
+class TwinTraces:
     """Slices put together.
 
     Args:

@@ -19,7 +19,7 @@ from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import STRETCH, IconButton, Segments, column, label, line_edit, row
 from gui.record.log_table import LogTable
-from gui.session.log import Level, Line
+from gui.session.log import LogLine, Severity
 
 Index = QModelIndex | QPersistentModelIndex
 ROOT = QModelIndex()
@@ -31,10 +31,10 @@ class LogModel(QAbstractTableModel):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self.lines: list[Line] = []
+        self.lines: list[LogLine] = []
         self._theme = theme
 
-    def add(self, line: Line) -> None:
+    def add(self, line: LogLine) -> None:
         """Append a line; the oldest go past `MOST`."""
         if len(self.lines) >= MOST:
             self.beginRemoveRows(ROOT, 0, 499)
@@ -62,7 +62,7 @@ class LogModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.DecorationRole and where == 1:
             return pixmap(line.level.value, self._colour(line), 16)
         if role == Qt.ItemDataRole.ForegroundRole:
-            if line.level is Level.ERROR:
+            if line.level is Severity.ERROR:
                 return QColor(self._theme.tokens.red)
             if where in (0, 2):
                 return QColor(self._theme.tokens.muted)
@@ -72,14 +72,14 @@ class LogModel(QAbstractTableModel):
             return f"{line.level.name.lower()}: {line.source}: {line.text}"
         return None
 
-    def _colour(self, line: Line) -> str:
+    def _colour(self, line: LogLine) -> str:
         tokens = self._theme.tokens
         return {
-            Level.INFO: tokens.muted,
-            Level.GOOD: tokens.green,
-            Level.WARNING: tokens.amber,
-            Level.ERROR: tokens.red,
-            Level.NOTE: tokens.accent,
+            Severity.INFO: tokens.muted,
+            Severity.GOOD: tokens.green,
+            Severity.WARNING: tokens.amber,
+            Severity.ERROR: tokens.red,
+            Severity.NOTE: tokens.accent,
         }[line.level]
 
 
@@ -100,9 +100,9 @@ class LogFilter(QSortFilterProxyModel):
         line = model.lines[row]
         return (
             True,
-            line.level in (Level.WARNING, Level.ERROR),
+            line.level in (Severity.WARNING, Severity.ERROR),
             line.safety,
-            line.level is Level.NOTE,
+            line.level is Severity.NOTE,
         )[self.choice]
 
 
@@ -131,7 +131,7 @@ class LogView(QWidget):
         self.note.returnPressed.connect(self._noted)
         theme.changed.connect(self.table.viewport().update)
 
-    def add(self, line: Line) -> None:
+    def add(self, line: LogLine) -> None:
         """Append a line."""
         self.model.add(line)
 

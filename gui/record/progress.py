@@ -8,10 +8,10 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from gui.lanes.expected import Hold
+from gui.lanes.expected import Stretch
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, row
-from gui.state import Snapshot, State, minutes
+from gui.state import Snapshot, WindowState, minutes
 
 
 class Blocks(QWidget):
@@ -20,7 +20,7 @@ class Blocks(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._holds: list[Hold] = []
+        self._holds: list[Stretch] = []
         self._length = 1.0
         self._at = 0.0
         self._colour = "accent"
@@ -28,7 +28,7 @@ class Blocks(QWidget):
         theme.changed.connect(self.update)
 
     def show_steps(
-        self, holds: list[Hold], length: float, at: float, colour: str
+        self, holds: list[Stretch], length: float, at: float, colour: str
     ) -> None:
         """Show where the run is; `colour` is the name of a token."""
         shown = (holds, length, at, colour)
@@ -66,7 +66,7 @@ class Blocks(QWidget):
             )
 
 
-class Progress(QWidget):
+class ProgressStrip(QWidget):
     """Step, label and time left above the blocks."""
 
     def __init__(self, theme: Theme) -> None:
@@ -84,7 +84,7 @@ class Progress(QWidget):
     def show_run(
         self,
         snapshot: Snapshot,
-        holds: list[Hold],
+        holds: list[Stretch],
         length: float,
         reach: float,
         trial: tuple[int, str] | None,
@@ -92,8 +92,10 @@ class Progress(QWidget):
     ) -> None:
         """Show where the run is, or how the last one ended."""
         state = snapshot.state
-        colour = {State.FAULT: "red", State.ABORTING: "amber"}.get(state, "accent")
-        if state in (State.RUNNING, State.ABORTING):
+        colour = {WindowState.FAULT: "red", WindowState.ABORTING: "amber"}.get(
+            state, "accent"
+        )
+        if state in (WindowState.RUNNING, WindowState.ABORTING):
             self._running(snapshot, holds, length, reach, trial)
         else:
             if ending.startswith("complete"):
@@ -108,12 +110,12 @@ class Progress(QWidget):
     def _running(
         self,
         snapshot: Snapshot,
-        holds: list[Hold],
+        holds: list[Stretch],
         length: float,
         reach: float,
         trial: tuple[int, str] | None,
     ) -> None:
-        if snapshot.state is State.ABORTING:
+        if snapshot.state is WindowState.ABORTING:
             self._left.setText("Stopping: the coil goes to 0 A and is read back")
         elif trial is None:
             self._left.setText("Opening instruments")

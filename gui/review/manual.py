@@ -9,7 +9,14 @@ from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, line, line_edit, panel, push, row, say
 from gui.review.scope_inputs import ScopeInputs
 from gui.session.live_manual import LiveManual
-from gui.state import CoilView, Snapshot, State, Truth, milliamperes, truth
+from gui.state import (
+    CoilKnowledge,
+    CoilView,
+    Snapshot,
+    WindowState,
+    milliamperes,
+    truth,
+)
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import parse, show
 from tactile_lab.scene.bench_file import BenchSpec
@@ -90,7 +97,7 @@ class ManualView(QWidget):
     ) -> None:
         """Show read-backs; allow what the state allows; `reading`: the meter is."""
         on = snapshot.manual
-        idle = snapshot.state is State.READY
+        idle = snapshot.state is WindowState.READY
         self.begin.setVisible(not on)
         self.begin.setEnabled(idle and snapshot.coil is not None)
         reason = ""
@@ -123,8 +130,8 @@ class ManualView(QWidget):
 
     def _show_coil(self, coil: CoilView | None) -> None:
         self.now.setText("—" if coil is None else milliamperes(coil.current))
-        what = truth(State.READY, coil)
-        if what is Truth.UNKNOWN:
+        what = truth(WindowState.READY, coil)
+        if what is CoilKnowledge.UNKNOWN:
             self.force.setText("state unknown: look at the source")
         elif coil is None or coil.current is None or coil.output is not True:
             self.force.setText("output off" if coil is not None else "")

@@ -19,7 +19,7 @@ from gui.look.theme import Theme
 from gui.parts import STRETCH, column, empty, label, line, lines, panel, push, row, say
 from gui.record.log import LogView
 from gui.record.monitor_bar import MonitorBar
-from gui.record.progress import Progress
+from gui.record.progress import ProgressStrip
 from gui.screen.compare_bar import CompareBar
 
 FOLLOWED = 5.0
@@ -89,7 +89,7 @@ class Centre(QWidget):
         self.view = TimeView()
         self.stack = LaneStack(self.view, theme)
         self.tools = Tools(self.stack, self.view, theme)
-        self.progress = Progress(theme)
+        self.progress = ProgressStrip(theme)
         self.log = LogView(theme)
         upper = panel()
         self.notice = label("", "muted")

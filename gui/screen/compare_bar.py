@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QFont, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
-from gui.lanes.compare import MARKS, Comparison, Layout
+from gui.lanes.compare import MARKS, Comparison, ComparisonRows
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
@@ -14,7 +14,7 @@ from gui.look.theme import Theme
 from gui.parts import STRETCH, IconButton, Segments, bar, empty, label, row
 
 ALIGNED = ("start", "step", "cursor")
-LAYOUTS = (Layout.STACK, Layout.OVERLAY, Layout.DIFFERENCE)
+LAYOUTS = (ComparisonRows.STACK, ComparisonRows.OVERLAY, ComparisonRows.DIFFERENCE)
 
 
 class CompareBar(QFrame):

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from gui.lanes.source import LiveSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
-from gui.state import State
+from gui.state import WindowState
 
 FAST, SLOW = 33, 100
 """Milliseconds between frames."""
@@ -88,7 +88,7 @@ class Frames(QObject):
             panels.centre.progress.show_run(
                 snapshot, holds, source.length, source.reach, trial, ending
             )
-            running = session.state in (State.RUNNING, State.ABORTING)
+            running = session.state in (WindowState.RUNNING, WindowState.ABORTING)
             panels.setup.show_head(source.reach if running else None)
 
     def _show_monitor(self) -> None:

@@ -15,8 +15,8 @@ from gui.review.entries import Entry, entries
 from gui.review.run_results import RunResults
 from gui.screen.panels import Panels
 from gui.screen.records import Records
-from gui.session.log import Level
-from gui.state import State
+from gui.session.log import Severity
+from gui.state import WindowState
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 from tactile_lab.store.folder import DATA
@@ -88,7 +88,7 @@ class Screen(QObject):
 
     @property
     def _busy(self) -> bool:
-        return self._panels.session.state in (State.RUNNING, State.ABORTING)
+        return self._panels.session.state in (WindowState.RUNNING, WindowState.ABORTING)
 
     def ask_scene(self) -> None:
         """Let the user choose a scene, and open it."""
@@ -140,7 +140,7 @@ class Screen(QObject):
         ]
         said = f"Scene {name or 'demo'} loaded"
         self._panels.session.log.add(
-            Level.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
+            Severity.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
         )
         return True
 
@@ -179,7 +179,7 @@ class Screen(QObject):
 
     def say(self, problem: str) -> None:
         """Tell why something could not be opened, above the lanes and in the log."""
-        self._panels.session.log.add(Level.ERROR, "open", problem)
+        self._panels.session.log.add(Severity.ERROR, "open", problem)
         self._panels.centre.say(problem)
 
     # --- told by the session
@@ -242,7 +242,7 @@ class Screen(QObject):
         Also between two steps, so that the session knows how well they agree.
         """
         session = self._panels.session
-        live = session.state is State.RUNNING and session.run.probes == "circuit"
+        live = session.state is WindowState.RUNNING and session.run.probes == "circuit"
         if live and session.source is not None:
             self.results.compare_with_model(session.source)
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from gui.session.log import Level, Log
+from gui.session.log import Log, Severity
 from gui.session.status import Status
-from gui.state import State
+from gui.state import WindowState
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import Checked, check_bench, read_field
 from tactile_lab.engine.link import Link
@@ -64,14 +64,14 @@ class ConnectedBench(QObject):
         self.request = bench_request(choice, self.spec)
         self._status.coil.use(None)
         self._log.add(
-            Level.INFO, "bench", f"Asking the instruments of {self.spec.name}"
+            Severity.INFO, "bench", f"Asking the instruments of {self.spec.name}"
         )
         self.check()
 
     def check(self) -> None:
         """Ask the instruments who they are, and have the coil verified off."""
         if self.request is not None:
-            self._status.enter(State.CONNECTING)
+            self._status.enter(WindowState.CONNECTING)
             self._link.ask(self._checked, check_bench, self.request)
 
     def let_go(self) -> None:
@@ -99,7 +99,7 @@ class ConnectedBench(QObject):
             return str(error)
         self.spec, self.overrides, self.request = scene.bench, overrides, request
         words = (f"{one.signal} ±{show(one.range, 'V')}" for one in scope.channels)
-        self._log.add(Level.INFO, "scope", f"Inputs set: {', '.join(words)}")
+        self._log.add(Severity.INFO, "scope", f"Inputs set: {', '.join(words)}")
         self._status.changed.emit()
         return ""
 
@@ -118,11 +118,11 @@ class ConnectedBench(QObject):
         self.reading, found = False, reply.value
         if found is None:
             words = f"The field was not read: {reply.problem}"
-            self._log.add(Level.ERROR, "meter", words)
+            self._log.add(Severity.ERROR, "meter", words)
         else:
             self.field = found.mean
             mean, spread = show(found.mean, "T", 4), show(found.spread, "T", 2)
-            self._log.add(Level.INFO, "meter", f"Field {mean} ± {spread}")
+            self._log.add(Severity.INFO, "meter", f"Field {mean} ± {spread}")
         self._status.changed.emit()
 
     def _checked(self, reply: Reply[Checked]) -> None:
@@ -132,7 +132,7 @@ class ConnectedBench(QObject):
             return
         if found is None:
             words = ("The bench cannot be used.", reply.problem)
-            self._log.add(Level.ERROR, "bench", " ".join(words))
+            self._log.add(Severity.ERROR, "bench", " ".join(words))
             if self.found is None:
                 self.spec = self.choice = None
             self.found = None
@@ -147,9 +147,9 @@ class ConnectedBench(QObject):
         status.coil.left(found.off)
         for one in found.found:
             if one.problem:
-                self._log.add(Level.ERROR, one.role, one.problem)
+                self._log.add(Severity.ERROR, one.role, one.problem)
             else:
-                self._log.add(Level.GOOD, one.role, one.identity)
+                self._log.add(Severity.GOOD, one.role, one.identity)
         if found.off is not None and unknown:
             status.set_fault("The coil's state is unknown.", found.off.text)
         elif broken:
@@ -157,5 +157,5 @@ class ConnectedBench(QObject):
             text = "; ".join(one.problem for one in broken)
             status.set_fault(f"No answer from the {names}.", text)
         else:
-            status.enter(State.READY)
+            status.enter(WindowState.READY)
             self.ready.emit()

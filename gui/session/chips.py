@@ -9,11 +9,11 @@ from gui.session.live_monitor import LiveMonitor
 from gui.session.live_run import LiveRun
 from gui.session.status import Status
 from gui.state import (
+    CoilKnowledge,
     CoilView,
     InstrumentView,
     Lamp,
-    State,
-    Truth,
+    WindowState,
     limit_text,
     milliamperes,
     truth,
@@ -64,7 +64,7 @@ class Chips:
 
     def _found(self, role: str) -> tuple[Lamp, str]:
         """Lamp and words of an instrument that is not in use now."""
-        if self._status.state is State.CONNECTING:
+        if self._status.state is WindowState.CONNECTING:
             return Lamp.WAITING, "asking …"
         if self._bench.found is None:
             return Lamp.ABSENT, "no device"
@@ -78,16 +78,16 @@ class Chips:
     def _coil(self, coil: CoilView | None) -> InstrumentView:
         state, name = self._status.state, ROLES["coil"]
         what = truth(state, coil)
-        if coil is None or what is Truth.NONE:
+        if coil is None or what is CoilKnowledge.NONE:
             return InstrumentView(name, *self._found("coil"))
         lamp = {
-            Truth.UNKNOWN: Lamp.BAD,
-            Truth.LIVE: Lamp.ACTIVE,
-            Truth.FALLING: Lamp.WAITING,
-            Truth.OFF: Lamp.BAD if state is State.FAULT else Lamp.GOOD,
+            CoilKnowledge.UNKNOWN: Lamp.BAD,
+            CoilKnowledge.LIVE: Lamp.ACTIVE,
+            CoilKnowledge.FALLING: Lamp.WAITING,
+            CoilKnowledge.OFF: Lamp.BAD if state is WindowState.FAULT else Lamp.GOOD,
         }[what]
         value = "—" if coil.current is None else milliamperes(coil.current)
-        if what is Truth.UNKNOWN:
+        if what is CoilKnowledge.UNKNOWN:
             return InstrumentView(name, lamp, "state unknown", "?")
         return InstrumentView(name, lamp, limit_text(coil), value)
 
@@ -102,7 +102,7 @@ class Chips:
             words = f"{count} channel{'' if count == 1 else 's'} · 8 bit"
             if self._monitor.alive:
                 lamp, value = Lamp.ACTIVE, "monitor"
-            elif self._status.state is State.RUNNING:
+            elif self._status.state is WindowState.RUNNING:
                 lamp, value = Lamp.ACTIVE, show(rate, "S/s", 3)
         return InstrumentView(ROLES["scope"], lamp, words, value)
 
@@ -113,14 +113,14 @@ class Chips:
         if meter is not None and meter.driver == "manual":
             words = "a person reads it"
         value = "—" if field is None else show(round(field, 5), "T", 3)
-        if self._status.state is State.RUNNING and field is not None:
+        if self._status.state is WindowState.RUNNING and field is not None:
             lamp = Lamp.ACTIVE
         short = " ".join(words.split(",")[:2])  # maker and model of an *IDN? answer
         return InstrumentView(ROLES["meter"], lamp, short, value)
 
     def _model(self, plan: Expectation) -> InstrumentView:
         """What the model expects; beside a run, how well it follows."""
-        running = self._status.state is State.RUNNING
+        running = self._status.state is WindowState.RUNNING
         lamp = Lamp.ACTIVE if running else Lamp.GOOD
         seen = self._run.agreement
         if seen is None and running and "V_C1" in plan.needs.stored:

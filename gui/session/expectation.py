@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gui.lanes.expected import Hold, Preview
+from gui.lanes.expected import Preview, Stretch
 from tactile_lab.engine.request import Request
 
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
     from tactile_lab.engine.engine import Engine
-    from tactile_lab.planning.estimate import Estimate
+    from tactile_lab.planning.estimate import Cost
     from tactile_lab.planning.needs import Needs
     from tactile_lab.planning.plan import Plan
     from tactile_lab.scene.scene import Scene
@@ -38,7 +38,7 @@ class Expectation:
 
     record: Record
     needs: Needs
-    estimate: Estimate
+    estimate: Cost
     preview: Preview
     warnings: tuple[str, ...]
 
@@ -72,7 +72,7 @@ def _preview(made: Plan) -> Preview:
 
     drive, result = made.timeline, made.preview
     length = drive.duration + BASELINE
-    holds = [Hold.of(step.trial, step.start + BASELINE) for step in drive.steps]
+    holds = [Stretch.of(step.trial, step.start + BASELINE) for step in drive.steps]
     force, none = drive.force.shifted(BASELINE), np.empty(0)
     if result is None:
         return Preview(force, {}, none, holds, length)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gui.session.live_task import LiveTask
-from gui.session.log import Level, Log
+from gui.session.log import Log, Severity
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import CoilCurrent, RunState, StateChanged
@@ -30,7 +30,7 @@ class LiveManual(LiveTask):
         """Open the coil source of a request's bench; the output stays off."""
         self.current, self.opened = 0.0, False
         self._begin(begin_manual, request)
-        self._log.add(Level.WARNING, "coil", "Manual control on", safety=True)
+        self._log.add(Severity.WARNING, "coil", "Manual control on", safety=True)
 
     def hold(self, current: float) -> None:
         """Go to `current`, A, as fast as the slew limit lets it, and stay."""
@@ -63,5 +63,5 @@ class LiveManual(LiveTask):
             status.set_fault("The coil's state is unknown.", reason or off.text)
         elif ending.state is RunState.FAULTED:
             status.set_fault("Manual control ended.", reason)
-        self._log.add(Level.GOOD, "safety", "Manual control off", safety=True)
+        self._log.add(Severity.GOOD, "safety", "Manual control off", safety=True)
         status.changed.emit()

@@ -13,7 +13,7 @@ from PySide6.QtCore import Signal
 
 from gui.lanes.source import LiveSource
 from gui.session.live_task import LiveTask
-from gui.session.log import Level, Log
+from gui.session.log import Log, Severity
 from gui.session.status import Status
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
@@ -79,10 +79,10 @@ class LiveMonitor(LiveTask):
             self._status.lose_engine()
         elif ending.state is events.RunState.REFUSED:
             words = f"The monitor was refused. {ending.reason}"
-            self._log.add(Level.ERROR, "monitor", words)
+            self._log.add(Severity.ERROR, "monitor", words)
         elif ending.state is events.RunState.FAULTED:
             words = f"The monitor ended. {ending.reason}"
-            self._log.add(Level.ERROR, "monitor", words)
+            self._log.add(Severity.ERROR, "monitor", words)
         self.ended.emit()
 
     @property
@@ -100,7 +100,7 @@ class LiveMonitor(LiveTask):
     def _recorded(self, reply: Reply[Path]) -> None:
         self.recording = False
         if reply.value is None:
-            self._log.add(Level.ERROR, "monitor", f"Not recorded: {reply.problem}")
+            self._log.add(Severity.ERROR, "monitor", f"Not recorded: {reply.problem}")
         else:
-            self._log.add(Level.GOOD, "monitor", f"Recorded to {reply.value}")
+            self._log.add(Severity.GOOD, "monitor", f"Recorded to {reply.value}")
             self.recorded.emit(reply.value)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
 
-from gui.lanes.expected import Hold
+from gui.lanes.expected import Stretch
 from gui.lanes.source import LiveSource
 from gui.session.live_task import LiveTask
-from gui.session.log import Level, Log
+from gui.session.log import Log, Severity
 from gui.session.status import Status
-from gui.state import State, milliamperes
+from gui.state import WindowState, milliamperes
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending, Executed
 from tactile_lab.engine.commands import answer, begin_run, note
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from gui.session.expectation import Expectation
     from gui.session.fit import Agreement
 
-LEVELS = {"info": Level.INFO, "warning": Level.WARNING, "error": Level.ERROR}
+LEVELS = {"info": Severity.INFO, "warning": Severity.WARNING, "error": Severity.ERROR}
 
 
 class LiveRun(LiveTask):
@@ -121,7 +121,7 @@ class LiveRun(LiveTask):
         if self.asked.current is not None:
             at = show(self.asked.current, "A")
             said = f"Typed {text.replace('-', '−')} at {at}"
-        self._log.add(Level.INFO, "runner", said)
+        self._log.add(Severity.INFO, "runner", said)
         self.asked = None
         self.say(answer, text)
         self._status.changed.emit()
@@ -135,12 +135,12 @@ class LiveRun(LiveTask):
             case PersonAsked():
                 self.asked = event
                 words = f"{event.doubt} {event.text}".strip()
-                self._log.add(Level.WARNING, "runner", words)
+                self._log.add(Severity.WARNING, "runner", words)
                 self._status.changed.emit()
             case events.StateChanged():
                 self._run_state(event)
             case events.Message(level=level, text=text):
-                self._log.add(LEVELS.get(level, Level.INFO), "runner", text)
+                self._log.add(LEVELS.get(level, Severity.INFO), "runner", text)
             case events.Progress(elapsed=elapsed, expected=expected):
                 self.elapsed, self.expected = elapsed, expected
             case events.TrialEnded(outcome=outcome):
@@ -171,7 +171,7 @@ class LiveRun(LiveTask):
         if ending.state is events.RunState.REFUSED:
             self.name = ""
             words = ("The run was refused.", ending.reason or "")
-            self._log.add(Level.ERROR, "bench", " ".join(words))
+            self._log.add(Severity.ERROR, "bench", " ".join(words))
             status.set_fault(*words)
         elif ending.state is events.RunState.LOST:
             status.lose_engine(kept=True)
@@ -185,13 +185,13 @@ class LiveRun(LiveTask):
     def _keep(self, done: Executed) -> None:
         status, off, folder = self._status, done.off, done.folder
         self.elapsed = done.duration
-        level = Level.GOOD if off.verified else Level.ERROR
+        level = Severity.GOOD if off.verified else Severity.ERROR
         self._log.add(level, "safety", f"Coil: {off.text}", safety=True)
         words = f"{folder.name} {done.state}: {done.spikes} spikes"
         lost = done.loss.get("samples")
         if lost is not None:
             words += f", {lost} samples lost"
-        self._log.add(Level.INFO, "store", words)
+        self._log.add(Severity.INFO, "store", words)
         if self.reports:
             self._link.ask(
                 lambda reply: self._report(folder, reply), write_report, folder
@@ -204,7 +204,7 @@ class LiveRun(LiveTask):
             left = f"Coil off, {milliamperes(off.current)} read back."
             status.set_fault(done.reason or "The run faulted.", kept + left)
         else:
-            status.enter(State.READY)
+            status.enter(WindowState.READY)
             if done.state is events.RunState.COMPLETE:
                 self.completed.emit()
 
@@ -212,39 +212,39 @@ class LiveRun(LiveTask):
         plan, coil = self.expectation, self._status.coil
         if event.folder is not None:
             self.folder, self.name = event.folder, event.folder.name
-            self._log.add(Level.INFO, "store", f"Recording to {event.folder}")
+            self._log.add(Severity.INFO, "store", f"Recording to {event.folder}")
         self.expected = plan.estimate.duration if plan else None
         coil.limits = event.limits or coil.limits
         coil.sign_of_life(read_back=True)
         preview = plan.preview if plan else None
         self.source = LiveSource(preview, event.newtons_per_ampere)
         for warning in plan.warnings if plan else ():
-            self._log.add(Level.WARNING, "plan", warning)
+            self._log.add(Severity.WARNING, "plan", warning)
         self.begun.emit(self.source)
         self._status.changed.emit()
 
     def _trial_started(self, source: LiveSource, event: events.TrialStarted) -> None:
         trial, start = event.trial, event.start
         self.trial, self.probes = (event.index, trial.label), trial.probes
-        source.begin_trial(event.index, Hold.of(trial, start))
+        source.begin_trial(event.index, Stretch.of(trial, start))
         what = "recovery" if trial.pause else trial.label
         words = f"Step {event.index + 1} · {what} started"
-        self._log.add(Level.INFO, "runner", words)
+        self._log.add(Severity.INFO, "runner", words)
         self._status.changed.emit()
 
     def _run_state(self, event: events.StateChanged) -> None:
-        running = self._status.state is State.RUNNING
+        running = self._status.state is WindowState.RUNNING
         if event.state is events.RunState.STOPPING:
             self.asked = None
             if running:
-                self._status.enter(State.ABORTING)
+                self._status.enter(WindowState.ABORTING)
         if event.state in (events.RunState.CONNECTING, events.RunState.RUNNING):
-            self._log.add(Level.INFO, "runner", event.text.capitalize())
+            self._log.add(Severity.INFO, "runner", event.text.capitalize())
 
     def _report(self, folder: Path, reply: Reply[None]) -> None:
         if reply.problem:
-            self._log.add(Level.WARNING, "report", reply.problem)
+            self._log.add(Severity.WARNING, "report", reply.problem)
         else:
             words = f"Report in {folder / 'report.html'}"
-            self._log.add(Level.GOOD, "report", words)
+            self._log.add(Severity.GOOD, "report", words)
         self.reported.emit(folder)

@@ -12,7 +12,7 @@ KEPT = 5000
 """Newest lines that are kept."""
 
 
-class Level(Enum):
+class Severity(Enum):
     """How much a line of the log matters."""
 
     INFO = "info"
@@ -23,7 +23,7 @@ class Level(Enum):
 
 
 @dataclass(frozen=True)
-class Line:
+class LogLine:
     """One line of the log.
 
     Attributes:
@@ -35,7 +35,7 @@ class Line:
     """
 
     at: datetime
-    level: Level
+    level: Severity
     source: str
     text: str
     safety: bool = False
@@ -48,13 +48,13 @@ class Log(QObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self.lines: list[Line] = []
+        self.lines: list[LogLine] = []
 
     def add(
-        self, level: Level, source: str, text: str, *, safety: bool = False
+        self, level: Severity, source: str, text: str, *, safety: bool = False
     ) -> None:
         """Put a line into the log."""
-        line = Line(datetime.now(), level, source, text, safety)
+        line = LogLine(datetime.now(), level, source, text, safety)
         self.lines.append(line)
         del self.lines[:-KEPT]
         self.added.emit(line)

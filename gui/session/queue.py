@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from gui.session.log import Level, Log
+from gui.session.log import Log, Severity
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
@@ -123,6 +123,6 @@ class Queue(QObject):
         if reply.value is None:
             self.items.remove(item)
             item.left = f"was taken out of the queue: {reply.problem}"
-            self._log.add(Level.ERROR, "queue", f"{item.title} {item.left}")
+            self._log.add(Severity.ERROR, "queue", f"{item.title} {item.left}")
         self.changed.emit()
         self.next()

@@ -18,10 +18,10 @@ from gui.session.form_plan import FormPlan
 from gui.session.live_manual import LiveManual
 from gui.session.live_monitor import LiveMonitor
 from gui.session.live_run import LiveRun
-from gui.session.log import Level, Log
+from gui.session.log import Log, Severity
 from gui.session.queue import Queue, Queued
 from gui.session.status import Status
-from gui.state import CoilView, Snapshot, State
+from gui.state import CoilView, Snapshot, WindowState
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
@@ -29,7 +29,7 @@ from tactile_lab.errors import TactileLabError
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
 
-BUSY = (State.RUNNING, State.ABORTING)
+BUSY = (WindowState.RUNNING, WindowState.ABORTING)
 
 
 class Session(QObject):
@@ -92,7 +92,7 @@ class Session(QObject):
 
     def connect_bench(self, choice: str) -> None:
         """Ask the instruments of a bench ("sim" or a bench file) who they are."""
-        idle = self.state in (State.DISCONNECTED, State.READY)
+        idle = self.state in (WindowState.DISCONNECTED, WindowState.READY)
         if idle and not self.manual.alive:
             self.bench.connect_to(choice)
 
@@ -100,7 +100,7 @@ class Session(QObject):
         """Let go of the bench."""
         if self._free:
             self.bench.let_go()
-            self.status.enter(State.DISCONNECTED)
+            self.status.enter(WindowState.DISCONNECTED)
 
     def set_inputs(self, channels: str) -> str:
         """Set the scope's inputs for all that follows; why not, "" if it went well.
@@ -108,13 +108,13 @@ class Session(QObject):
         Args:
             channels: ``[[scope.channels]]`` of a bench file as one TOML list.
         """
-        if self.state is not State.READY:
+        if self.state is not WindowState.READY:
             return "The scope's inputs are set between runs."
         return self.bench.set_inputs(channels)
 
     def read_field(self) -> None:
         """Read the field between runs, or while the coil is driven by hand."""
-        if self.state is State.READY:
+        if self.state is WindowState.READY:
             task = self.manual.task
             self.bench.read_field(0 if task is None else task.number)
 
@@ -136,7 +136,7 @@ class Session(QObject):
             return
         self.status.fault, self.source = None, None
         self.run.start(request, title, expectation)
-        self.status.enter(State.RUNNING)
+        self.status.enter(WindowState.RUNNING)
 
     def enqueue_scene(self, scene: str, title: str) -> str:
         """Have a scene follow the runs before it; why not, "" if it does."""
@@ -168,8 +168,12 @@ class Session(QObject):
 
     def note(self, text: str) -> None:
         """A note of the user, stamped with wall-clock and run time."""
-        at = f" (at {self.run.elapsed:.1f} s)" if self.state is State.RUNNING else ""
-        self.log.add(Level.NOTE, "note", text + at)
+        at = (
+            f" (at {self.run.elapsed:.1f} s)"
+            if self.state is WindowState.RUNNING
+            else ""
+        )
+        self.log.add(Severity.NOTE, "note", text + at)
         self.run.note(text)
 
     def stop(self, reason: str = "STOP in the window") -> None:
@@ -181,32 +185,32 @@ class Session(QObject):
         self._after_monitor = None
         if self.manual.alive:
             self.manual.stop(reason)
-            self._log_stop(f"{reason}: coil off", Level.WARNING)
+            self._log_stop(f"{reason}: coil off", Severity.WARNING)
         elif self.run.alive:
             self.run.stop(reason)
-            if self.state is State.RUNNING:
-                self.status.enter(State.ABORTING)
-                self._log_stop(f"{reason}: coil off", Level.WARNING)
+            if self.state is WindowState.RUNNING:
+                self.status.enter(WindowState.ABORTING)
+                self._log_stop(f"{reason}: coil off", Severity.WARNING)
         elif self.monitor.alive:
             self.monitor.stop("monitor off")
             self._log_stop("Monitor off; the coil was not in use")
-        elif self.state is State.READY and self.bench.request is not None:
+        elif self.state is WindowState.READY and self.bench.request is not None:
             self._log_stop("Coil off sent again")
             self.bench.check()
 
     def acknowledge(self) -> None:
         """The user has read the fault; who is still there, and the coil, is asked."""
-        if self.state is State.FAULT:
+        if self.state is WindowState.FAULT:
             self.status.fault = None
             if self.bench.found is not None:
                 self.bench.check()
             else:
-                self.status.enter(State.DISCONNECTED)
+                self.status.enter(WindowState.DISCONNECTED)
 
     # --- what the window shows
 
     @property
-    def state(self) -> State:
+    def state(self) -> WindowState:
         """Of the window."""
         return self.status.state
 
@@ -230,7 +234,7 @@ class Session(QObject):
         """Everything the header, banner and buttons are rendered from."""
         coil, spec = self.coil_view(), self.bench.spec
         name = "No bench connected" if spec is None else spec.name
-        if self.run.name and self.state is not State.DISCONNECTED:
+        if self.run.name and self.state is not WindowState.DISCONNECTED:
             name = self.run.name
         return Snapshot(
             state=self.state,
@@ -261,7 +265,7 @@ class Session(QObject):
     @property
     def _free(self) -> bool:
         """Whether something may begin to use the bench."""
-        ready = self.state is State.READY and not self.manual.alive
+        ready = self.state is WindowState.READY and not self.manual.alive
         return ready and self._after_monitor is None
 
     def _show_live(self, source: LiveSource) -> None:
@@ -273,12 +277,12 @@ class Session(QObject):
         if wanted is not None:
             self.start(*wanted)
 
-    def _log_stop(self, text: str, level: Level = Level.INFO) -> None:
+    def _log_stop(self, text: str, level: Severity = Severity.INFO) -> None:
         self.log.add(level, "safety", text, safety=True)
 
     def _engine_lost(self, why: str) -> None:
-        self.log.add(Level.ERROR, "engine", f"The engine ended: {why}")
+        self.log.add(Severity.ERROR, "engine", f"The engine ended: {why}")
 
     def _desk_lost(self, why: str) -> None:
         text = f"Fits and the model beside runs were interrupted: {why}"
-        self.log.add(Level.WARNING, "desk", text)
+        self.log.add(Severity.WARNING, "desk", text)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, Signal
 
 from gui.session.coil import CoilWatch
-from gui.session.log import Level, Log
-from gui.state import Fault, State
+from gui.session.log import Log, Severity
+from gui.state import FaultNotice, WindowState
 from tactile_lab.bench import OffReport
 
 UNKNOWN = OffReport(False, None, "not verified")
@@ -29,12 +29,12 @@ class Status(QObject):
 
     def __init__(self, log: Log) -> None:
         super().__init__()
-        self.state = State.DISCONNECTED
-        self.fault: Fault | None = None
+        self.state = WindowState.DISCONNECTED
+        self.fault: FaultNotice | None = None
         self.coil = CoilWatch()
         self._log = log
 
-    def enter(self, state: State) -> None:
+    def enter(self, state: WindowState) -> None:
         """Enter a state."""
         self.state = state
         self.changed.emit()
@@ -42,9 +42,9 @@ class Status(QObject):
     def set_fault(self, title: str, consequence: str) -> None:
         """Something went wrong; a person must read it before anything goes on."""
         self.faulted.emit()
-        self.fault = Fault(title, consequence)
-        self._log.add(Level.ERROR, "safety", f"{title} {consequence}", safety=True)
-        self.enter(State.FAULT)
+        self.fault = FaultNotice(title, consequence)
+        self._log.add(Severity.ERROR, "safety", f"{title} {consequence}", safety=True)
+        self.enter(WindowState.FAULT)
 
     def lose_engine(self, *, kept: bool = False) -> None:
         """The engine died over the coil; a guard, where there is one, switches it off.

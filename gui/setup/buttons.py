@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QWidget
 from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
 from gui.parts import bar, push
-from gui.state import State
+from gui.state import WindowState
 
-WORDS = {State.RUNNING: "Running …", State.ABORTING: "Stopping …"}
+WORDS = {WindowState.RUNNING: "Running …", WindowState.ABORTING: "Stopping …"}
 
 
 class Buttons(QWidget):
@@ -28,9 +28,9 @@ class Buttons(QWidget):
         bar(self, (0, 0, 0, 0), 8, *parts)
         theme.changed.connect(self._tint)
         self._tint()
-        self.show_next(State.DISCONNECTED, "", cannot_wait="")
+        self.show_next(WindowState.DISCONNECTED, "", cannot_wait="")
 
-    def show_next(self, state: State, problem: str, *, cannot_wait: str) -> None:
+    def show_next(self, state: WindowState, problem: str, *, cannot_wait: str) -> None:
         """Offer the form's run.
 
         Args:

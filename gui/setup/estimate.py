@@ -11,10 +11,10 @@ from gui.state import minutes
 from tactile_lab.quantity import show
 
 if TYPE_CHECKING:
-    from tactile_lab.planning.estimate import Estimate
+    from tactile_lab.planning.estimate import Cost
 
 
-def words_of(estimate: Estimate) -> tuple[str, str, str, str]:
+def words_of(estimate: Cost) -> tuple[str, str, str, str]:
     """Run time, samples, disk and share of the coil's heat budget, for a person."""
     heat = 100 * estimate.heat / estimate.heat_budget
     return (
@@ -42,7 +42,7 @@ class EstimateView(QWidget):
             grid.addWidget(value, 1, column)
             self._values.append(value)
 
-    def show_estimate(self, estimate: Estimate | None) -> None:
+    def show_estimate(self, estimate: Cost | None) -> None:
         """Show an estimate, or that there is none."""
         if estimate is None:
             for value in self._values:

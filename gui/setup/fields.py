@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from gui.ask_file import ask_file
 from gui.parts import STRETCH, Combo, column, filled, label, row, say
-from gui.setup.parameter import FieldError, Kind, Parameter, entry_of, text_of
+from gui.setup.parameter import FieldError, FormField, Kind, entry_of, text_of
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import exact, parse
 
@@ -39,7 +39,7 @@ class QuantityEdit(QLineEdit):
 
     edited = Signal()
 
-    def __init__(self, parameter: Parameter) -> None:
+    def __init__(self, parameter: FormField) -> None:
         super().__init__()
         self._parameter = parameter
         self.textEdited.connect(self.edited)
@@ -140,7 +140,7 @@ class Choice(Combo):
         self.setCurrentText(text)
 
 
-def editor(parameter: Parameter) -> QuantityEdit | Switch | Choice:
+def editor(parameter: FormField) -> QuantityEdit | Switch | Choice:
     """What edits a parameter: it has `text`, `put` and `edited`."""
     if parameter.kind is Kind.SWITCH:
         return Switch()
@@ -161,7 +161,7 @@ class Field(QFrame):
 
     changed = Signal()
 
-    def __init__(self, parameter: Parameter, value: object) -> None:
+    def __init__(self, parameter: FormField, value: object) -> None:
         super().__init__()
         self.parameter = parameter
         self.default = text_of(parameter, parameter.default)

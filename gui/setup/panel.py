@@ -34,7 +34,7 @@ from gui.setup.preset_button import PresetButton
 from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
 from gui.setup.subject import Subject
-from gui.state import Snapshot, State, run_problem
+from gui.state import Snapshot, WindowState, run_problem
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 
@@ -200,7 +200,7 @@ class SetupPanel(QFrame):
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Lock the form, say what it shows, and why a button is off."""
         self._snapshot = snapshot
-        busy = snapshot.state in (State.RUNNING, State.ABORTING)
+        busy = snapshot.state in (WindowState.RUNNING, WindowState.ABORTING)
         self._in_progress = busy and self._shows_run_in_progress()
         editing = self.subject.edited is not None
         self.form.lock(busy and not editing)
@@ -212,7 +212,7 @@ class SetupPanel(QFrame):
         if editing:
             self.buttons.show_edit(self._unusable)
         else:
-            alone = snapshot.state is State.DISCONNECTED
+            alone = snapshot.state is WindowState.DISCONNECTED
             cannot_wait = "No bench is connected." if alone else self._unusable
             self.buttons.show_next(
                 snapshot.state, self._blocked(), cannot_wait=cannot_wait

@@ -41,7 +41,7 @@ class FieldError(ValueError):
 
 
 @dataclass(frozen=True)
-class Parameter:
+class FormField:
     """One key of a table as a form needs it.
 
     Attributes:
@@ -96,7 +96,7 @@ class Parameter:
         return TypeAdapter(kind, config=ConfigDict(strict=True))
 
 
-def parameter(key: str, info: FieldInfo) -> Parameter:
+def parameter(key: str, info: FieldInfo) -> FormField:
     """The parameter that a field of a table describes."""
     inner, optional, units = _taken_apart(info.annotation)
     units += [entry for entry in info.metadata if isinstance(entry, Unit)]
@@ -111,7 +111,7 @@ def parameter(key: str, info: FieldInfo) -> Parameter:
         kind = Kind.FILE
     else:
         kind = PLAIN.get(inner, Kind.OTHER)
-    return Parameter(key, info, kind, units[0] if units else None, optional, choices)
+    return FormField(key, info, kind, units[0] if units else None, optional, choices)
 
 
 def _taken_apart(kind: Any) -> tuple[Any, bool, list[Unit]]:
@@ -129,7 +129,7 @@ def _taken_apart(kind: Any) -> tuple[Any, bool, list[Unit]]:
     return kind, False, []
 
 
-def text_of(parameter: Parameter, value: Any) -> str:
+def text_of(parameter: FormField, value: Any) -> str:
     """A parameter's SI value as it stands in its field."""
     if value is None:
         return ""
@@ -155,7 +155,7 @@ def listed(values: list[float], symbol: str) -> str:
     return ", ".join(exact(value, symbol) for value in values)
 
 
-def entry_of(parameter: Parameter, text: str) -> str | None:
+def entry_of(parameter: FormField, text: str) -> str | None:
     """What a scene file holds for the text in a field; None to leave the key out.
 
     Raises:
@@ -178,7 +178,7 @@ def entry_of(parameter: Parameter, text: str) -> str | None:
     return toml(value)
 
 
-def _value(parameter: Parameter, text: str) -> Any:
+def _value(parameter: FormField, text: str) -> Any:
     """What a field's text means, not yet checked; quantities are texts."""
     symbol = parameter.unit.symbol if parameter.unit is not None else ""
     match parameter.kind:

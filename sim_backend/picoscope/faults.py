@@ -22,7 +22,7 @@ Kind = Literal[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault:
+class ScopeFault:
     """One fault of the unit, struck once, when the first given condition holds.
 
     Kinds:
@@ -75,11 +75,11 @@ class Fault:
 class Schedule:
     """Faults that have not struck yet, and calls counted so far."""
 
-    faults: list[Fault] = field(default_factory=list)
-    struck: list[Fault] = field(default_factory=list)
+    faults: list[ScopeFault] = field(default_factory=list)
+    struck: list[ScopeFault] = field(default_factory=list)
     calls: dict[str, int] = field(default_factory=dict)
 
-    def strike(self, call: str, now: float, produced: int) -> list[Fault]:
+    def strike(self, call: str, now: float, produced: int) -> list[ScopeFault]:
         """Count a call and return the faults that strike at it."""
         count = self.calls[call] = self.calls.get(call, 0) + 1
         if not self.faults:

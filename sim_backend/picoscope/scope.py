@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim_backend.picoscope import codes as pico
-from sim_backend.picoscope.faults import Fault, Schedule
+from sim_backend.picoscope.faults import Schedule, ScopeFault
 from sim_backend.plant.scope_source import Acquisition, Codes, Input, SampleSource
 from tactile_lab.clock import Clock
 
@@ -89,7 +89,7 @@ class SimulatedPicoScope:
     source: SampleSource
     clock: Clock
     make: Make = field(default_factory=Make)
-    faults: Sequence[Fault] = ()
+    faults: Sequence[ScopeFault] = ()
     dropped: int = 0
     """Samples a channel that a starved stream has lost so far."""
 
@@ -134,7 +134,7 @@ class SimulatedPicoScope:
             return self._powers[0]
         return pico.OK
 
-    def _strike(self, fault: Fault, now: float) -> None:
+    def _strike(self, fault: ScopeFault, now: float) -> None:
         if fault.kind == "status":
             wanted = None if fault.call is None else fault.call.removeprefix("ps3000a")
             self._answers += [(wanted, fault.code)] * fault.times

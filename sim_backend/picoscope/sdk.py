@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_backend.picoscope import codes as unit
-from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.scope import Make, SimulatedPicoScope
 from sim_backend.plant.scope_source import SampleSource
 from tactile_lab.clock import Clock
@@ -79,7 +79,7 @@ class FakePs3000a:
         source: SampleSource,
         clock: Clock,
         make: Make | None = None,
-        faults: Sequence[Fault] = (),
+        faults: Sequence[ScopeFault] = (),
     ) -> None:
         self.device = SimulatedPicoScope(source, clock, make or Make(), faults)
         self.errors: list[BaseException] = []

@@ -20,7 +20,7 @@ from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import FloatArray, Pieces
 from sim_backend.plant.render import noise_table
 from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
-from sim_backend.plant.sensor import NEEDS, Sensor
+from sim_backend.plant.sensor import NEEDS, SimulatedSensor
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.magnetics import Magnet
@@ -78,7 +78,7 @@ class Plant(DrivenCoil):
         self.seed = seed
         super().__init__(options.electromagnet())
         self._drive = _Drive(self._electromagnet, magnet, options)
-        self._sensor = Sensor(self.circuit, self._drive)
+        self._sensor = SimulatedSensor(self.circuit, self._drive)
         self._noise = noise_table(seed)
         swing = self.circuit.fire_voltage - self.circuit.reset_voltage
         self._spike = options.speed.spike(swing, self.circuit.tau_K)

@@ -70,7 +70,7 @@ class _Chunk:
         return self.state.time
 
 
-class Sensor:
+class SimulatedSensor:
     """V_C1, V_C2, I_DS and spike times of the driven circuit at any time asked for.
 
     Only stages that something needed so far are solved. A stage first needed later

@@ -51,7 +51,7 @@ class LineInstrument(Protocol):
 
 
 @dataclass(frozen=True)
-class Reply:
+class DelayedBytes:
     """Bytes that start to come back `delay` s from now."""
 
     delay: float
@@ -93,7 +93,7 @@ class FarEnd:
         address.far_end = self
         return address
 
-    def take(self, data: bytes) -> list[Reply]:
+    def take(self, data: bytes) -> list[DelayedBytes]:
         """Any bytes; the answers of the lines they complete."""
         answers = []
         for byte in data:
@@ -109,17 +109,17 @@ class FarEnd:
                     answers.append(answer)
         return answers
 
-    def _answer(self, line: bytes) -> Reply:
+    def _answer(self, line: bytes) -> DelayedBytes:
         clock = self.clock
         if self.faults.strike(line, clock.now(), ("deaf",)):
-            return Reply(0.0, b"")
+            return DelayedBytes(0.0, b"")
         clock.sleep_until(clock.now() + self.wire.latency)
         if self.faults.strike(line, clock.now(), ("refused",)):
             answer = REFUSAL if b"?" in line else None
         else:
             answer = self.instrument.line(line)
         faults = self.faults.strike(line, clock.now(), ANSWER_KINDS)
-        return Reply(*spoilt(answer, line, self.instrument.reply_end, faults))
+        return DelayedBytes(*spoilt(answer, line, self.instrument.reply_end, faults))
 
 
 _far_ends: WeakValueDictionary[str, FarEnd] = WeakValueDictionary()

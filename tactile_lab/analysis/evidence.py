@@ -31,7 +31,7 @@ LONGEST = 1.0
 """Intervals longer than this tell little about rate and much about drift, s."""
 
 
-class Problem:
+class Residuals:
     """Residuals of one identification as a function of scaled parameters."""
 
     def __init__(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Problem, scatter
+from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, scatter
 from tactile_lab.analysis.spike_pairs import PART
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.errors import NotIdentifiableError, ParameterError
@@ -90,7 +90,7 @@ def identify(
     if circuit.saturation and spike_times is not None:
         # between spikes I_C is then no function of V_C1 alone
         spike_times, unused = None, ("spikes are not used: T1 saturates",)
-    problem = Problem(circuit, tuple(names), force, duration, V_C1, spike_times)
+    problem = Residuals(circuit, tuple(names), force, duration, V_C1, spike_times)
     if problem.size <= len(names):
         raise NotIdentifiableError(
             f"{problem.size} data points cannot determine {len(names)} parameters"
@@ -125,7 +125,7 @@ _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
 def _systematic(
-    problem: Problem, x: FloatArray, displaced: Sequence[Waveform]
+    problem: Residuals, x: FloatArray, displaced: Sequence[Waveform]
 ) -> list[FloatArray]:
     """Half of the 95 % band each systematic cause gives all residuals, V."""
     here = problem.residual(x)
@@ -138,7 +138,7 @@ def _systematic(
 
 
 def _identified(
-    problem: Problem, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
+    problem: Residuals, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
 ) -> Identified:
     jacobian = _jacobian(problem, x) * weights[:, None]
     lengths = np.linalg.norm(jacobian, axis=0)
@@ -174,7 +174,7 @@ def _identified(
     )
 
 
-def _jacobian(problem: Problem, x: FloatArray) -> FloatArray:
+def _jacobian(problem: Residuals, x: FloatArray) -> FloatArray:
     """Central differences in the scaled parameters, shape (points, parameters)."""
     columns = []
     for i in range(x.size):
@@ -186,7 +186,7 @@ def _jacobian(problem: Problem, x: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    problem: Problem,
+    problem: Residuals,
     circuit: Circuit,
     name: str,
     error: float,

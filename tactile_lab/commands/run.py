@@ -21,7 +21,7 @@ from tactile_lab.commands.options import (
 )
 from tactile_lab.commands.read_off import field_reader
 from tactile_lab.commands.terminal import (
-    Progress,
+    ProgressLine,
     fail,
     print_json,
     refusing,
@@ -168,7 +168,7 @@ class Narrator:
 
     def __init__(self, label: str) -> None:
         self._label = label
-        self._progress: Progress | None = None
+        self._progress: ProgressLine | None = None
         self._trial = ""
         self._spikes = 0
         self._rate = 0.0
@@ -176,7 +176,7 @@ class Narrator:
 
     def expect(self, execution: Execution) -> None:
         """This is about to run; the model will run beside it."""
-        self._progress = Progress(execution.plan.estimate.duration, self._label)
+        self._progress = ProgressLine(execution.plan.estimate.duration, self._label)
         searched = execution.needs.detect_on is not None
         if searched or "V_C1" in execution.needs.stored:
             from tactile_lab.acquisition.model_comparison import ModelComparison

@@ -171,7 +171,7 @@ class StatusLine:
         self._live.stop()
 
 
-class Progress:
+class ProgressLine:
     """How far a long piece of work is, on stderr.
 
     A bar with the time left on a terminal, a plain line per tenth where piped.
@@ -227,7 +227,7 @@ class Progress:
         if self._line is not None:
             self._line.close()
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> ProgressLine:
         return self
 
     def __exit__(self, *_: object) -> None:

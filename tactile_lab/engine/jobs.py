@@ -32,7 +32,7 @@ LONGEST = 300.0
 
 
 @dataclass(frozen=True)
-class Identified:
+class InstrumentAnswer:
     """One instrument answered, or did not.
 
     Attributes:
@@ -55,7 +55,7 @@ class Checked:
         off: how the coil was left; None without a coil.
     """
 
-    found: tuple[Identified, ...]
+    found: tuple[InstrumentAnswer, ...]
     off: OffReport | None
 
 
@@ -66,7 +66,7 @@ def check_bench(engine: Engine, request: Request) -> Checked:
 
 def check(bench: Bench) -> Checked:
     """Open, identify and close each instrument; the coil is verified off on the way."""
-    found: list[Identified] = []
+    found: list[InstrumentAnswer] = []
     off: OffReport | None = None
     every = (("coil", bench.coil), ("scope", bench.scope), ("meter", bench.field_meter))
     with bench.clock.taking_part("check"):
@@ -79,9 +79,9 @@ def check(bench: Bench) -> Checked:
                     off = bench.coil.safe_off()
                 identity = instrument.identity
                 instrument.close()
-                found.append(Identified(role, identity, ""))
+                found.append(InstrumentAnswer(role, identity, ""))
             except (TactileLabError, OSError) as error:
-                found.append(Identified(role, "", str(error)))
+                found.append(InstrumentAnswer(role, "", str(error)))
     return Checked(tuple(found), off)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import Unit
-from tactile_lab.table import INTERNAL, Table
+from tactile_lab.table import INTERNAL, SceneTable
 
 FloatArray = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ SATURATION_HEADROOM = 0.5
 
 
 @dataclass(frozen=True)
-class Parameter(Unit):
+class CircuitParameter(Unit):
     """Unit and limits of a circuit's parameter, which `Circuit` itself refuses by."""
 
     def allows(self, number: float) -> bool:
@@ -34,20 +34,20 @@ class Parameter(Unit):
         return True
 
 
-Number = Annotated[float, Parameter("", above=0.0)]
-Ampere = Annotated[float, Parameter("A", above=0.0)]
-Volt = Annotated[float, Parameter("V")]
-PositiveVolt = Annotated[float, Parameter("V", above=0.0)]
-Metre = Annotated[float, Parameter("m", above=0.0)]
-Second = Annotated[float, Parameter("s", above=0.0)]
-Ohm = Annotated[float, Parameter("Ohm", above=0.0)]
-Farad = Annotated[float, Parameter("F", above=0.0)]
+Number = Annotated[float, CircuitParameter("", above=0.0)]
+Ampere = Annotated[float, CircuitParameter("A", above=0.0)]
+Volt = Annotated[float, CircuitParameter("V")]
+PositiveVolt = Annotated[float, CircuitParameter("V", above=0.0)]
+Metre = Annotated[float, CircuitParameter("m", above=0.0)]
+Second = Annotated[float, CircuitParameter("s", above=0.0)]
+Ohm = Annotated[float, CircuitParameter("Ohm", above=0.0)]
+Farad = Annotated[float, CircuitParameter("F", above=0.0)]
 
 _PUT = {"V_fire": 3.56, "V_reset": 0.578, "t_eps": 8e-6}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Circuit(Table):
+class Circuit(SceneTable):
     """The sensor circuit of Fig. 3; the defaults are Table 1.
 
     Args:
@@ -91,10 +91,10 @@ class Circuit(Table):
     V_GS: Volt = 1.4
     m: Number = 5.646
     V_T: PositiveVolt = 0.025
-    g31: Annotated[float, Parameter("V m/N")] = 0.039
+    g31: Annotated[float, CircuitParameter("V m/N")] = 0.039
     h: Metre = 500e-9
     L: Metre = 7.7e-3
-    d: Annotated[float, Parameter("m")] = 1.8e-3
+    d: Annotated[float, CircuitParameter("m")] = 1.8e-3
     a: Metre = 2e-3
     b: Metre = 475e-6
     tau: Second = 8.69
@@ -102,7 +102,7 @@ class Circuit(Table):
     R2: Ohm = 100e6
     R3: Ohm = 100e6
     R_L: Ohm = 500e6
-    R_k: Annotated[float, Parameter("Ohm")] = 10e3
+    R_k: Annotated[float, CircuitParameter("Ohm")] = 10e3
     C1: Farad = 680e-12
     C2: Farad = 150e-12
     V_S: PositiveVolt = 5.0
@@ -112,11 +112,13 @@ class Circuit(Table):
     beta_R: Number = 4.977
     V_fire: Volt | None = None
     V_reset: Volt | None = None
-    t_eps: Annotated[float, Parameter("s")] | None = None
+    t_eps: Annotated[float, CircuitParameter("s")] | None = None
     t1: Literal["emitter_resistor", "direct"] = "emitter_resistor"
     firing: Literal["lif", "put"] = "lif"
     saturation: bool = False
-    I_bias: Annotated[float, Parameter("A")] = field(default=0.0, metadata=INTERNAL)
+    I_bias: Annotated[float, CircuitParameter("A")] = field(
+        default=0.0, metadata=INTERNAL
+    )
 
     def __post_init__(self) -> None:
         for name, unit in _units().items():

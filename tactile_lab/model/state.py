@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tactile_lab.model.circuit import Volt
-from tactile_lab.table import Table
+from tactile_lab.table import SceneTable
 
 
 @dataclass(frozen=True, kw_only=True)
-class Start(Table):
+class Start(SceneTable):
     """Voltages at time 0 instead of the equilibrium, V; a cold start is all 0 V."""
 
     V_P: Volt

@@ -22,7 +22,7 @@ CODES = 127
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class Cost:
     """What running a scene takes; SI units.
 
     Attributes:
@@ -57,7 +57,7 @@ class Estimate:
     resolution: dict[str, float]
 
 
-def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Estimate:
+def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     """What running `scene` takes."""
     coil, current = scene.bench.coil, drive.current
     assert current is not None
@@ -70,7 +70,7 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Estimate:
         samples = 0
     raw = samples * len(needed.stored) * BYTES_PER_SAMPLE
     step = 0.0 if interval is None else largest_step(current, interval)
-    return Estimate(
+    return Cost(
         duration=drive.duration,
         streamed=drive.streamed,
         trials=len(drive.steps),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_lab.planning.calibrated import check_calibration
-from tactile_lab.planning.estimate import Estimate, estimate
+from tactile_lab.planning.estimate import Cost, estimate
 from tactile_lab.planning.needs import Needs, needs
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
@@ -46,7 +46,7 @@ class Plan:
     needs: Needs
     uses: Reasons
     leaves_out: Reasons
-    estimate: Estimate
+    estimate: Cost
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
     preview: Result | None

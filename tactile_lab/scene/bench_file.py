@@ -23,7 +23,7 @@ from tactile_lab.instruments.registry import (
 )
 from tactile_lab.magnetics import Magnet
 from tactile_lab.quantity import Voltage
-from tactile_lab.table import Table
+from tactile_lab.table import SceneTable
 
 WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field")
 """Signals a scope channel can carry."""
@@ -46,7 +46,7 @@ Baud = Annotated[int, Field(ge=50, le=4_000_000)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoilSpec(Table):
+class CoilSpec(SceneTable):
     """``[coil]`` of a bench: the current source.
 
     Attributes:
@@ -95,7 +95,7 @@ def _once_each(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScopeSpec(Table):
+class ScopeSpec(SceneTable):
     """``[scope]``: the digitiser.
 
     Attributes:
@@ -123,7 +123,7 @@ class ScopeSpec(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FieldMeterSpec(Table):
+class FieldMeterSpec(SceneTable):
     """``[field_meter]``: the teslameter.
 
     Attributes:
@@ -151,7 +151,7 @@ class HandSet(TypedDict, total=False):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchSpec(Table):
+class BenchSpec(SceneTable):
     """What a bench file says, ready to be used; nothing of it is opened.
 
     Attributes:

@@ -19,7 +19,7 @@ from tactile_lab.quantity import (
     parse,
 )
 from tactile_lab.signals import SIGNALS
-from tactile_lab.table import Table
+from tactile_lab.table import SceneTable
 
 Noise = Annotated[float, Unit("V", least=0.0)]
 HalfWidth = Annotated[float, Unit("A", least=0.0)]
@@ -59,7 +59,7 @@ def _signals(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record(Table):
+class Record(SceneTable):
     """``[record]``: which signals are kept and how fast the scope samples.
 
     Attributes:
@@ -73,7 +73,7 @@ class Record(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Detect(Table):
+class Detect(SceneTable):
     """``[detect]``: how spikes are found on the streamed V_K.
 
     Attributes:
@@ -127,7 +127,7 @@ Temperature = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conditions(Table):
+class Conditions(SceneTable):
     """``[conditions]``: under which a run is made; noted with it, changing nothing.
 
     Attributes:
@@ -187,7 +187,7 @@ Probes = Annotated[tuple[str, ...], AfterValidator(_scope_signals)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Simulated(Table):
+class Simulated(SceneTable):
     """``[simulated]``: the physics of the simulated bench; no effect on a real one.
 
     A 0 switches a part off.
@@ -238,7 +238,7 @@ class Simulated(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoilUse(Table):
+class CoilUse(SceneTable):
     """``[coil]``: what to do with a force the coil cannot follow.
 
     Attributes:

@@ -38,7 +38,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class HonestyRow:
     """Estimated and true error of one case, s and V; None where there is no spike."""
 
     case: Case
@@ -109,7 +109,7 @@ def saturated_case(seed: int) -> Case:
     return replace(case, circuit=circuit, force=force, until=until)
 
 
-def compare(case: Case, samples: int = 40) -> Comparison:
+def compare(case: Case, samples: int = 40) -> HonestyRow:
     """Solve one case both ways; V_C1 is compared at `samples` random times."""
     c = case
     times = np.sort(np.random.default_rng(c.seed).uniform(0, c.until, samples))
@@ -121,7 +121,7 @@ def compare(case: Case, samples: int = 40) -> Comparison:
     assert found.spike_times is not None
     assert found.error.spike_time is not None and found.error.V_C1 is not None
     spike_time = _largest_gap(found.spike_times.tolist(), exact.spike_times)
-    return Comparison(
+    return HonestyRow(
         c,
         found.spike_times.size,
         len(exact.spike_times),

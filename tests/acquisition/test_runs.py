@@ -187,12 +187,14 @@ def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(
     run_scene, short
 ):
     from sim_backend.bench import open_bench
-    from sim_backend.picoscope.faults import Fault
+    from sim_backend.picoscope.faults import ScopeFault
 
     ran = run_scene(
         *short,
         bench=lambda scene: open_bench(
-            scene, needs(scene), scope_faults=[Fault(kind="unplug", sample=700_000)]
+            scene,
+            needs(scene),
+            scope_faults=[ScopeFault(kind="unplug", sample=700_000)],
         ),
     )
     assert ran.done.state is RunState.FAULTED

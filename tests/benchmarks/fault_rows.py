@@ -18,7 +18,7 @@ from typing import Any
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.coil.source import SimCoilSource
-from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.serial_line.faults import SerialFault
@@ -36,7 +36,7 @@ class Injection:
     """What goes wrong in one run, and what is done to the bench before."""
 
     coil: tuple[SerialFault, ...] = ()
-    scope: tuple[Fault, ...] = ()
+    scope: tuple[ScopeFault, ...] = ()
     meter: tuple[SerialFault, ...] = ()
     make: Make | None = None
     prepare: Callable[[Bench], Bench] | None = None
@@ -83,7 +83,7 @@ def _scope(**fault: Any) -> Cause:
 
     def cause(chance: random.Random) -> Injection:
         when = {} if "call" in fault else {"sample": chance.randint(*SAMPLES)}
-        return Injection(scope=(Fault(**when, **fault),))
+        return Injection(scope=(ScopeFault(**when, **fault),))
 
     return cause
 

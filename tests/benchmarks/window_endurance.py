@@ -17,7 +17,7 @@ from pathlib import Path
 from window_frames import Bench, memory
 
 from gui.app import begin
-from gui.state import State
+from gui.state import WindowState
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.engine.request import Request
@@ -45,7 +45,9 @@ def endurance(seconds: float, folder: Path) -> None:
     bench = Bench(folder, realtime=False)
     session = bench.session
     begin(bench.window, None, "sim")
-    bench.until(lambda: session.state is State.READY and session.plan.expectation, 120)
+    bench.until(
+        lambda: session.state is WindowState.READY and session.plan.expectation, 120
+    )
     (folder / "hour.toml").write_text(HOUR.format(seconds=seconds))
     request = Request(str(folder / "hour.toml"), (), "sim")
     session.start(request, "hour")
@@ -54,7 +56,7 @@ def endurance(seconds: float, folder: Path) -> None:
     for part in (0.05, 0.25, 0.5, 0.75, 1.0):
         bench.until(
             lambda part=part: (
-                session.state is not State.RUNNING
+                session.state is not WindowState.RUNNING
                 or (session.source and session.source.reach >= part * seconds)
             ),
             3600,
@@ -66,7 +68,7 @@ def endurance(seconds: float, folder: Path) -> None:
             f"{now[0]:.0f} ({now[0] - first[0]:+.0f}) | "
             f"{now[1]:.0f} ({now[1] - first[1]:+.0f}) |"
         )
-    bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
+    bench.until(lambda: session.state in (WindowState.READY, WindowState.FAULT), 60)
     fault = "" if session.status.fault is None else f": {session.status.fault.title}"
     bench.say(
         f"Then {session.state.value} {fault}, {session.source.spikes.size} spikes."
@@ -80,7 +82,9 @@ def faults(folder: Path) -> None:
     bench = Bench(folder, separate=False)
     session, window = bench.session, bench.window
     begin(window, None, "sim")
-    bench.until(lambda: session.state is State.READY and session.plan.expectation, 120)
+    bench.until(
+        lambda: session.state is WindowState.READY and session.plan.expectation, 120
+    )
     endings = []
     for name, fault in SLOW.items():
         window.setup.start()
@@ -89,9 +93,9 @@ def faults(folder: Path) -> None:
         coil = [far for wire, far in wires.items() if "coil" in wire][-1]
         bench.clear()
         coil.faults.add(fault)
-        bench.until(lambda: session.state is not State.RUNNING, 4)
+        bench.until(lambda: session.state is not WindowState.RUNNING, 4)
         session.stop("enough")
-        bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
+        bench.until(lambda: session.state in (WindowState.READY, WindowState.FAULT), 60)
         bench.until(lambda: not session.busy, 60)
         said = (
             "" if session.status.fault is None else f" · {session.status.fault.title}"
@@ -101,7 +105,7 @@ def faults(folder: Path) -> None:
         endings.append(f"{name}: {words}")
         session.acknowledge()
         session.connect_bench("sim")
-        bench.until(lambda: session.state in (State.READY, State.FAULT), 60)
+        bench.until(lambda: session.state in (WindowState.READY, WindowState.FAULT), 60)
     bench.say(f"In the end: {'; '.join(endings)}.")
     window.close()
     session.close()

@@ -26,11 +26,11 @@ from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gui.app import application, begin
-from gui.lanes.expected import Hold
+from gui.lanes.expected import Stretch
 from gui.lanes.source import LiveSource
 from gui.look.theme import Theme
 from gui.session.session import Session
-from gui.state import State
+from gui.state import WindowState
 from gui.window import Window
 from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.live import Live
@@ -200,7 +200,7 @@ def main(seconds: float) -> None:
         bench.until(lambda: session.plan.expectation, 120)
         bench.clear()
         session.connect_bench("sim")
-        bench.until(lambda: session.state is State.READY, 120)
+        bench.until(lambda: session.state is WindowState.READY, 120)
         bench.report("connect")
         bench.measure("idle", seconds)
         window.setup.start()
@@ -215,9 +215,9 @@ def main(seconds: float) -> None:
         bench.until(lambda: False, 2.0)
         bench.report("its record takes its place")
         window.screen_.close_run()
-        bench.until(lambda: session.state is not State.ABORTING, 20)
+        bench.until(lambda: session.state is not WindowState.ABORTING, 20)
         session.source = source = LiveSource(None, 0.2)
-        source.holds.append(Hold(0.0, 1e9, "emulated"))
+        source.holds.append(Stretch(0.0, 1e9, "emulated"))
         window.centre.stack.show_source(source)
         window.centre.view.set_follow(True)
         session.run.source = source

@@ -21,7 +21,7 @@ from window_frames import Bench, memory
 
 from gui.app import begin
 from gui.lanes.stored import RunSource
-from gui.state import State
+from gui.state import WindowState
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.request import Request
 
@@ -124,7 +124,7 @@ def main() -> None:
         session = bench.session
         begin(bench.window, None, "sim")
         bench.until(
-            lambda: session.state is State.READY and session.plan.expectation, 120
+            lambda: session.state is WindowState.READY and session.plan.expectation, 120
         )
         bench.measure("idle", 3.0)
         source = opened(bench, folder, what)

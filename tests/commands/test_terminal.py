@@ -6,7 +6,7 @@ import re
 import click
 import pytest
 
-from tactile_lab.commands.terminal import Progress, print_json, refusing, say
+from tactile_lab.commands.terminal import ProgressLine, print_json, refusing, say
 from tactile_lab.errors import SceneError
 
 
@@ -30,7 +30,7 @@ class Watch:
 
 def test_piped_progress_is_a_plain_line_per_tenth():
     stream, watch = io.StringIO(), Watch()
-    with Progress(100.0, "demo", stream, watch) as progress:
+    with ProgressLine(100.0, "demo", stream, watch) as progress:
         for done in range(1001):
             watch.time = done / 100
             progress.update(done / 10)
@@ -43,7 +43,7 @@ def test_piped_progress_is_a_plain_line_per_tenth():
 
 def test_progress_on_a_terminal_redraws_one_line_with_the_time_left():
     stream, watch = Terminal(), Watch()
-    with Progress(10.0, "demo", stream, watch) as progress:
+    with ProgressLine(10.0, "demo", stream, watch) as progress:
         progress.update(0.0)
         watch.time = 30.0
         progress.update(5.0, "120 mN")
@@ -56,7 +56,7 @@ def test_progress_on_a_terminal_redraws_one_line_with_the_time_left():
 
 def test_what_happens_once_before_the_first_update_is_not_taken_for_the_pace():
     stream, watch = io.StringIO(), Watch()
-    progress = Progress(10.0, "demo", stream, watch)
+    progress = ProgressLine(10.0, "demo", stream, watch)
     watch.time = 13.0
     progress.update(0.1)
     watch.time = 14.0
@@ -68,7 +68,7 @@ def test_what_happens_once_before_the_first_update_is_not_taken_for_the_pace():
 
 def test_redraws_are_few():
     stream, watch = Terminal(), Watch()
-    progress = Progress(1.0, "demo", stream, watch)
+    progress = ProgressLine(1.0, "demo", stream, watch)
     for step in range(1000):
         watch.time += 1e-3
         progress.update(step / 1000)
@@ -77,7 +77,7 @@ def test_redraws_are_few():
 
 def test_notes_stand_on_their_own_lines():
     stream = Terminal()
-    progress = Progress(1.0, "demo", stream, Watch())
+    progress = ProgressLine(1.0, "demo", stream, Watch())
     progress.update(0.5)
     progress.note("warning: something")
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue())
@@ -87,8 +87,8 @@ def test_notes_stand_on_their_own_lines():
 
 def test_progress_of_nothing_and_beyond_the_end():
     stream = io.StringIO()
-    Progress(0.0, "demo", stream, Watch()).update(0.0)
-    Progress(1.0, "demo", stream, Watch()).update(2.0)
+    ProgressLine(0.0, "demo", stream, Watch()).update(0.0)
+    ProgressLine(1.0, "demo", stream, Watch()).update(2.0)
     assert stream.getvalue().count("100%") == 2
 
 

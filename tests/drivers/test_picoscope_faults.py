@@ -9,7 +9,7 @@ import pytest
 from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
-from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.bench import Channel
@@ -37,7 +37,7 @@ class Rig:
     """A scope on the simulated library, and a loop that polls it."""
 
     def __init__(
-        self, *faults: Fault, make: Make | None = None, **options: object
+        self, *faults: ScopeFault, make: Make | None = None, **options: object
     ) -> None:
         self.clock = SimulatedClock()
         self.library = FakePs3000a(SOURCE, self.clock, make, faults)
@@ -91,7 +91,7 @@ CALLS = (
 @pytest.mark.parametrize("nth", [1, 3])
 def test_unplugged_at_any_call(call: str, nth: int) -> None:
     once = call in ("MaximumValue", "SetSimpleTrigger", "RunStreaming")
-    rig = Rig(Fault(kind="unplug", call=call, nth=1 if once else nth))
+    rig = Rig(ScopeFault(kind="unplug", call=call, nth=1 if once else nth))
     rig.fails(LinkLostError, "unplugged or without power.*check cable and power")
     with pytest.raises(NotFoundError, match="check the USB cable"):
         rig.scope.open()
@@ -101,7 +101,7 @@ def test_unplugged_at_any_call(call: str, nth: int) -> None:
 
 @pytest.mark.parametrize("call", ["Stop", "CloseUnit"])
 def test_unplugged_while_stopping_still_lets_go(call: str) -> None:
-    rig = Rig(Fault(kind="unplug", call=call))
+    rig = Rig(ScopeFault(kind="unplug", call=call))
     rig.stream(0.1)
     rig.scope.close()
     assert not rig.library.device.is_open
@@ -110,36 +110,38 @@ def test_unplugged_while_stopping_still_lets_go(call: str) -> None:
 
 
 def test_unplugged_before_opening() -> None:
-    rig = Rig(Fault(kind="unplug", call="OpenUnit"))
+    rig = Rig(ScopeFault(kind="unplug", call="OpenUnit"))
     rig.fails(NotFoundError, "udev rule")
 
 
 def test_samples_before_the_unplugging_are_kept() -> None:
-    rig = Rig(Fault(kind="unplug", time=0.5))
+    rig = Rig(ScopeFault(kind="unplug", time=0.5))
     rig.fails(LinkLostError, "0x7")
     assert rig.samples == pytest.approx(48_000, abs=2_100)
 
 
 def test_samples_read_in_the_same_poll_as_the_failure_are_kept() -> None:
     # the ring wraps in the first poll; the second call of that poll fails
-    fault = Fault(kind="unplug", call="GetStreamingLatestValues", nth=2)
+    fault = ScopeFault(kind="unplug", call="GetStreamingLatestValues", nth=2)
     rig = Rig(fault, ring=1500)
     rig.fails(LinkLostError, "0x7", step=0.014)
     assert rig.samples == 1400
-    rig = Rig(Fault(kind="unplug", call="GetStreamingLatestValues", nth=3), ring=1500)
+    rig = Rig(
+        ScopeFault(kind="unplug", call="GetStreamingLatestValues", nth=3), ring=1500
+    )
     rig.fails(LinkLostError, "0x7", step=0.014)
     assert rig.samples == 1500
 
 
 def test_a_link_that_falls_silent_is_found_out_by_the_watchdog() -> None:
-    rig = Rig(Fault(kind="silent", time=0.5), watchdog=0.3)
+    rig = Rig(ScopeFault(kind="silent", time=0.5), watchdog=0.3)
     text = rig.fails(LinkLostError, "has sent nothing for .* does not answer")
     assert "unplugged" in text
     assert rig.clock.now() == pytest.approx(0.5 + 0.3, abs=0.05)
 
 
 def test_a_scope_that_answers_but_sends_nothing() -> None:
-    busy = Fault(
+    busy = ScopeFault(
         kind="status", call="GetStreamingLatestValues", nth=10, code=0x27, times=1000
     )
     rig = Rig(busy, watchdog=0.3)
@@ -148,21 +150,23 @@ def test_a_scope_that_answers_but_sends_nothing() -> None:
 
 
 def test_streaming_that_stops_by_itself() -> None:
-    rig = Rig(Fault(kind="stream_fails", time=0.3))
+    rig = Rig(ScopeFault(kind="stream_fails", time=0.3))
     rig.fails(SamplesLostError, "stopped by itself")
     rig.works()
 
 
 def test_streaming_that_fails_because_the_link_is_dead_is_called_that() -> None:
     rig = Rig(
-        Fault(kind="status", call="GetStreamingLatestValues", nth=5, code=0x14),
-        Fault(kind="unplug", call="PingUnit"),
+        ScopeFault(kind="status", call="GetStreamingLatestValues", nth=5, code=0x14),
+        ScopeFault(kind="unplug", call="PingUnit"),
     )
     rig.fails(LinkLostError, "unplugged")
 
 
 def test_a_call_that_hangs_and_then_fails() -> None:
-    rig = Rig(Fault(kind="hang", call="GetStreamingLatestValues", nth=7, duration=5.0))
+    rig = Rig(
+        ScopeFault(kind="hang", call="GetStreamingLatestValues", nth=7, duration=5.0)
+    )
     rig.fails(LinkLostError, "unplugged")
     assert rig.clock.now() > 5.0
     assert rig.samples == 6 * 2000
@@ -170,14 +174,14 @@ def test_a_call_that_hangs_and_then_fails() -> None:
 
 @pytest.mark.parametrize("lost", [4, 1_200, 10_000])
 def test_a_gap_the_scope_does_not_tell_is_found_by_counting(lost: int) -> None:
-    rig = Rig(Fault(kind="gap", time=0.5, samples=lost))
+    rig = Rig(ScopeFault(kind="gap", time=0.5, samples=lost))
     text = rig.fails(SamplesLostError, "Samples are missing")
     about = int(re.search(r"about (\d+) too few", text).group(1))  # type: ignore[union-attr]
     assert about == pytest.approx(lost, abs=2)
 
 
 def test_a_gap_just_before_the_end_is_found_too() -> None:
-    rig = Rig(Fault(kind="gap", time=0.9, samples=5_000))
+    rig = Rig(ScopeFault(kind="gap", time=0.9, samples=5_000))
     rig.fails(SamplesLostError, "Samples are missing", seconds=1.0)
 
 
@@ -194,13 +198,13 @@ def test_a_small_fifo_in_the_scope_starves_and_shows() -> None:
 
 
 def test_buffer_stall() -> None:
-    rig = Rig(Fault(kind="stall", time=0.3))
+    rig = Rig(ScopeFault(kind="stall", time=0.3))
     rig.fails(SamplesLostError, "overwritten; lower the sample rate")
     rig.works()
 
 
 def test_overrange_on_a_schedule() -> None:
-    rig = Rig(Fault(kind="overrange", time=0.05, duration=0.04, inputs=("C",)))
+    rig = Rig(ScopeFault(kind="overrange", time=0.05, duration=0.04, inputs=("C",)))
     flags = []
     with rig.clock.taking_part("scope"):
         rig.scope.open()
@@ -262,7 +266,7 @@ def test_undervoltage_cannot_be_acknowledged() -> None:
     ],
 )
 def test_power_that_changes_while_streaming(kind: str, text: str) -> None:
-    rig = Rig(Fault(kind=kind, time=0.5), allow_usb_power=True)  # type: ignore[arg-type]
+    rig = Rig(ScopeFault(kind=kind, time=0.5), allow_usb_power=True)  # type: ignore[arg-type]
     with pytest.raises(RefusedError, match=text):
         rig.stream(2.0)
     assert rig.samples == pytest.approx(48_000, abs=2_100)
@@ -270,7 +274,7 @@ def test_power_that_changes_while_streaming(kind: str, text: str) -> None:
 
 
 def test_power_lost_while_streaming_needs_leave_to_go_on() -> None:
-    rig = Rig(Fault(kind="supply_lost", time=0.5))
+    rig = Rig(ScopeFault(kind="supply_lost", time=0.5))
     with pytest.raises(RefusedError):
         rig.stream(2.0)
     with pytest.raises(LimitError, match="allow_usb_power"):
@@ -279,7 +283,7 @@ def test_power_lost_while_streaming_needs_leave_to_go_on() -> None:
 
 
 def test_undervoltage_while_streaming() -> None:
-    rig = Rig(Fault(kind="undervoltage", time=0.5))
+    rig = Rig(ScopeFault(kind="undervoltage", time=0.5))
     rig.fails(RefusedError, "cannot feed the scope")
 
 
@@ -293,7 +297,7 @@ def test_inputs_that_are_off_on_usb_power() -> None:
 def test_busy_and_overlap_answers_are_asked_again(code: int) -> None:
     rig = Rig(
         *(
-            Fault(
+            ScopeFault(
                 kind="status",
                 call="GetStreamingLatestValues",
                 nth=n,
@@ -318,13 +322,13 @@ def test_another_serial_number_is_asked_for() -> None:
 
 
 def test_hub_reset_brings_the_same_scope_back() -> None:
-    rig = Rig(Fault(kind="reset", time=0.4))
+    rig = Rig(ScopeFault(kind="reset", time=0.4))
     rig.fails(LinkLostError, "unplugged")
     rig.works()
 
 
 def test_an_unknown_status_is_shown_as_a_number() -> None:
-    rig = Rig(Fault(kind="status", call="RunStreaming", code=0x1234))
+    rig = Rig(ScopeFault(kind="status", call="RunStreaming", code=0x1234))
     rig.fails(InstrumentError, "PICO_STATUS 0x1234, unknown")
 
 
@@ -333,7 +337,7 @@ def test_random_busyness_never_loses_a_sample() -> None:
     nths = np.sort(random.choice(np.arange(2, 200), 40, replace=False))
     rig = Rig(
         *(
-            Fault(
+            ScopeFault(
                 kind="status",
                 call="GetStreamingLatestValues",
                 nth=int(n),
@@ -356,7 +360,7 @@ def test_every_status_of_the_table_becomes_one_of_our_errors() -> None:
 
 def test_samples_left_unread_because_it_was_busy_are_no_loss() -> None:
     # the third poll reaches the ring's end, and the call for the rest meets a busy one
-    busy = Fault(kind="status", call="GetStreamingLatestValues", nth=4, code=0x27)
+    busy = ScopeFault(kind="status", call="GetStreamingLatestValues", nth=4, code=0x27)
     rig = Rig(busy, ring=3000)
     rig.stream(0.14, step=0.014)
     assert rig.samples == 14_000

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.usbtmc.frames import (
-    Header,
+    FrameHeader,
     block_payload,
     message_out,
     next_tag,
@@ -27,23 +27,23 @@ def test_the_example_of_the_standard() -> None:
     st.integers(0, 255), st.integers(1, 255), st.integers(0, 2**32 - 1), st.booleans()
 )
 def test_headers_survive_the_wire(message: int, tag: int, size: int, end: bool) -> None:
-    header = Header(message, tag, size, end)
+    header = FrameHeader(message, tag, size, end)
     assert len(header.pack()) == 12
-    assert Header.unpack(header.pack() + b"more") == header
+    assert FrameHeader.unpack(header.pack() + b"more") == header
 
 
 @given(st.binary(min_size=1, max_size=50), st.integers(1, 255))
 def test_messages_are_padded_to_four(payload: bytes, tag: int) -> None:
     frame = message_out(tag, payload)
     assert len(frame) % 4 == 0
-    assert Header.unpack(frame).size == len(payload)
+    assert FrameHeader.unpack(frame).size == len(payload)
     assert frame[12 : 12 + len(payload)] == payload
 
 
 @given(st.binary(max_size=40))
 def test_garbage_is_refused_or_a_header(raw: bytes) -> None:
     try:
-        header = Header.unpack(raw)
+        header = FrameHeader.unpack(raw)
     except BadReplyError:
         return
     assert header.pack()[:3] == raw[:3]

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 from gui.app import application, begin
 from gui.look.theme import Theme
 from gui.session.session import Session
-from gui.state import State
+from gui.state import WindowState
 from gui.window import Window
 from tactile_lab.engine.request import Request
 
@@ -82,9 +82,9 @@ class Lab:
         self.until(lambda: not session.busy and not session.monitor.alive)
         self.until(lambda: session.link.idle)
         session.acknowledge()
-        if session.state is State.DISCONNECTED:
+        if session.state is WindowState.DISCONNECTED:
             session.connect_bench("sim")
-        self.until(lambda: session.state is State.READY)
+        self.until(lambda: session.state is WindowState.READY)
         window.screen_.close_run()
         wanted = str(self.folder / "short.toml")
         texts = window.setup.form.texts()
@@ -107,9 +107,9 @@ class Lab:
         session = self.session
         before = session.run.folder
         self.window.setup.run.click()
-        assert session.state is State.RUNNING
-        self.until(lambda: session.state in (State.READY, State.FAULT))
-        assert session.state is State.READY, session.status.fault
+        assert session.state is WindowState.RUNNING
+        self.until(lambda: session.state in (WindowState.READY, WindowState.FAULT))
+        assert session.state is WindowState.READY, session.status.fault
         self.until(lambda: not session.busy)
         assert session.run.folder is not None and session.run.folder != before
         self.complete.append(session.run.folder)

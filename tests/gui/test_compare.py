@@ -5,8 +5,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from gui.lanes.compare import Comparison, Layout
-from gui.lanes.expected import Hold
+from gui.lanes.compare import Comparison, ComparisonRows
+from gui.lanes.expected import Stretch
 from gui.lanes.lane import lanes_for
 from gui.lanes.readings import Painted, values_at
 from gui.lanes.source import Member, Source
@@ -21,13 +21,16 @@ class Falling(Source):
 
     reach = 10.0
     spikes = np.empty(0)
-    holds: ClassVar[list[Hold]] = []
+    holds: ClassVar[list[Stretch]] = []
 
     def __init__(self, late: float, *spikes: float, more: float = 0.0) -> None:
         time = np.linspace(0.0, 10.0, 1001)
         self.line = Trace.line(time, 4.0 - 0.1 * (time - late) + more)
         self.spikes = np.array(spikes)
-        self.holds = [Hold(1.0 + late, 5.0 + late, "a"), Hold(5.0 + late, 10.0, "b")]
+        self.holds = [
+            Stretch(1.0 + late, 5.0 + late, "a"),
+            Stretch(5.0 + late, 10.0, "b"),
+        ]
 
     def measured(self, signal: str, start: float, end: float, count: int) -> Trace:
         return self.line
@@ -67,7 +70,7 @@ def test_cursor_aligns_the_nearest_steps_where_no_spike_is_nearer(comparison) ->
 
 
 def test_difference_takes_the_reference_from_slow_channels(comparison) -> None:
-    comparison.layout = Layout.DIFFERENCE
+    comparison.layout = ComparisonRows.DIFFERENCE
     assert comparison.subtracts(LANES["V_C1"]) and comparison.subtracts(LANES["force"])
     for key in ("V_C2", "spikes", "rate"):
         assert not comparison.subtracts(LANES[key])

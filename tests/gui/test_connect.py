@@ -20,9 +20,9 @@ from gui.dialogs.bench_text import (
     start_choice,
 )
 from gui.dialogs.connect import Connect
-from gui.dialogs.instruments import Instruments
+from gui.dialogs.instruments import InstrumentsPage
 from gui.review.conclusion import conclusion_of
-from gui.state import Fault, State
+from gui.state import FaultNotice, WindowState
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.engine.commands import answer
@@ -95,7 +95,7 @@ def test_look_does_not_block_and_tells_what_it_found(lab) -> None:
 
 
 def test_what_is_found_is_suggested_where_it_fits(lab) -> None:
-    page = Instruments(start_choice(), lab.window.theme)
+    page = InstrumentsPage(start_choice(), lab.window.theme)
     nothing = {"kind": "serial", "title": "port", "identity": None, "fits": ()}
     found = [
         {**nothing, "address": "COM1", "problem": "nothing answered"},
@@ -117,7 +117,7 @@ def test_what_is_found_is_suggested_where_it_fits(lab) -> None:
 def test_instrument_is_tried_out_and_says_so_below_its_row(lab) -> None:
     served = ServedBench(coil="pty")
     served.start()
-    page = Instruments(start_choice(), lab.window.theme)
+    page = InstrumentsPage(start_choice(), lab.window.theme)
     page.test_coil.click()
     assert "port" in page.answers["coil"].text(), "nothing to ask"
     page.coil_port.setCurrentText(served.addresses["coil"])
@@ -156,10 +156,10 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     lab.until(lambda: asked)
     assert asked[0].path == "wiring_check" and asked[0].bench == "sim"
     session.run.trial = (0, "rest")
-    session.status.enter(State.RUNNING)
+    session.status.enter(WindowState.RUNNING)
     assert dialog.wiring.progress.text().startswith("Step 1: rest")
-    session.status.fault = Fault("The coil source is gone.", "Coil off.")
-    session.status.enter(State.FAULT)
+    session.status.fault = FaultNotice("The coil source is gone.", "Coil off.")
+    session.status.enter(WindowState.FAULT)
     assert dialog.wiring.progress.text() == "The coil source is gone."
     session.acknowledge()
     lab.until(dialog.wiring.check.isEnabled)
@@ -184,7 +184,7 @@ def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     window, session = lab.window, lab.session
     done: list[object] = []
     session.run.task = RemoteTask(0, lambda *said: done.append(said))
-    session.status.enter(State.RUNNING)
+    session.status.enter(WindowState.RUNNING)
     session.run.take(PersonAsked("Put the probes on 0 V."))
     lab.until(window.question.isVisible)
     assert "0 V" in window.question.text.text()
@@ -213,7 +213,7 @@ def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:
     session.run.reported.emit(made)
     assert not dialog.calibration.use.isHidden()
     assert dialog.use_calibration(made / "calibration.csv", lab.folder / "own.toml")
-    lab.until(lambda: session.state is State.READY)
+    lab.until(lambda: session.state is WindowState.READY)
     magnet = session.bench.spec.magnet
     assert magnet.calibration is not None and abs(magnet.calibration.most - 1) < 1e-9
     assert "own-field.csv" in dialog.calibration.named.text()
@@ -243,7 +243,7 @@ def test_dialog_keeps_what_it_does_not_show(tmp_path: Path) -> None:
 
 def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> None:
     choice = start_choice()
-    page = Instruments(choice, lab.window.theme)
+    page = InstrumentsPage(choice, lab.window.theme)
     assert page.meter_port.isEnabled()
     page.meter_row.setCurrentText(BY_PERSON)
     assert not page.meter_port.isEnabled() and not page.test_meter.isEnabled()
@@ -251,14 +251,14 @@ def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> 
     assert spec.field_meter is not None and spec.field_meter.driver == "manual"
     again = start_choice()
     show_bench(again, spec)
-    assert Instruments(again, lab.window.theme).meter_row.currentText() == BY_PERSON
+    assert InstrumentsPage(again, lab.window.theme).meter_row.currentText() == BY_PERSON
     page.deleteLater()
 
 
 def test_the_dialog_offers_registered_scopes_and_keeps_ones_own(lab) -> None:
     choice = start_choice()
     choice.scope = "/lab/my_scope.py"
-    page = Instruments(choice, lab.window.theme)
+    page = InstrumentsPage(choice, lab.window.theme)
     offered = [page.scope.itemData(k) for k in range(page.scope.count())]
     assert offered == ["ps3000a", "usbtmc", "", "/lab/my_scope.py"]
     assert page.take().scope == "/lab/my_scope.py"
@@ -272,10 +272,10 @@ def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     assert isinstance(dialog, Connect)
     dialog.instruments.coil_port.setCurrentText("/dev/not-there")
     assert dialog.save_to(lab.folder / "absent.toml")
-    lab.until(lambda: session.state is State.FAULT)
+    lab.until(lambda: session.state is WindowState.FAULT)
     assert "not-there" in session.status.fault.consequence
     window.banner.acknowledge.click()
-    assert session.state is State.DISCONNECTED
+    assert session.state is WindowState.DISCONNECTED
     assert window.centre.empty.isVisible()
 
 
@@ -298,7 +298,7 @@ def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
     lab = calibrating
     session, card = lab.session, lab.window.question
     asked: list[float] = []
-    while session.state is State.RUNNING:
+    while session.state is WindowState.RUNNING:
         errand = session.run.asked
         assert not card.doubt.text() or card.doubt.isHidden()
         asked.append(errand.current)
@@ -308,7 +308,7 @@ def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
         assert not card.done.isEnabled(), "nothing is typed yet"
         QTest.keyClicks(card.entry, f"{10.8 * errand.current:.2f}")
         QTest.keyClick(card.entry, Qt.Key.Key_Return)
-        lab.until(lambda: session.run.asked or session.state is not State.RUNNING)
+        lab.until(lambda: session.run.asked or session.state is not WindowState.RUNNING)
     lab.until(lambda: not session.busy)
     assert session.status.fault is None
     assert asked[:5] == pytest.approx([1.0, 0.5, 0.0, -0.5, -1.0])

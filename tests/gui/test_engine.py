@@ -15,7 +15,7 @@ from benches import SERVED
 from PySide6.QtWidgets import QApplication
 
 from gui.session.session import Session
-from gui.state import State, Truth, truth
+from gui.state import CoilKnowledge, WindowState, truth
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.commands import begin_manual, begin_run, hold, renew, stop
@@ -84,24 +84,24 @@ def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
             session.poll()
             time.sleep(0.005)
 
-    def known() -> Truth:
+    def known() -> CoilKnowledge:
         return truth(session.state, session.coil_view())
 
     session.connect_bench("sim")
-    until(lambda: session.state is State.READY)
+    until(lambda: session.state is WindowState.READY)
     engine = session.link.pid
     assert engine is not None and engine != os.getpid()
     session.start(request_, "long")
-    until(lambda: known() is Truth.LIVE)
+    until(lambda: known() is CoilKnowledge.LIVE)
     os.kill(engine, signal.SIGKILL)
-    until(lambda: session.state is State.FAULT)
+    until(lambda: session.state is WindowState.FAULT)
     assert not session.busy
-    assert known() is Truth.UNKNOWN
+    assert known() is CoilKnowledge.UNKNOWN
     session.acknowledge()
     session.connect_bench("sim")
-    until(lambda: session.state is State.READY)
+    until(lambda: session.state is WindowState.READY)
     assert session.link.pid != engine
-    assert known() is Truth.OFF
+    assert known() is CoilKnowledge.OFF
     session.close()
     assert not session.link.alive
     assert ended(tmp_path / "runs")["status"] == "running", "`recover` mends it"
@@ -223,14 +223,17 @@ def test_engine_that_dies_by_hand_is_switched_off_by_its_guard(
 ) -> None:
     session = Session(tmp_path / "runs")
     session.connect_bench(str(source.bench))
-    wait_for(lambda: session.state is State.READY, session.poll)
+    wait_for(lambda: session.state is WindowState.READY, session.poll)
     session.begin_manual()
     session.manual.hold(0.1)
     wait_for(lambda: (session.coil_view().current or 0) > 0.09, session.poll)
-    assert source.output and truth(session.state, session.coil_view()) is Truth.LIVE
+    assert (
+        source.output
+        and truth(session.state, session.coil_view()) is CoilKnowledge.LIVE
+    )
     os.kill(session.link.pid, signal.SIGKILL)
-    wait_for(lambda: session.state is State.FAULT, session.poll)
+    wait_for(lambda: session.state is WindowState.FAULT, session.poll)
     assert not session.manual.alive and not session.busy
-    assert truth(session.state, session.coil_view()) is Truth.UNKNOWN
+    assert truth(session.state, session.coil_view()) is CoilKnowledge.UNKNOWN
     wait_for(lambda: not source.output, session.poll)
     session.close()

@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gui.header.header import Header
-from gui.state import InstrumentView, Lamp, Snapshot, State
+from gui.state import InstrumentView, Lamp, Snapshot, WindowState
 
 VIEWS = (
     InstrumentView("Coil source", Lamp.ACTIVE, "output on · ≤ 2 A", "798 mA"),
@@ -15,7 +15,7 @@ VIEWS = (
     InstrumentView("Teslameter", Lamp.ACTIVE, "LSCI MODEL425", "8.78 mT"),
     InstrumentView("Model", Lamp.WARNING, "beside the run", "NRMSE 12.3 %"),
 )
-SHOWN = Snapshot(State.RUNNING, "bench", True, "2026-11-21_120000_demo")
+SHOWN = Snapshot(WindowState.RUNNING, "bench", True, "2026-11-21_120000_demo")
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.axis import decimals, nice_range, number, signed, ticks
-from gui.lanes.expected import Aligned, Hold, Preview
+from gui.lanes.expected import Aligned, Preview, Stretch
 from gui.lanes.paint import zigzag
 from gui.lanes.rate import rate_at, rate_of
 from gui.lanes.source import Readings
@@ -174,7 +174,7 @@ def test_rate_on_the_card_is_that_of_the_line(spikes: np.ndarray) -> None:
 
 
 def test_model_moves_to_where_each_trial_really_started() -> None:
-    holds = [Hold(0.1, 1.0, "a"), Hold(1.0, 2.0, "b")]
+    holds = [Stretch(0.1, 1.0, "a"), Stretch(1.0, 2.0, "b")]
     force = Waveform.through([(0.1, 0.0), (0.5, 1.0), (1.5, 1.0)])
     preview = Preview(force, {}, np.array([0.5, 1.5]), holds, 2.0)
     aligned = Aligned(preview)

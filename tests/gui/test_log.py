@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 from gui.look.theme import Theme
 from gui.record.log import LogView
 from gui.record.log_table import MESSAGE, ROW
-from gui.session.log import Level, Line
+from gui.session.log import LogLine, Severity
 
 LONG = "The coil source does not answer within 0.3 s. " * 9
 
@@ -20,9 +20,9 @@ def filled(app: QApplication, height: int, count: int = 40) -> LogView:
     log = LogView(Theme("light"))
     log.resize(800, height)
     for number in range(count):
-        level = Level.ERROR if number == 30 else Level.INFO
+        level = Severity.ERROR if number == 30 else Severity.INFO
         text = LONG if number == 30 else f"Step {number} started"
-        log.add(Line(datetime.now(), level, "runner", text))
+        log.add(LogLine(datetime.now(), level, "runner", text))
     log.show()
     app.processEvents()
     return log
@@ -48,7 +48,7 @@ def test_only_whole_rows_are_shown_and_the_newest_last(
     for row in shown(log):
         top = table.rowViewportPosition(row)
         assert 0 <= top <= table.viewport().height() - ROW
-    log.add(Line(datetime.now(), Level.INFO, "runner", "one more"))
+    log.add(LogLine(datetime.now(), Severity.INFO, "runner", "one more"))
     app.processEvents()
     assert shown(log)[-1] == 40
     log.resize(800, height + 31)
@@ -60,7 +60,7 @@ def test_only_whole_rows_are_shown_and_the_newest_last(
 def test_who_looks_further_up_is_left_there(app: QApplication) -> None:
     log = filled(app, 200)
     log.table.scrollToTop()
-    log.add(Line(datetime.now(), Level.INFO, "runner", "one more"))
+    log.add(LogLine(datetime.now(), Severity.INFO, "runner", "one more"))
     app.processEvents()
     assert shown(log)[0] == 0
     log.close()

@@ -2,7 +2,7 @@
 
 from PySide6.QtTest import QTest
 
-from gui.state import State, Truth, truth
+from gui.state import CoilKnowledge, WindowState, truth
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.events import CoilCurrent, RunState
 from tactile_lab.bench import OffReport
@@ -26,7 +26,7 @@ def test_inputs_are_set_for_all_that_follows(lab) -> None:
     planned = next(c for c in scene.bench.scope.channels if c.signal == "V_C1")
     assert planned == channel, "the next run has them, and so has its command line"
     session.connect_bench("sim")
-    lab.until(lambda: session.state is State.READY)
+    lab.until(lambda: session.state is WindowState.READY)
     assert session.bench.overrides == (), "another bench has its own"
 
 
@@ -49,11 +49,11 @@ def test_unusable_inputs_change_nothing_and_say_why(lab) -> None:
 
 def test_inputs_are_locked_while_running(lab) -> None:
     window, session = lab.window, lab.session
-    session.status.enter(State.RUNNING)
+    session.status.enter(WindowState.RUNNING)
     inputs = window.review.manual.inputs
     assert not inputs.use.isEnabled() and not inputs.cards[0].isEnabled()
     assert session.set_inputs("[]") != ""
-    session.status.enter(State.READY)
+    session.status.enter(WindowState.READY)
     assert inputs.use.isEnabled()
 
 
@@ -78,7 +78,7 @@ def test_a_current_that_is_set_while_the_source_opens_is_not_lost(lab) -> None:
     assert "read back" in lab.window.review.manual.force.text()
     session.stop("test is over")
     lab.until(lambda: not session.manual.alive)
-    assert session.state is State.READY and session.coil_view().verified_off
+    assert session.state is WindowState.READY and session.coil_view().verified_off
 
 
 def test_stop_counts_while_the_source_opens(lab) -> None:
@@ -88,7 +88,7 @@ def test_stop_counts_while_the_source_opens(lab) -> None:
     session.manual.hold(0.1)
     lab.until(lambda: not session.manual.alive)
     view = session.coil_view()
-    assert session.state is State.READY
+    assert session.state is WindowState.READY
     assert view.output is False and view.verified_off and abs(view.current) < 2e-3
 
 
@@ -106,9 +106,9 @@ def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
     why = "The coil's thread ended without a word."
     session.manual.take(Ended(Ending(RunState.FAULTED, off, why)))
     assert not session.manual.alive
-    assert truth(session.state, session.coil_view()) is Truth.UNKNOWN
+    assert truth(session.state, session.coil_view()) is CoilKnowledge.UNKNOWN
     assert (
-        session.state is State.FAULT
+        session.state is WindowState.FAULT
         and "without a word" in session.status.fault.consequence
     )
     session.acknowledge()

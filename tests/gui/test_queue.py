@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QLineEdit
 
 from gui.parts import IconButton
 from gui.session.queue import Queued
-from gui.state import State
+from gui.state import WindowState
 from tactile_lab.engine.request import Request
 from tactile_lab.scene.load import load
 
@@ -14,14 +14,14 @@ from tactile_lab.scene.load import load
 def busy(lab) -> None:
     """As while a run is in progress, without one."""
     lab.session.run.request = lab.window.setup.request()
-    lab.session.status.enter(State.RUNNING)
+    lab.session.status.enter(WindowState.RUNNING)
 
 
 def idle(lab) -> None:
     lab.session.queue.items.clear()
     lab.session.queue.held = False
     lab.session.queue.changed.emit()
-    lab.session.status.enter(State.READY)
+    lab.session.status.enter(WindowState.READY)
 
 
 def test_dropped_scene_and_run_wait_with_their_cost(lab) -> None:
@@ -63,7 +63,7 @@ def test_stop_holds_the_queue_until_it_is_resumed(lab, monkeypatch) -> None:
             Queued(title, window.setup.request(), session.plan.expectation)
         )
     session.stop("STOP")
-    session.status.enter(State.READY)
+    session.status.enter(WindowState.READY)
     session.queue.next()
     assert started == [] and window.setup.queue.resume.isVisible()
     window.setup.queue.resume.click()
@@ -113,7 +113,7 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
     session, setup = lab.session, lab.window.setup
     before = setup.form.texts()
     lab.run()
-    lab.until(lambda: session.state is State.RUNNING)
+    lab.until(lambda: session.state is WindowState.RUNNING)
     three_waiting(lab)
     shorter = session.queue.items[1].expectation.estimate.duration
     QTest.mouseClick(setup.queue.cards[1], Qt.MouseButton.LeftButton)
@@ -131,14 +131,14 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
     )
     assert setup.form.texts() == before, "the form shows the next run again"
     assert not any(e.isEnabled() for e in setup.form.findChildren(QLineEdit))
-    assert session.state is State.RUNNING and not setup.run.isEnabled()
+    assert session.state is WindowState.RUNNING and not setup.run.isEnabled()
     idle_after_run(lab)
 
 
 def idle_after_run(lab) -> None:
     lab.session.queue.items.clear()
     lab.session.stop("test is over")
-    lab.until(lambda: lab.session.state is State.READY)
+    lab.until(lambda: lab.session.state is WindowState.READY)
     idle(lab)
 
 
@@ -173,7 +173,7 @@ def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
     three_waiting(lab)
     setup.edit(session.queue.items[0])
     type_into(setup.form.field("hold"), "8 s")
-    session.status.enter(State.READY)
+    session.status.enter(WindowState.READY)
     session.queue.next()
     assert started == ["one"]
     assert "one has started with the parameters it had" in setup.strip.text()
@@ -202,7 +202,7 @@ def test_edit_that_cannot_run_is_not_saved(lab) -> None:
     setup.save()
     assert setup.subject.edited is session.queue.items[0]
     setup.start()
-    assert session.state is State.RUNNING and len(session.queue.items) == 3
+    assert session.state is WindowState.RUNNING and len(session.queue.items) == 3
     setup.buttons.cancel.click()
     idle(lab)
 
@@ -234,9 +234,11 @@ def test_edited_run_is_executed_as_it_was_saved(lab) -> None:
     assert len(session.queue.items) == 1
     first = session.run.folder
     session.stop("the next one follows when asked for")
-    lab.until(lambda: session.state is State.READY)
+    lab.until(lambda: session.state is WindowState.READY)
     setup.queue.resume.click()
-    lab.until(lambda: session.run.folder != first and session.state is State.READY)
+    lab.until(
+        lambda: session.run.folder != first and session.state is WindowState.READY
+    )
     assert load(session.run.folder / "scene.toml").protocol.hold == 0.25
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from gui.lanes.expected import Hold, Preview
+from gui.lanes.expected import Preview, Stretch
 from gui.lanes.phase import phase
 from gui.lanes.rate import begins, rate_of
 from gui.lanes.source import LiveSource
@@ -53,7 +53,7 @@ def live(planned: np.ndarray, twin: np.ndarray, end: float) -> LiveSource:
     since = np.searchsorted(planned, time, side="right")
     value = time - np.append(0.0, planned)[since]
     force = Waveform.through([(0.0, 0.0), (14.0, 0.0)])
-    holds = [Hold(PERIOD * k, PERIOD * (k + 1), str(k)) for k in range(3)]
+    holds = [Stretch(PERIOD * k, PERIOD * (k + 1), str(k)) for k in range(3)]
     preview = Preview(force, {"V_C2": (time, value)}, planned, holds, 14.0)
     source = LiveSource(preview, 1.0)
     value = np.zeros(2, np.float32)

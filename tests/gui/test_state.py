@@ -3,10 +3,10 @@ import pytest
 from gui.look.tokens import DARK, LIGHT, Tokens
 from gui.state import (
     STALE,
+    CoilKnowledge,
     CoilView,
     Snapshot,
-    State,
-    Truth,
+    WindowState,
     clock_text,
     milliamperes,
     minutes,
@@ -36,50 +36,52 @@ LIVE = CoilView(True, 0.374, 0.374, limit=2.0)
 
 def test_stop_tells_the_read_back_not_the_command() -> None:
     coil = CoilView(True, current=0.112, setpoint=0.9)
-    assert stop_text(State.RUNNING, coil).detail == "112 mA live"
+    assert stop_text(WindowState.RUNNING, coil).detail == "112 mA live"
 
 
 def test_silent_source_is_unknown() -> None:
     silent = CoilView(True, 0.374, 0.374, age=STALE + 0.1)
-    assert truth(State.RUNNING, silent) is Truth.UNKNOWN
-    assert stop_text(State.RUNNING, silent).title == "COIL STATE UNKNOWN"
+    assert truth(WindowState.RUNNING, silent) is CoilKnowledge.UNKNOWN
+    assert stop_text(WindowState.RUNNING, silent).title == "COIL STATE UNKNOWN"
 
 
 def test_old_read_back_is_said_to_be_old() -> None:
     coil = CoilView(True, 0.1, 0.5, age=0.1, read_age=STALE + 1)
-    assert stop_text(State.RUNNING, coil).detail == "500 mA sent, not read back"
+    assert stop_text(WindowState.RUNNING, coil).detail == "500 mA sent, not read back"
 
 
-@pytest.mark.parametrize("state", list(State))
-def test_unverified_off_is_unknown_in_every_state(state: State) -> None:
+@pytest.mark.parametrize("state", list(WindowState))
+def test_unverified_off_is_unknown_in_every_state(state: WindowState) -> None:
     coil = CoilView(False, None, verified_off=False)
-    assert truth(state, coil) is Truth.UNKNOWN
+    assert truth(state, coil) is CoilKnowledge.UNKNOWN
 
 
 def test_without_coil_stop_says_so() -> None:
-    assert stop_text(State.DISCONNECTED, None).detail == "no coil source"
+    assert stop_text(WindowState.DISCONNECTED, None).detail == "no coil source"
 
 
 def test_live_coil_is_live_also_when_ready() -> None:
     # by hand: the state is ready, the coil is not off
-    assert truth(State.READY, LIVE) is Truth.LIVE
+    assert truth(WindowState.READY, LIVE) is CoilKnowledge.LIVE
 
 
 def test_aborting_shows_the_fall() -> None:
-    assert stop_text(State.ABORTING, LIVE).detail == "374 mA → 0"
+    assert stop_text(WindowState.ABORTING, LIVE).detail == "374 mA → 0"
 
 
-@pytest.mark.parametrize("state", [s for s in State if s is not State.READY])
-def test_run_is_off_with_a_reason_unless_ready(state: State) -> None:
+@pytest.mark.parametrize(
+    "state", [s for s in WindowState if s is not WindowState.READY]
+)
+def test_run_is_off_with_a_reason_unless_ready(state: WindowState) -> None:
     assert run_problem(Snapshot(state=state), form_problem="")
 
 
 def test_run_is_on_when_ready_and_the_form_is_good() -> None:
-    ready = Snapshot(state=State.READY)
+    ready = Snapshot(state=WindowState.READY)
     assert run_problem(ready, form_problem="") == ""
     assert run_problem(ready, form_problem="Hold: wrong") == "Hold: wrong"
     assert "by hand" in run_problem(
-        Snapshot(state=State.READY, manual=True), form_problem=""
+        Snapshot(state=WindowState.READY, manual=True), form_problem=""
     )
 
 
@@ -97,7 +99,7 @@ def test_durations() -> None:
 
 
 def test_clock_shows_elapsed_and_expected() -> None:
-    running = Snapshot(state=State.RUNNING, elapsed=23.4, expected=41.0)
+    running = Snapshot(state=WindowState.RUNNING, elapsed=23.4, expected=41.0)
     assert clock_text(running) == ("RUNNING", "00:23.4 / 00:41")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gui.lanes.twin import CLOSE, Twin
+from gui.lanes.twin import CLOSE, TwinTraces
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.model_parts import binned, live_part
@@ -32,7 +32,7 @@ def in_one_piece() -> ModelPart:
 @given(st.lists(st.floats(0.01, 1.45), max_size=6))
 def test_any_slicing_gives_the_spikes_of_one_piece(cuts: list[float]) -> None:
     whole = in_one_piece()
-    twin, tracks = LiveModel.of(SCENE), Twin()
+    twin, tracks = LiveModel.of(SCENE), TwinTraces()
     fed = 0
     for end in [*sorted(cuts), 1.5]:
         while fed < len(POINTS) and POINTS[fed][0] <= end:
@@ -104,7 +104,7 @@ def test_bins_hold_all_the_model_does(start, width, count, signal) -> None:
 
 def parts(
     asked: list[tuple[float, float, int]],
-) -> tuple[Twin, Callable[[], None]]:
+) -> tuple[TwinTraces, Callable[[], None]]:
     """A twin, and what answers its newest look."""
 
     def slice_(start: float, end: float, count: int) -> ModelPart:
@@ -112,7 +112,7 @@ def parts(
         bins = {"V_C1": binned(RESULT, "V_C1", spikes, start, end, count)}
         return ModelPart(bins, spikes, end)
 
-    twin = Twin(lambda *part: asked.append(part))
+    twin = TwinTraces(lambda *part: asked.append(part))
     twin.add(slice_(0.0, 1.5, 1500))
     return twin, lambda: twin.refine(slice_(*asked[-1]))
 

@@ -22,7 +22,7 @@ from gui.dialogs.help import Help
 from gui.dialogs.saving import table
 from gui.lanes.source import PlanSource
 from gui.session.queue import Queued
-from gui.state import State, Truth
+from gui.state import CoilKnowledge, WindowState
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.store.run import Run
@@ -49,7 +49,7 @@ def test_ready_offers_run_and_shows_the_plan(lab) -> None:
     window.setup.plan_now()
     lab.until(lambda: isinstance(window.centre.stack.source, PlanSource))
     assert window.setup.run.isEnabled()
-    assert window.header.stop.truth is Truth.OFF
+    assert window.header.stop.truth is CoilKnowledge.OFF
     assert window.header.badge.isVisible()
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert keys == ["force", "V_C1", "residual", "V_C2", "V_K", "spikes", "rate"]
@@ -61,7 +61,7 @@ def test_run_locks_the_form_and_shows_the_coil_live(lab) -> None:
     lab.run()
     assert not window.setup.run.isEnabled()
     assert not any(e.isEnabled() for e in window.setup.form.findChildren(QLineEdit))
-    lab.until(lambda: window.header.stop.truth is Truth.LIVE)
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
     assert red_share(window.header.stop) > 0.5
 
 
@@ -73,7 +73,7 @@ def test_run_moves_lanes_and_gives_results(lab) -> None:
     assert not source.trace("V_C1", 0.0, 2.0, 500).empty
     assert [f.label for f in window.screen_.results.steps] == ["80 mN", "120 mN"]
     assert window.review.results.mark.text().startswith("final")
-    lab.until(lambda: window.header.stop.truth is Truth.OFF)
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.OFF)
 
 
 @pytest.mark.parametrize("how", ["click", "Esc", "F12"])
@@ -88,20 +88,20 @@ def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
         lab.until(window.isActiveWindow)
         key = {"Esc": Qt.Key.Key_Escape, "F12": Qt.Key.Key_F12}[how]
         QTest.keyClick(window, key)
-    assert session.state is State.ABORTING
-    lab.until(lambda: session.state is State.READY)
+    assert session.state is WindowState.ABORTING
+    lab.until(lambda: session.state is WindowState.READY)
     coil = session.coil_view()
     assert coil is not None and coil.output is False and coil.verified_off
     assert window.screen_.ending.startswith("aborted")
 
 
 def test_stop_is_enabled_in_every_state(lab) -> None:
-    for state in State:
+    for state in WindowState:
         lab.session.status.state = state
         lab.window.render_state()
         assert lab.window.header.stop.isEnabled()
         assert lab.window.header.stop.isVisible()
-    lab.session.status.state = State.READY
+    lab.session.status.state = WindowState.READY
     lab.window.render_state()
 
 
@@ -112,7 +112,7 @@ def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
     assert window.closing.isVisible() and window.closing.keep.isDefault()
     QTest.keyClick(window, Qt.Key.Key_Escape)
     assert not window.closing.isVisible()
-    assert session.state is State.RUNNING, "Esc in the question is not STOP"
+    assert session.state is WindowState.RUNNING, "Esc in the question is not STOP"
     assert window.isVisible()
 
 
@@ -120,25 +120,27 @@ def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:
     window, session = lab.window, lab.session
     lab.run()
     newest_coil().faults.add(SerialFault(kind="unplug", times=None))
-    lab.until(lambda: session.state is State.FAULT)
+    lab.until(lambda: session.state is WindowState.FAULT)
     assert window.banner.isVisible()
-    assert window.header.stop.truth is Truth.UNKNOWN
+    assert window.header.stop.truth is CoilKnowledge.UNKNOWN
     assert window.header.stop.words.title == "COIL STATE UNKNOWN"
     assert not window.setup.run.isEnabled()
     window.banner.acknowledge.click()
-    assert session.state is not State.FAULT
-    assert window.header.stop.truth is Truth.UNKNOWN, "reading a fault verifies nothing"
+    assert session.state is not WindowState.FAULT
+    assert window.header.stop.truth is CoilKnowledge.UNKNOWN, (
+        "reading a fault verifies nothing"
+    )
     assert not window.setup.run.isEnabled(), "and nothing runs beside it"
-    lab.until(lambda: session.state is State.READY)
-    assert window.header.stop.truth is Truth.OFF, "the instruments were asked"
+    lab.until(lambda: session.state is WindowState.READY)
+    assert window.header.stop.truth is CoilKnowledge.OFF, "the instruments were asked"
 
 
 def test_reconnecting_makes_the_coil_known_again(lab) -> None:
     session = lab.session
     session.connect_bench("sim")
-    assert session.state is State.CONNECTING
-    lab.until(lambda: session.state is State.READY)
-    assert lab.window.header.stop.truth is Truth.OFF
+    assert session.state is WindowState.CONNECTING
+    lab.until(lambda: session.state is WindowState.READY)
+    assert lab.window.header.stop.truth is CoilKnowledge.OFF
 
 
 def test_queue_can_be_edited_while_running(lab) -> None:
@@ -152,14 +154,14 @@ def test_queue_can_be_edited_while_running(lab) -> None:
     assert window.setup.queue.isVisible()
     session.queue.remove(session.queue.items[1])
     first = session.run.folder
-    assert session.state is State.RUNNING, "a queued run waits"
+    assert session.state is WindowState.RUNNING, "a queued run waits"
     session.stop("the next one shall not follow")
-    lab.until(lambda: session.state is State.READY)
+    lab.until(lambda: session.state is WindowState.READY)
     assert [item.title for item in session.queue.items] == [
         "three"
     ] and not session.busy
     session.queue.add(Queued("four", window.setup.request()))
-    lab.until(lambda: session.queue.items == [] and session.state is State.READY)
+    lab.until(lambda: session.queue.items == [] and session.state is WindowState.READY)
     assert session.run.folder != first
 
 
@@ -191,7 +193,7 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
     window.review.manual.current.setText("100 mA")
     window.review.manual.set.click()
     lab.until(lambda: abs((session.coil_view().current or 0) - 0.1) < 2e-3)
-    lab.until(lambda: window.header.stop.truth is Truth.LIVE)
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
     assert not window.setup.run.isEnabled()
     session.run.expected = 10.0  # of the run before
     assert not window.close(), "the coil is live: closing asks"
@@ -265,7 +267,7 @@ def test_a_run_stopped_before_its_first_sample_is_no_new_problem(lab) -> None:
     window, session = lab.window, lab.session
     window.setup.start()
     session.stop("at once")
-    lab.until(lambda: not session.busy and session.state is not State.ABORTING)
+    lab.until(lambda: not session.busy and session.state is not WindowState.ABORTING)
     lab.until(lambda: not any(t.name == "open run" for t in threading.enumerate()))
     lab.app.processEvents()
     assert not window.centre.notice.isVisible(), window.centre.notice.text()
@@ -463,14 +465,14 @@ def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     assert "mV" in window.centre.monitor_bar.words
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
-    assert session.state is State.READY
-    assert window.header.stop.truth is Truth.OFF
+    assert session.state is WindowState.READY
+    assert window.header.stop.truth is CoilKnowledge.OFF
     session.out.mkdir(exist_ok=True)
     before = set(session.out.iterdir())
     window.setup.run.click()
-    lab.until(lambda: session.state is State.RUNNING)
+    lab.until(lambda: session.state is WindowState.RUNNING)
     assert not session.monitor.alive, "the scope is handed over before the run"
-    lab.until(lambda: session.state in (State.READY, State.FAULT))
+    lab.until(lambda: session.state in (WindowState.READY, WindowState.FAULT))
     new = set(session.out.iterdir()) - before
     assert len(new) == 1, "watching keeps nothing"
 
@@ -536,9 +538,9 @@ def test_esc_closes_a_card_between_runs_and_is_stop_in_one(lab) -> None:
     window.actions_.show_help()
     card = window.findChild(Help)
     QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
-    assert not card.isVisible() and session.state is State.READY
+    assert not card.isVisible() and session.state is WindowState.READY
     lab.run()
     window.actions_.show_help()
     QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
-    assert session.state is State.ABORTING
+    assert session.state is WindowState.ABORTING
     card.hide()

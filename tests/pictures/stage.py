@@ -22,7 +22,7 @@ from gui.app import application, begin
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
 from gui.session.session import Session
-from gui.state import State
+from gui.state import WindowState
 from gui.window import Window
 
 SIZE = (1720, 1080)
@@ -111,7 +111,9 @@ class Stage:
         session = self.session
         session.plan.expectation = None
         self.window.setup.plan_now()
-        self.until(lambda: session.plan.expectation and session.state is State.READY)
+        self.until(
+            lambda: session.plan.expectation and session.state is WindowState.READY
+        )
         self.live(0.4)
 
     def run(self) -> None:
@@ -119,7 +121,7 @@ class Stage:
         session = self.session
         self.planned()
         self.window.setup.start()
-        self.until(lambda: session.state is State.RUNNING)
+        self.until(lambda: session.state is WindowState.RUNNING)
         self.ended()
 
     def ended(self) -> None:

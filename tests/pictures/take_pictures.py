@@ -17,7 +17,7 @@ from PySide6.QtTest import QTest
 from stage import SIZE, Stage, instruments_attached
 
 from gui.dialogs.connect import Connect
-from gui.state import State
+from gui.state import WindowState
 
 READ_BY_A_PERSON = """
 name = "read by a person"
@@ -157,7 +157,7 @@ def _wiring(stage: Stage) -> None:
     dialog = _connect(stage)
     dialog.show_page(1)
     dialog.wiring.check.click()
-    stage.until(lambda: stage.session.state is State.RUNNING)
+    stage.until(lambda: stage.session.state is WindowState.RUNNING)
     stage.ended()
     stage.until(lambda: dialog.wiring.verdicts)
     stage.shoot("window_wiring")
@@ -207,7 +207,7 @@ def _unplugged(stage: Stage) -> None:
     stage.window.screen_.open_scene("demo.toml")
     stage.planned()
     stage.window.setup.start()
-    stage.until(lambda: stage.session.state is State.FAULT)
+    stage.until(lambda: stage.session.state is WindowState.FAULT)
     stage.live(0.3)
     stage.shoot("window_fault_dark", "dark")
     stage.shoot("window_fault_light")
@@ -216,12 +216,12 @@ def _unplugged(stage: Stage) -> None:
 def _calibration(folder: Path) -> None:
     """The field calibration from its page; as fast as it computes."""
     stage = Stage(folder, "sim", realtime=False)
-    stage.until(lambda: stage.session.state is State.READY)
+    stage.until(lambda: stage.session.state is WindowState.READY)
     stage.planned()
     dialog = _connect(stage)
     dialog.show_page(2)
     dialog.calibration.field.click()
-    stage.until(lambda: stage.session.state is State.RUNNING)
+    stage.until(lambda: stage.session.state is WindowState.RUNNING)
     stage.ended()
     stage.until(dialog.calibration.use.isVisible)
     stage.live(0.3)
@@ -234,7 +234,7 @@ def _read_by_a_person(folder: Path) -> None:
     Path("bench.toml").write_text(READ_BY_A_PERSON)
     stage = Stage(folder, "bench.toml", "calibrate_field", realtime=False)
     session, card = stage.session, stage.window.question
-    stage.until(lambda: session.state is State.READY)
+    stage.until(lambda: session.state is WindowState.READY)
     stage.planned()
     stage.window.setup.start()
     for field in ("10.83", "9.75", "8.66"):

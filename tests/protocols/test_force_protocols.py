@@ -9,7 +9,7 @@ from protocols.bipolar import Bipolar
 from protocols.calibrate_field import CalibrateField
 from protocols.force_check import ForceCheck
 from protocols.hold import Hold
-from protocols.monitor import Monitor
+from protocols.monitor import NoForce
 from protocols.rate_force import RateForce
 from protocols.repeat import Repeat
 from protocols.sine_sweep import SineSweep
@@ -254,7 +254,7 @@ def test_wiring_check_pushes_little():
 
 
 def test_monitor_asks_for_no_force():
-    trials = drive(Monitor(duration=25.0, part=10.0), quiet)
+    trials = drive(NoForce(duration=25.0, part=10.0), quiet)
     assert [t.length for t in trials] == pytest.approx([10, 10, 5])
     assert all(t.force.peak == 0 for t in trials)
 

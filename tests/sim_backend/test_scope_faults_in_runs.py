@@ -8,7 +8,7 @@ import pytest
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.bench import open_bench
-from sim_backend.picoscope.faults import Fault
+from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
@@ -30,7 +30,7 @@ AT = 150_000
 """Sample at which faults strike; the run has more."""
 
 
-def run(folder: Path, *faults: Fault) -> tuple[Executed, int]:
+def run(folder: Path, *faults: ScopeFault) -> tuple[Executed, int]:
     """The finished run, and samples of V_K in its folder."""
     scene = load("demo", OVERRIDES)
     bench = open_bench(scene, needs(scene), scope_faults=faults)
@@ -45,30 +45,37 @@ def run(folder: Path, *faults: Fault) -> tuple[Executed, int]:
     ("fault", "reason"),
     [
         (
-            Fault(kind="unplug", sample=AT),
+            ScopeFault(kind="unplug", sample=AT),
             "does not answer: unplugged or without power",
         ),
-        (Fault(kind="silent", sample=AT), "sent nothing for"),
-        (Fault(kind="stream_fails", sample=AT), "streaming stopped by itself"),
-        (Fault(kind="hang", sample=AT, duration=5.0), ""),
-        (Fault(kind="gap", sample=AT, samples=700), "Samples are missing"),
-        (Fault(kind="stall", sample=AT), "would have been overwritten"),
-        (Fault(kind="supply_lost", sample=AT), "mains adapter is not connected"),
-        (Fault(kind="supply_connected", sample=AT), "mains adapter was plugged in"),
-        (Fault(kind="undervoltage", sample=AT), "cannot feed the scope"),
-        (Fault(kind="reset", sample=AT), "does not answer"),
+        (ScopeFault(kind="silent", sample=AT), "sent nothing for"),
+        (ScopeFault(kind="stream_fails", sample=AT), "streaming stopped by itself"),
+        (ScopeFault(kind="hang", sample=AT, duration=5.0), ""),
+        (ScopeFault(kind="gap", sample=AT, samples=700), "Samples are missing"),
+        (ScopeFault(kind="stall", sample=AT), "would have been overwritten"),
+        (ScopeFault(kind="supply_lost", sample=AT), "mains adapter is not connected"),
         (
-            Fault(kind="status", call="GetStreamingLatestValues", nth=15, code=0x4C),
+            ScopeFault(kind="supply_connected", sample=AT),
+            "mains adapter was plugged in",
+        ),
+        (ScopeFault(kind="undervoltage", sample=AT), "cannot feed the scope"),
+        (ScopeFault(kind="reset", sample=AT), "does not answer"),
+        (
+            ScopeFault(
+                kind="status", call="GetStreamingLatestValues", nth=15, code=0x4C
+            ),
             "power failed",
         ),
         (
-            Fault(kind="status", call="GetStreamingLatestValues", nth=15, code=0x999),
+            ScopeFault(
+                kind="status", call="GetStreamingLatestValues", nth=15, code=0x999
+            ),
             "0x999, unknown",
         ),
     ],
-    ids=lambda value: value.kind if isinstance(value, Fault) else "",
+    ids=lambda value: value.kind if isinstance(value, ScopeFault) else "",
 )
-def test_faults_while_streaming(tmp_path: Path, fault: Fault, reason: str) -> None:
+def test_faults_while_streaming(tmp_path: Path, fault: ScopeFault, reason: str) -> None:
     done, samples = run(tmp_path, fault)
     ending = done
     assert ending.state is RunState.FAULTED
@@ -89,7 +96,9 @@ def test_a_loss_that_only_the_last_poll_finds_is_told(tmp_path: Path) -> None:
     sound, library = run_slowly(tmp_path / "sound")
     assert sound.exit_code == 0
     polls = library.device.schedule.calls["GetStreamingLatestValues"]
-    last = Fault(kind="gap", call="GetStreamingLatestValues", nth=polls, samples=700)
+    last = ScopeFault(
+        kind="gap", call="GetStreamingLatestValues", nth=polls, samples=700
+    )
     done, _ = run_slowly(tmp_path / "lossy", last)
     assert done.off.verified
     assert done.state is RunState.FAULTED
@@ -100,7 +109,7 @@ def test_a_loss_that_only_the_last_poll_finds_is_told(tmp_path: Path) -> None:
     assert "not known how many" in str(verdict.certificate)
 
 
-def run_slowly(folder: Path, *faults: Fault) -> tuple[Executed, FakePs3000a]:
+def run_slowly(folder: Path, *faults: ScopeFault) -> tuple[Executed, FakePs3000a]:
     """A run whose polls take 5 ms, so that the last, too, brings samples."""
     scene = load("demo", OVERRIDES)
     bench = open_bench(scene, needs(scene), scope_faults=faults)
@@ -120,7 +129,7 @@ def run_slowly(folder: Path, *faults: Fault) -> tuple[Executed, FakePs3000a]:
     "call", ["OpenUnit", "GetUnitInfo", "SetChannel", "RunStreaming"]
 )
 def test_unplugged_before_the_first_sample(tmp_path: Path, call: str) -> None:
-    done, samples = run(tmp_path, Fault(kind="unplug", call=call))
+    done, samples = run(tmp_path, ScopeFault(kind="unplug", call=call))
     assert done.state is RunState.FAULTED
     assert done.off.verified
     assert samples == 0
@@ -129,17 +138,17 @@ def test_unplugged_before_the_first_sample(tmp_path: Path, call: str) -> None:
 @pytest.mark.parametrize(
     "fault",
     [
-        Fault(
+        ScopeFault(
             kind="status", call="GetStreamingLatestValues", nth=9, code=0x27, times=5
         ),
-        Fault(
+        ScopeFault(
             kind="status", call="GetStreamingLatestValues", nth=9, code=0x43, times=2
         ),
-        Fault(kind="overrange", sample=AT, duration=0.05, inputs=("C",)),
+        ScopeFault(kind="overrange", sample=AT, duration=0.05, inputs=("C",)),
     ],
     ids=["busy", "overlap", "overrange"],
 )
-def test_what_a_run_survives(tmp_path: Path, fault: Fault) -> None:
+def test_what_a_run_survives(tmp_path: Path, fault: ScopeFault) -> None:
     done, samples = run(tmp_path, fault)
     assert done.state is RunState.COMPLETE, done.reason
     assert done.off.verified
