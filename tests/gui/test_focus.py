@@ -15,6 +15,9 @@ def reachable(window: QWidget) -> list[QWidget]:
     found, at = [], window.nextInFocusChain()
     while at is not window:
         tabbed = at.focusPolicy() & Qt.FocusPolicy.TabFocus
+        tabbed = (
+            tabbed and at.focusProxy() is None
+        )  # the line in a choice is its inside
         if tabbed and at.isVisible() and at.isEnabled() and at.window() is window:
             found.append(at)
         at = at.nextInFocusChain()
