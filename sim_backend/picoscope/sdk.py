@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from ctypes import POINTER, c_float, c_int8, c_int16, c_int32, c_uint32, c_void_p
 from typing import Any, TypeVar
 
@@ -38,27 +38,22 @@ StreamingReady = convention(
 _Method = TypeVar("_Method", bound=Callable[..., int])
 
 
+FUNCTIONS: dict[str, tuple[Callable[..., int], tuple[Any, ...]]] = {}
+"""Method and argument types of each C function, by its name without "ps3000a"."""
+
+
 def header(*argtypes: Any) -> Callable[[_Method], _Method]:
-    """Mark a method ``_do_it`` as the C function ``ps3000aDoIt`` with these arguments.
+    """Enter a method ``_do_it`` as the C function ``ps3000aDoIt`` with these arguments.
 
     A first argument of int16_t is the handle, which the method does not get.
     """
 
-    def mark(method: _Method) -> _Method:
-        method.argtypes = argtypes  # type: ignore[attr-defined]
+    def enter(method: _Method) -> _Method:
+        name = method.__name__.title().replace("_", "")
+        FUNCTIONS[name] = (method, argtypes)
         return method
 
-    return mark
-
-
-def marked(kind: type) -> Iterator[tuple[str, Any, tuple[Any, ...]]]:
-    """Name without "ps3000a", method and argument types of all marked methods."""
-    for attribute in dir(kind):
-        method = getattr(kind, attribute)
-        argtypes = getattr(method, "argtypes", None)
-        if attribute.startswith("_") and isinstance(argtypes, tuple):
-            name = "".join(word.title() for word in attribute.split("_"))
-            yield name, method, argtypes
+    return enter
 
 
 class FakePs3000a:
@@ -86,7 +81,7 @@ class FakePs3000a:
         self.in_callback = False
         self._busy = threading.Lock()
         self.buffers: dict[int, NDArray[np.int16]] = {}
-        for name, method, argtypes in marked(FakePs3000a):
+        for name, (method, argtypes) in FUNCTIONS.items():
             entry = convention(c_uint32, *argtypes)(self._guarded(name, method))
             setattr(self, f"ps3000a{name}", entry)
 

@@ -14,7 +14,7 @@ import pytest
 
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import ENVIRONMENT, load
-from sim_backend.picoscope.sdk import FakePs3000a, marked
+from sim_backend.picoscope.sdk import FUNCTIONS
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError, LinkLostError, SamplesLostError
@@ -140,7 +140,7 @@ def test_use_after_close_is_an_error(emulator: Any, library_file: Path) -> None:
 
 def test_the_fake_exports_what_the_compiled_library_does(library_file: Path) -> None:
     library = load(str(library_file))
-    for name, _, argtypes in marked(FakePs3000a):
+    for name, (_, argtypes) in FUNCTIONS.items():
         function = getattr(library, f"ps3000a{name}")
         assert len(argtypes) == len(function.argtypes)
         widths = [ctypes.sizeof(a) for a in argtypes]
