@@ -21,6 +21,11 @@ class WindowState(Enum):
     ABORTING = "stopping"
     FAULT = "fault"
 
+    @property
+    def in_run(self) -> bool:
+        """Whether a run is in progress, be it one that is being stopped."""
+        return self in (WindowState.RUNNING, WindowState.ABORTING)
+
 
 class CoilKnowledge(Enum):
     """What is known about the coil, from read-back, never from commands."""
@@ -218,7 +223,7 @@ def clock_text(snapshot: Snapshot) -> tuple[str, str]:
     if snapshot.state is WindowState.CONNECTING:
         return word, "asking the instruments"
     elapsed = minutes(snapshot.elapsed, tenths=True)
-    if snapshot.state in (WindowState.RUNNING, WindowState.ABORTING):
+    if snapshot.state.in_run:
         if snapshot.expected is None:
             return word, elapsed
         return word, f"{elapsed} / {minutes(snapshot.expected)}"

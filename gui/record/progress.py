@@ -95,7 +95,7 @@ class ProgressStrip(QWidget):
         colour = {WindowState.FAULT: "red", WindowState.ABORTING: "amber"}.get(
             state, "accent"
         )
-        if state in (WindowState.RUNNING, WindowState.ABORTING):
+        if state.in_run:
             self._running(snapshot, holds, length, reach, trial)
         else:
             if ending.startswith("complete"):

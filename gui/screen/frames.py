@@ -9,7 +9,6 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from gui.lanes.source import LiveSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
-from gui.state import WindowState
 
 FAST, SLOW = 33, 100
 """Milliseconds between frames."""
@@ -88,8 +87,7 @@ class Frames(QObject):
             panels.centre.progress.show_run(
                 snapshot, holds, source.length, source.reach, trial, ending
             )
-            running = session.state in (WindowState.RUNNING, WindowState.ABORTING)
-            panels.setup.show_head(source.reach if running else None)
+            panels.setup.show_head(source.reach if session.state.in_run else None)
 
     def _show_monitor(self) -> None:
         panels, monitor = self._panels, self._panels.session.monitor

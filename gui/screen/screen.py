@@ -88,7 +88,7 @@ class Screen(QObject):
 
     @property
     def _busy(self) -> bool:
-        return self._panels.session.state in (WindowState.RUNNING, WindowState.ABORTING)
+        return self._panels.session.state.in_run
 
     def ask_scene(self) -> None:
         """Let the user choose a scene, and open it."""

@@ -29,8 +29,6 @@ from tactile_lab.errors import TactileLabError
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
 
-BUSY = (WindowState.RUNNING, WindowState.ABORTING)
-
 
 class Session(QObject):
     """The parts, and the rules between them.
@@ -217,13 +215,13 @@ class Session(QObject):
     @property
     def busy(self) -> bool:
         """Whether closing needs a question first."""
-        return self.run.alive or self.state in BUSY or self.manual.alive
+        return self.run.alive or self.state.in_run or self.manual.alive
 
     @property
     def plan_on_screen(self) -> Expectation | None:
         """The plan of the run in progress, else that of the form."""
-        busy = self.state in BUSY
-        return self.run.expectation if busy else self.plan.expectation
+        in_run = self.state.in_run
+        return self.run.expectation if in_run else self.plan.expectation
 
     def coil_view(self) -> CoilView | None:
         """The coil as it is known now."""

@@ -200,7 +200,7 @@ class SetupPanel(QFrame):
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Lock the form, say what it shows, and why a button is off."""
         self._snapshot = snapshot
-        busy = snapshot.state in (WindowState.RUNNING, WindowState.ABORTING)
+        busy = snapshot.state.in_run
         self._in_progress = busy and self._shows_run_in_progress()
         editing = self.subject.edited is not None
         self.form.lock(busy and not editing)
