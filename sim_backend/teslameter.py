@@ -226,10 +226,8 @@ class RowMeter:
             answers[row.multiplier] = lambda: "m"
         for line, wanted in row.confirm.items():
             answers[line] = partial(invented, wanted)
-            answers[line]()
         answers[row.field] = field
         self._talk = RowParser(row, answers, lambda text: False, deque())
-        field()
 
     def line(self, line: bytes) -> bytes | None:
         """Act on one line; the answer without terminator, or None."""

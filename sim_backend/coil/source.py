@@ -92,8 +92,6 @@ class RowCoil(CoilPanel):
         self._limit, self._set = reader(row.limit), reader(row.set)
         self._told: deque[str] = deque()
         self._talk = RowParser(row, self._queries(), self._act, self._told)
-        for answer in self._queries().values():
-            answer()  # a pattern without an answer is found here, not in a run
 
     def line(self, line: bytes) -> bytes | None:
         """Act on one line; the answer without terminator, or None."""

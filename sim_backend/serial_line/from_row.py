@@ -14,7 +14,7 @@ from string import Formatter
 from typing import Any
 
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.serial_dialect import CoilDialect, SerialDialect
+from tactile_lab.instruments.serial_dialect import SerialDialect
 
 UNKNOWN = '-113,"Undefined header"'
 
@@ -29,6 +29,9 @@ class RowParser:
         answers: further queries.
         acts: further lines; each says whether it was meant.
         errors: of the instrument, oldest first.
+
+    Raises:
+        SceneError: no answer can be made from one of the row's patterns.
     """
 
     def __init__(
@@ -44,14 +47,15 @@ class RowParser:
             self._answers[row.error] = lambda: errors.popleft() if errors else fine
         self._accepted = {*row.init, *row.optional, *row.release}
         self._acts, self._errors = acts, errors
-        join = row.join if isinstance(row, CoilDialect) else ""
-        self._error = row.error
-        self._tail = join + row.error if join and row.error else None
+        self._error = row.error or ""
+        self._tail = row.verified("")[0]  # behind a line that is verified in one
+        for answer in answers.values():
+            answer()  # a pattern without an answer is found here, not in a run
 
     def line(self, line: bytes) -> bytes | None:
         """Act on one line; the answer without terminator, or None."""
         parts = [line.decode("ascii", "replace")]
-        if self._tail and self._error and parts[0].endswith(self._tail):
+        if self._tail and parts[0].endswith(self._tail):
             parts = [parts[0].removesuffix(self._tail), self._error]
         said = [self._one(part) for part in parts]
         told = ";".join(one for one in said if one)
