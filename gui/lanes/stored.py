@@ -188,13 +188,10 @@ def _pyramid(signal: StoredSignal) -> Pyramid:
 
 def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Force from the applied current, and the field, as (times, values)."""
-    current = run.current
-    measured = np.where(
-        np.isnan(current["measured"]), current["setpoint"], current["measured"]
-    )
+    time, current = run.read_back.T
     field = run.field
     return {
-        "force": (current["time"].copy(), measured * gain),
+        "force": (time, current * gain),
         "field": (field["time"].copy(), field["field"].copy()),
     }
 

@@ -48,13 +48,11 @@ def thumbnail_of(folder: Path) -> Thumbnail:
     """
     with Run.load(folder) as run:
         length = max(run.duration, 1e-9)
-        rows, spikes = run.current, run.spikes["time"] / length
+        (when, amperes), spikes = run.read_back.T, run.spikes["time"] / length
         grid = np.linspace(0.0, length, POINTS)
-        if not rows.size:
+        if not when.size:
             return Thumbnail(np.zeros(POINTS), _places(spikes))
-        measured = rows["measured"]
-        amperes = np.where(np.isnan(measured), rows["setpoint"], measured)
-        at = np.searchsorted(rows["time"], grid, side="right") - 1
+        at = np.searchsorted(when, grid, side="right") - 1
         force = np.where(at < 0, 0.0, amperes[np.maximum(at, 0)])
         return Thumbnail(force / max(np.max(np.abs(force)), 1e-9), _places(spikes))
 

@@ -248,6 +248,13 @@ class StoredRun:
         return self.records("current")
 
     @property
+    def read_back(self) -> FloatArray:
+        """Shape (n, 2): time, s, and coil current read then, A; what was sent if not."""
+        rows = self.current
+        read = np.where(np.isnan(rows["measured"]), rows["setpoint"], rows["measured"])
+        return np.column_stack([rows["time"], read])
+
+    @property
     def shunt(self) -> Shunt | None:
         """Reads the recorded coil current between two times; None without one."""
         if "coil_current" not in self.signals:

@@ -150,6 +150,7 @@ def test_slow_records_events_and_trials_come_back(bench, recorder, folder):
     with Run.load(folder.path) as run:
         assert np.isnan(run.current["measured"][0])
         assert run.current["measured"][1] == pytest.approx(0.99)
+        assert run.read_back.tolist() == [[0.5, 1.0], [0.6, 0.99]]
         assert run.field.tolist() == [(0.7, 11e-3)]
         assert run.trials["label"].tolist() == [b"120 mN"]
         assert run.trials[0]["end"] == pytest.approx(3.5)
