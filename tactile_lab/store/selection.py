@@ -99,16 +99,20 @@ class Selection:
 
     def pieces(self, run: StoredRun) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
         """(times, one array of SI values per signal), a bounded piece at a time."""
+        spans = self.spans(run)
+        if not spans:
+            return
         signals = [run.signal(name) for name in self.names(run)]
-        for first, last in self.spans(run):
-            count = self.average(signals[0].interval)
-            step = max(PIECE // count, 1) * count
+        # read once: a scope with gaps leaves thousands of stretches
+        axis, count = signals[0].axis, self.average(signals[0].interval)
+        step = max(PIECE // count, 1) * count
+        for first, last in spans:
             for at in range(first, last, step):
                 stop = min(at + step, last)
                 edges = np.arange(at, stop, count)
                 centre = (edges + np.minimum(edges + count, stop) - 1) / 2
                 yield (
-                    run.axis.time_of(centre),
+                    axis.time_of(centre),
                     [_averaged(signal[at:stop], count) for signal in signals],
                 )
 
