@@ -249,7 +249,7 @@ class StoredRun:
 
     @property
     def read_back(self) -> FloatArray:
-        """Shape (n, 2): time, s, and coil current read then, A; what was sent if not."""
+        """Shape (n, 2): time, s, and coil current then, A: read back, else as sent."""
         rows = self.current
         read = np.where(np.isnan(rows["measured"]), rows["setpoint"], rows["measured"])
         return np.column_stack([rows["time"], read])

@@ -12,6 +12,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from gui.app import application, begin
+from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
 from gui.session.session import Session
 from gui.state import WindowState
@@ -73,7 +74,10 @@ class Lab:
         session, window = self.session, self.window
         while session.queue.items:
             session.queue.remove(session.queue.items[0])
-        window.closing.hide()
+        while (popup := QApplication.activePopupWidget()) is not None:
+            popup.close()
+        for overlay in window.findChildren(Overlay):
+            overlay.hide()
         window.activateWindow()  # another test may have had a window of its own
         self.until(window.isActiveWindow)
         if session.busy:

@@ -72,7 +72,3 @@ def test_tab_stays_in_an_open_card_and_the_header(lab) -> None:
     assert window.header.stop in seen, "STOP is always within reach"
     covered = (window.setup, window.centre, window.review)
     assert not any(part.isAncestorOf(one) for one in seen for part in covered)
-    from gui.dialogs.overlay import Overlay
-
-    for overlay in window.findChildren(Overlay):
-        overlay.hide()
