@@ -244,27 +244,36 @@ class Cascade:
         return [self.V2, *(self.V2 + w for w in W)]
 
     def _fires(self, leak: Numbers) -> Decimal | None:
-        """Fraction of the step at which V_C2 first reaches V_fire."""
-        gap = np.array([float(v - self.V_f) for v in leak])
-        above = np.flatnonzero(self.rule.to_grid @ gap >= 0)
+        """Fraction of the step at which V_C2 first reaches V_fire.
+
+        Between two points of the grid that lie below, it may touch V_fire at a
+        maximum: that is looked for wherever the grid bends enough to hold one.
+        """
+        rule = self.rule
+        gap = [v - self.V_f for v in leak]
+        on_grid = rule.to_grid @ np.array([float(g) for g in gap])
+        above = np.flatnonzero(on_grid[1:] >= 0) + 1
+        end = int(above[0]) if above.size else rule.grid.size - 1
+        # a parabola's top is an eighth of its second difference above the grid
+        padded = np.concatenate([on_grid[1:2], on_grid, on_grid[-2:-1]])
+        bend = 2.0 * on_grid - padded[:-2] - padded[2:]
+        tops = (padded[:-2] <= on_grid) & (padded[2:] <= on_grid)
+        near = on_grid + np.abs(bend) >= -1e-12
+        slope = None
+        for k in np.flatnonzero(tops & near):
+            if k > end or on_grid[k] >= 0:
+                break
+            slope = rule.slope(gap) if slope is None else slope
+            low = Decimal(float(rule.grid[k - 1 if k else 0]))
+            high = Decimal(float(rule.grid[k + 1 if k < end else end]))
+            if rule.at(slope, low) > 0 > rule.at(slope, high):
+                top = rule.root(slope, low, high)
+                if rule.at(gap, top) >= 0:
+                    return rule.root(gap, low, top)
         if above.size == 0:
             return None
-        k = int(above[0])
-        low = Decimal(float(self.rule.grid[k - 1])) if k else ZERO
-        high = Decimal(float(self.rule.grid[k]))
-        f_low = self.rule.at(leak, low) - self.V_f
-        f_high = self.rule.at(leak, high) - self.V_f
-        u = high
-        for _ in range(60):
-            u = low - f_low * (high - low) / (f_high - f_low)
-            f = self.rule.at(leak, u) - self.V_f
-            if abs(f) < Decimal("1e-28") or high - low < Decimal("1e-30"):
-                break
-            if f < 0:
-                low, f_low, f_high = u, f, f_high / 2
-            else:
-                high, f_high, f_low = u, f, f_low / 2
-        return u
+        low, high = (Decimal(float(rule.grid[i])) for i in (end - 1, end))
+        return rule.root(gap, low, high)
 
     def _record(
         self, t: Decimal, h: Decimal, done: Decimal, ys: Numbers, leak: Numbers | None

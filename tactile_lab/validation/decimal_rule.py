@@ -40,12 +40,12 @@ class Rule:
         for i in range(n):
             self.D[i][i] = -sum(self.D[i], ZERO)
         self.D_float = differentiation(np.array([float(u) for u in self.u]))[1:, 1:]
-        grid = np.linspace(0.0, 1.0, 161)[1:]
+        grid = np.linspace(0.0, 1.0, 161)
         w = np.array([float(x) for x in self.weight])
-        rows = w / (grid[:-1, None] - np.array([float(u) for u in self.u])[None, :])
+        rows = w / (grid[1:-1, None] - np.array([float(u) for u in self.u])[None, :])
         self.grid, self.to_grid = grid, np.zeros((grid.size, w.size))
-        self.to_grid[:-1] = rows / rows.sum(axis=1, keepdims=True)
-        self.to_grid[-1, -1] = 1.0
+        self.to_grid[1:-1] = rows / rows.sum(axis=1, keepdims=True)
+        self.to_grid[0, 0] = self.to_grid[-1, -1] = 1.0
 
     def at(self, values: Numbers, u: Decimal) -> Decimal:
         """The polynomial through `values` at u (barycentric)."""
@@ -57,6 +57,30 @@ class Rule:
             above += part * value
             below += part
         return above / below
+
+    def slope(self, values: Numbers) -> Numbers:
+        """Derivative of the polynomial through `values`, at the same points."""
+        return [
+            sum((d * v for d, v in zip(row, values, strict=True)), ZERO)
+            for row in self.D
+        ]
+
+    def root(self, values: Numbers, low: Decimal, high: Decimal) -> Decimal:
+        """Where the polynomial is zero between two points where its signs differ."""
+        f_low, f_high = self.at(values, low), self.at(values, high)
+        u = high
+        for _ in range(60):
+            if f_low == f_high:
+                break
+            u = low - f_low * (high - low) / (f_high - f_low)
+            f = self.at(values, u)
+            if abs(f) < Decimal("1e-28") or high - low < Decimal("1e-30"):
+                break
+            if (f < 0) == (f_low < 0):
+                low, f_low, f_high = u, f, f_high / 2
+            else:
+                high, f_high, f_low = u, f, f_low / 2
+        return u
 
     def tail(self, values: Numbers) -> Decimal:
         """Size of the last Chebyshev coefficient."""

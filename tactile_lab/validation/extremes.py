@@ -17,7 +17,7 @@ from tactile_lab.validation.problem import Problem
 from tactile_lab.validation.reference import constant_firing
 from tactile_lab.waveform import Waveform
 
-Truth = Literal["reference", "formula", "refuse", "finite"]
+Truth = Literal["reference", "formula", "refuse", "limit", "finite"]
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,9 @@ class Extreme:
     Attributes:
         problem: the scene.
         truth: "reference" (40 digits), "formula" (Eq. (15) at constant current),
-            "refuse" (must be refused) or "finite" (too long for either: right answer
-            unknown, must be finite, and the same at another tolerance).
+            "refuse" (has no answer and must be refused), "limit" (has one, which the
+            solver refuses to count up to) or "finite" (too long for either: right
+            answer unknown, must be finite, and the same at another tolerance).
         statistics: keep no spikes, only count.
     """
 
@@ -121,7 +122,7 @@ def _saturated() -> Iterator[Callable[[], Extreme]]:
     yield partial(_case, "saturated, 1e6 s of silence", T1, still, 1e6, "finite")
     firing = Circuit(saturation=True, V_GS=1.6)
     yield partial(
-        _case, "saturated, 1e6 s of firing", firing, still, 1e6, "refuse", True
+        _case, "saturated, 1e6 s of firing", firing, still, 1e6, "limit", True
     )
 
 
@@ -137,9 +138,7 @@ def grazing(gap: float) -> Extreme:
         k = int(np.argmax(V))
         low, high = times[max(k - 1, 0)], times[min(k + 1, 400)]
     top = float(V[k])
-    return _case(
-        f"grazing {gap:+g}", Circuit(V_th=top * (1 - gap)), wave, 1.0, "finite"
-    )
+    return _case(f"grazing {gap:+g}", Circuit(V_th=top * (1 - gap)), wave, 1.0)
 
 
 def near_double() -> Extreme:

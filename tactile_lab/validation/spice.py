@@ -106,20 +106,29 @@ def ngspice(problem: Problem, reltol: float, cap: float) -> tuple[FloatArray, fl
             lines = [x for x in done.stderr.splitlines() if "rror" in x] or [""]
             raise SolverError(f"ngspice wrote no result: {lines[0]}")
         table = np.loadtxt(out, ndmin=2)
-    return _spikes(table[:, 0], table[:, 1], problem), float(table[-1, 2])
+    c = problem.circuit
+    spikes = resets(table[:, 0], table[:, 1], c.fire_voltage, c.reset_voltage, c.tau_L)
+    return spikes, float(table[-1, 2])
 
 
-def _spikes(t: FloatArray, V: FloatArray, problem: Problem) -> FloatArray:
-    """Every fall through the middle ends a charge; its peak is where V_fire was met."""
-    fire, reset = problem.circuit.fire_voltage, problem.circuit.reset_voltage
-    middle = 0.5 * (fire + reset)
+def resets(
+    t: FloatArray, V: FloatArray, fire: float, reset: float, tau: float
+) -> FloatArray:
+    """When the firing stage emptied C2, read from V_C2: where it met `fire`, s.
+
+    A reset is a fall from a peak through the lowest tenth of the swing in less than
+    half the time in which C2 could leak that far through R_L, `tau` s. How high the
+    peak was plays no part: a charge that peaks just below `fire` leaks away slowly.
+    """
+    low = reset + 0.1 * (fire - reset)
     found = []
-    for k in np.flatnonzero((V[:-1] >= middle) & (V[1:] < middle)):
+    for k in np.flatnonzero((V[:-1] >= low) & (V[1:] < low)):
         peak = k
         while peak > 0 and V[peak - 1] >= V[peak]:
             peak -= 1
-        if V[peak] < fire - 0.02 * (fire - reset):
-            continue  # it only leaked away
+        leaks = tau * np.log(V[peak] / low) if low > 0 else np.inf
+        if t[k + 1] - t[peak] > 0.5 * leaks:
+            continue
         while peak > 0 and V[peak - 1] >= fire:
             peak -= 1
         if peak > 0 and V[peak] > fire > V[peak - 1]:

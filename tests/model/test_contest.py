@@ -5,7 +5,7 @@ import pytest
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.validation import general
+from tactile_lab.validation import general, spice
 from tactile_lab.validation.accuracy import fastest, table, write_csv
 from tactile_lab.validation.contest import Method, Truth, judge, ours
 from tactile_lab.validation.problem import OutOfTimeError, Problem
@@ -34,6 +34,19 @@ def test_fixed_steps_get_better_with_shorter_ones(exact):
         spikes, _ = general.fixed_step(PROBLEM, 1, dt, 30.0)
         errors.append(np.max(np.abs(spikes - exact.spike_times)))
     assert errors[1] < 0.3 * errors[0]
+
+
+def test_a_charge_that_leaks_away_below_the_threshold_is_no_spike():
+    sensor = Circuit()
+    fire, tau = sensor.fire_voltage, sensor.tau_L
+    rise = np.linspace(0.0, 0.1, 201)
+    fall = np.linspace(0.1, 0.4, 61)[1:]
+    t = np.concatenate([rise, fall, rise + 0.4, [0.5 + 1e-9, 0.6]])
+    leaking = (fire - 2.4e-3) * np.exp(-(fall - 0.1) / tau)
+    fired = 10.001 * fire * rise
+    V = np.concatenate([(fire - 2.4e-3) * rise / 0.1, leaking, fired, [1e-4, 0.0]])
+    found = spice.resets(t, V, fire, sensor.reset_voltage, tau)
+    assert found == pytest.approx([0.5 - 0.1 * 1e-4], abs=1e-6)
 
 
 def test_verdicts(exact, tmp_path):

@@ -101,6 +101,16 @@ def test_a_spike_that_only_just_happens_or_not_is_decided(gap):
     assert found.spike_times.size == (gap > 0)
 
 
+@pytest.mark.parametrize("gap", [1e-9, 1e-12, -1e-12])
+def test_the_reference_finds_a_spike_that_only_touches_the_threshold(gap):
+    case = _grazing(gap)
+    exact = reference(case["circuit"], case["force"], case["until"])
+    assert len(exact.spike_times) == (gap > 0)
+    found = simulate(**case)
+    for ours, true in zip(found.spike_times, exact.spike_times, strict=True):
+        assert abs(ours - float(true)) <= found.error.spike_time
+
+
 def _grazing(gap):
     case = grazing(gap).problem
     return {"circuit": case.circuit, "force": case.force, "until": case.until}
