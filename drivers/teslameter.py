@@ -12,6 +12,9 @@ from tactile_lab.clock import Clock
 from tactile_lab.errors import BadReplyError, LimitError
 from tactile_lab.instruments.serial_dialect import MULTIPLIERS, MeterDialect
 
+MOST_READINGS = 4
+"""Readings to take until two in a row have one multiplier."""
+
 
 class Teslameter:
     """A field meter behind a serial port.
@@ -42,6 +45,7 @@ class Teslameter:
         )
         self._clock = clock
         self._talk = Conversation(link, dialect)
+        self._last_factor = 1.0
 
     @property
     def identity(self) -> str:
@@ -87,16 +91,16 @@ class Teslameter:
             LimitError: the field exceeds the meter's range.
             BadReplyError: the answer is no number, twice.
         """
-        answer = self._talk.query(self.dialect.field)
-        if re.search(self.dialect.overload, answer):
-            raise LimitError(
-                f"The field exceeds the teslameter's range (it answers {answer!r}). "
-                "Choose a larger range or autorange."
-            )
-        value = self._talk.parsed(answer)
-        if value is None:
-            value = self._talk.number(self.dialect.field)
-        return Reading(self._clock.now(), value * self._factor())
+        for _ in range(MOST_READINGS):
+            value, factor = self._value(), self._factor()
+            # the range may have changed between the two answers
+            if factor == self._last_factor:
+                return Reading(self._clock.now(), value * factor * self.dialect.scale)
+            self._last_factor = factor
+        raise BadReplyError(
+            "The teslameter changes its multiplier from reading to reading. Fix its "
+            "range at its front panel, or keep the field steady."
+        )
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
@@ -138,10 +142,33 @@ class Teslameter:
                 "unit. Unlock its front panel, check cable and baud rate, try again."
             )
 
+    def _value(self) -> float:
+        """What the meter shows, in its unit.
+
+        Raises:
+            LimitError: the field exceeds its range.
+        """
+        answer = self._talk.query(self.dialect.field)
+        if re.search(self.dialect.overload, answer):
+            raise LimitError(
+                f"The field exceeds the teslameter's range (it answers {answer!r}). "
+                "Choose a larger range or autorange."
+            )
+        value = self._talk.parsed(answer)
+        return self._talk.number(self.dialect.field) if value is None else value
+
     def _factor(self) -> float:
-        if self.dialect.multiplier is None:
-            return self.dialect.scale
-        letter = self._talk.query(self.dialect.multiplier).strip().lower()
+        """Factor by the prefix letter of the row's multiplier query, or 1.
+
+        An empty line is an answer to it. One that was left on the wire is found out:
+        the next is another.
+        """
+        query = self.dialect.multiplier
+        if query is None:
+            return 1.0
+        letter = self._talk.query(query, blank=True).lower()
+        if not letter:
+            letter = self._talk.query(query, blank=True).lower()
         if letter not in MULTIPLIERS:
             raise BadReplyError(f"The teslameter's multiplier {letter!r} is unknown.")
-        return self.dialect.scale * MULTIPLIERS[letter]
+        return MULTIPLIERS[letter]

@@ -56,7 +56,7 @@ class SimTeslameter:
         self._clock = clock
         self._noise = noise
         self._random = np.random.default_rng(seed)
-        self.reply_end, standard, commands = MODELS[model]
+        self.reply_end, self.gap, standard, commands = MODELS[model]
         self.unit = 1
         self.range = 4
         self.autorange = False
@@ -156,7 +156,7 @@ def _lakeshore_421(meter: SimTeslameter) -> dict[str, Handler]:
         ),
         "ACDC?": lambda _: meter.settings.get("acdc", "1"),
         "FIELD?": field,
-        "FIELDM?": lambda _: prefix()[0] or " ",
+        "FIELDM?": lambda _: prefix()[0],
     }
 
 
@@ -189,14 +189,17 @@ def _lakeshore_f41(meter: SimTeslameter) -> dict[str, Handler]:
     }
 
 
-MODELS: dict[str, tuple[bytes, bool, Callable[[SimTeslameter], dict[str, Handler]]]] = {
-    "lakeshore-425": (b"\r\n", False, lambda meter: _family(meter, "425", 3)),
-    "lakeshore-455": (b"\r\n", False, lambda meter: _family(meter, "455", 5)),
-    "lakeshore-475": (b"\r\n", False, lambda meter: _family(meter, "475", 5)),
-    "lakeshore-421": (b"\r\n", False, _lakeshore_421),
-    "lakeshore-f41": (b"\n", True, _lakeshore_f41),
+MODELS: dict[
+    str, tuple[bytes, float, bool, Callable[[SimTeslameter], dict[str, Handler]]]
+] = {
+    "lakeshore-425": (b"\r\n", 0.03, False, lambda meter: _family(meter, "425", 3)),
+    "lakeshore-455": (b"\r\n", 0.03, False, lambda meter: _family(meter, "455", 5)),
+    "lakeshore-475": (b"\r\n", 0.03, False, lambda meter: _family(meter, "475", 5)),
+    "lakeshore-421": (b"\r\n", 0.05, False, _lakeshore_421),
+    "lakeshore-f41": (b"\n", 0.0, True, _lakeshore_f41),
 }
-"""Reply terminator, SCPI error queue, and commands of each model, by dialect row."""
+"""Reply terminator, rest it wants before a line (s), SCPI error queue, and commands of
+each model, by dialect row."""
 
 
 class RowMeter:
@@ -214,6 +217,7 @@ class RowMeter:
     def __init__(self, plant: DrivenCoil, row: MeterDialect, clock: Clock) -> None:
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")
+        self.gap = row.serial.min_gap
         per_tesla = 1 / row.scale
 
         def field() -> str:

@@ -55,14 +55,19 @@ class Conversation(Generic[D]):
                 "or port in the bench file."
             )
 
-    def query(self, line: str) -> str:
-        """The answer to `line`, asked again once if it was lost or garbled."""
+    def query(self, line: str, *, blank: bool = False) -> str:
+        """The answer to `line`, asked again once if it was lost or garbled.
+
+        Args:
+            line: without terminator.
+            blank: an empty line is an answer.
+        """
         try:
-            return self.link.query(line)
+            return self.link.query(line, blank=blank)
         except (NoReplyError, BadReplyError):
             self.link.resynchronise()
             self.clear_errors()
-            return self.link.query(line)
+            return self.link.query(line, blank=blank)
 
     def number(self, line: str, pattern: str | None = None) -> float:
         """The numeric answer to `line`: group 1 of `pattern`, or of the row's.

@@ -26,6 +26,9 @@ from tactile_lab.instruments.serial_dialect import SerialSettings
 QUIET = 0.05
 """Silence that ends a drain, s."""
 
+GAP_MARGIN = 0.005
+"""How much later than the one after it a line may leave its port, s."""
+
 LONGEST_DRAIN = 1.0
 """Longest time a far end may keep talking while the line is drained, s."""
 
@@ -95,6 +98,7 @@ class SerialLink:
         try:
             with self._mapped():
                 self._serial.reset_input_buffer()
+            self._rest_from(self._clock.now())  # whoever spoke to it before
             self._send_preamble()
             answer = self._exchange(self._identify)
         except BaseException:
@@ -124,8 +128,12 @@ class SerialLink:
         self._settle()
         self._send(line)
 
-    def query(self, line: str) -> str:
+    def query(self, line: str, *, blank: bool = False) -> str:
         """Send `line` and return its answer without terminator and flow control.
+
+        Args:
+            line: without terminator.
+            blank: an empty line is an answer, not one of those passed over.
 
         Raises:
             LinkLostError: unplugged.
@@ -133,7 +141,7 @@ class SerialLink:
             BadReplyError: bytes that are no text.
         """
         self._settle()
-        return self._exchange(line)
+        return self._exchange(line, blank)
 
     def record(self, path: Path) -> None:
         """Write every byte from now on to a transcript at `path`, until closed.
@@ -226,14 +234,14 @@ class SerialLink:
         if self._doubtful:
             self.resynchronise()
 
-    def _exchange(self, line: str) -> str:
+    def _exchange(self, line: str, blank: bool = False) -> str:
         self._doubtful = True
         self._send(line)
         if self.wire.echo:
             repeated = self._receive(line)
             if repeated != line:
                 raise self._bad(line, repeated.encode())
-        answer = self._receive(line)
+        answer = self._receive(line, blank)
         if answer == line:
             raise BadReplyError(
                 f"The {self._what} at {self.port} echoes what it is sent. Switch its "
@@ -259,19 +267,30 @@ class SerialLink:
         self._beat()
         self._tell(">", data)
         self._half_sent = True
+        begun = self._clock.now()
         with self._mapped() as port:
             port.write(data)
         self._half_sent = False
-        self._free_at = self._clock.now() + self.wire.min_gap
+        # a port takes all characters at once and sends them one by one
+        sent = begun + len(data) * self.wire.character_time
+        self._rest_from(max(sent, self._clock.now()))
 
-    def _receive(self, asked: str) -> str:
-        """One line; blank ones, which flow control leaves behind, are passed over."""
+    def _rest_from(self, time: float) -> None:
+        """Send nothing for a while after clock time `time` s, if it wants that."""
+        if self.wire.min_gap:
+            self._free_at = time + self.wire.min_gap + GAP_MARGIN
+
+    def _receive(self, asked: str, blank: bool = False) -> str:
+        """One line; blank ones, which flow control leaves behind, are passed over.
+
+        With `blank` they are not.
+        """
         end = self.wire.reply_end.encode("ascii")
         while True:
             with self._mapped() as port:
                 line = port.read_until(end)
             self._beat()
-            self._free_at = self._clock.now() + self.wire.min_gap
+            self._rest_from(self._clock.now())
             if line:
                 self._tell("<", line)
             if not line.endswith(end):
@@ -282,7 +301,7 @@ class SerialLink:
                     "and terminator."
                 )
             text = line.translate(None, self.wire.strip.encode("ascii")).rstrip(b"\r\n")
-            if not text:
+            if not text and not blank:
                 continue
             if not all(0x20 <= byte < 0x7F for byte in text):
                 raise self._bad(asked, line)

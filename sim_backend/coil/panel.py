@@ -53,6 +53,8 @@ class CoilPanel:
         self.remote = False
         self.local = False
         """A person took it to its front panel: the wire may not set it."""
+        self.gap = 0.0
+        """Rest it wants before a line, s."""
         self.errors: deque[tuple[int, str]] = deque()
         self.list = ListPlayer(clock, self.drive)
         if output_on:

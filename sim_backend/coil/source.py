@@ -89,6 +89,7 @@ class RowCoil(CoilPanel):
         self._row = row
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")
+        self.gap = row.serial.min_gap
         self._limit, self._set = reader(row.limit), reader(row.set)
         self._told: deque[str] = deque()
         self._talk = RowParser(row, self._queries(), self._act, self._told)

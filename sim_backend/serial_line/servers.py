@@ -28,11 +28,14 @@ class SerialServer(ABC):
 
     Args:
         far_end: the instrument, on a real clock.
-        paced: let bytes take the time the baud rate gives them.
+        paced: let bytes take the time the baud rate gives them, and the instrument
+            want its rest between lines.
     """
 
     def __init__(self, far_end: FarEnd, *, paced: bool = False) -> None:
         self.far_end = far_end
+        if not paced:
+            far_end.gap = 0.0
         self._each = far_end.wire.character_time if paced else 0.0
         self._due: list[tuple[float, int, bytes]] = []
         self._order = 0
@@ -69,6 +72,7 @@ class SerialServer(ABC):
                 self._send(heapq.heappop(self._due)[2])
 
     def _take(self, data: bytes) -> None:
+        began = self.far_end.clock.now()
         if self._each:
             time.sleep(len(data) * self._each)
         struck = self.far_end.faults.strike(
@@ -77,7 +81,7 @@ class SerialServer(ABC):
         for fault in struck:
             self._break(fault)
             return
-        for answer in self.far_end.take(data):
+        for answer in self.far_end.take(data, began):
             self._order += 1
             due = time.monotonic() + answer.delay + len(answer.data) * self._each
             heapq.heappush(self._due, (due, self._order, answer.data))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import itertools
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -43,6 +44,11 @@ class LineInstrument(Protocol):
     @property
     def clearing(self) -> bytes:
         """Characters that clear what it has received of a line."""
+        ...
+
+    @property
+    def gap(self) -> float:
+        """Rest it wants before a line, s; what begins sooner is not heard."""
         ...
 
     def line(self, line: bytes) -> bytes | None:
@@ -84,7 +90,9 @@ class FarEnd:
         self.held = False
         self.faults = FaultSchedule()
         self.unplugged: Unplugged | None = None
+        self.gap = instrument.gap
         self._partial = bytearray()
+        self._hears_from = -math.inf
 
     @property
     def url(self) -> Address:
@@ -93,10 +101,18 @@ class FarEnd:
         address.far_end = self
         return address
 
-    def take(self, data: bytes) -> list[DelayedBytes]:
-        """Any bytes; the answers of the lines they complete."""
+    def take(self, data: bytes, began: float | None = None) -> list[DelayedBytes]:
+        """Any bytes; the answers of the lines they complete.
+
+        Args:
+            data: what came.
+            began: clock time at which it began to come, s; now unless given.
+        """
         answers = []
+        began = self.clock.now() if began is None else began
         for byte in data:
+            if not self._partial and began < self._hears_from:
+                continue
             if byte in self.instrument.clearing:
                 self._partial.clear()
             elif byte not in b"\r\n":
@@ -105,6 +121,9 @@ class FarEnd:
                 line = bytes(self._partial)
                 self._partial.clear()
                 answer = self._answer(line)
+                if self.gap:
+                    said = answer.delay + len(answer.data) * self.wire.character_time
+                    self._hears_from = self.clock.now() + said + self.gap
                 if answer.data:
                     answers.append(answer)
         return answers
@@ -197,8 +216,9 @@ class SimPort(serial.SerialBase):
             if far_end.unplugged is not None:
                 far_end.unplugged.write()
                 continue
-            clock.sleep_until(clock.now() + len(group) * each)
-            for answer in far_end.take(group) if heard else ():
+            began = clock.now()
+            clock.sleep_until(began + len(group) * each)
+            for answer in far_end.take(group, began) if heard else ():
                 start = max(clock.now() + answer.delay, self._line_free)
                 for i, sent in enumerate(answer.data):
                     self._arriving.append((start + (i + 1) * each, sent))

@@ -55,7 +55,8 @@ class SerialSettings(Strict):
         xonxoff, rtscts, dsrdtr: flow control.
         dtr: level of DTR when opened; None leaves it to the system.
         send_end, reply_end: line terminators.
-        min_gap: rest between the end of an answer and the next line, s.
+        min_gap: rest between the last character of a line or an answer and the first
+            of the next line, s.
         latency: time the instrument takes to act on a line, s; typical, for plans.
         timeout: longest wait for an answer, s.
         max_line: longest line in characters, terminator included.

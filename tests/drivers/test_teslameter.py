@@ -5,7 +5,7 @@ from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import MODELS, SimTeslameter
 from tactile_lab.clock import SimulatedClock
-from tactile_lab.errors import BadReplyError, LimitError
+from tactile_lab.errors import BadReplyError, LimitError, NoReplyError
 from tactile_lab.instruments.dialects import dialect_ids, load_dialect
 
 METERS = dialect_ids("field meter")
@@ -28,12 +28,35 @@ def meter(request, resistor):
         meter.close()
 
 
-@pytest.mark.parametrize("amperes", [0.0, 0.5, -0.5, 2.0, 20.0])
+@pytest.mark.parametrize("amperes", [0.0, 0.5, -0.5, 2.0, 20.0, 50.0])
 def test_reads_tesla(meter, amperes):
     _, plant, _, it = meter
     plant.set_current(0, amperes)
     assert it.read().value == pytest.approx(11e-3 * amperes, rel=1e-3, abs=1e-6)
     assert it.settings()["identity"].startswith(("LSCI", "Lake"))
+
+
+def test_a_change_of_range_between_field_and_multiplier_is_noticed(meter):
+    """A 421 says value and prefix in two answers: 40 mT is not 40 T."""
+    _, plant, _, it = meter
+    for amperes in (0.5, 50.0, 0.5):
+        plant.set_current(0, amperes)
+        assert it.read().value == pytest.approx(11e-3 * amperes, rel=1e-3)
+
+
+def test_what_comes_before_its_time_is_not_heard(meter):
+    """A row that forgets the rest a Lake Shore wants cannot open it."""
+    clock, _, end, it = meter
+    it.close()
+    hasty = it.dialect.serial.model_copy(update={"min_gap": 0.0})
+    row = it.dialect.model_copy(update={"serial": hasty})
+    other = Teslameter(row, end.url, clock)
+    if it.dialect.serial.min_gap == 0:
+        other.open()
+    else:
+        with pytest.raises(NoReplyError):
+            other.open()
+    other.close()
 
 
 def test_overload_is_told(meter):

@@ -37,6 +37,7 @@ class Replay:
 
     reply_end = b""
     clearing = b""
+    gap = 0.0
 
     def __init__(self, path: Path) -> None:
         self._path = path
