@@ -116,6 +116,7 @@ class Snapshot:
         elapsed: run time reached, s.
         expected: run time expected, s; None if unknown.
         manual: the coil is driven by hand.
+        known: the instruments answered lately; else nobody knows whether they do.
         fault: unacknowledged fault.
     """
 
@@ -128,6 +129,7 @@ class Snapshot:
     elapsed: float = 0.0
     expected: float | None = None
     manual: bool = False
+    known: bool = True
     fault: FaultNotice | None = None
 
 
@@ -218,6 +220,8 @@ def clock_text(snapshot: Snapshot) -> tuple[str, str]:
         WindowState.ABORTING: "STOPPING",
         WindowState.FAULT: "FAULT",
     }[snapshot.state]
+    if snapshot.manual:
+        return "BY HAND", "the coil is in use"
     if snapshot.state is WindowState.DISCONNECTED:
         return word, "connect to start"
     if snapshot.state is WindowState.CONNECTING:
@@ -229,8 +233,8 @@ def clock_text(snapshot: Snapshot) -> tuple[str, str]:
         return word, f"{elapsed} / {minutes(snapshot.expected)}"
     if snapshot.state is WindowState.FAULT:
         return word, f"stopped at {elapsed}"
-    if snapshot.manual:
-        return word, "coil by hand"
+    if not snapshot.known:
+        return word, "nobody answered lately"
     return word, f"last run {elapsed}" if snapshot.elapsed else "coil off"
 
 

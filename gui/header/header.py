@@ -50,6 +50,7 @@ class Header(QFrame):
         self._clock = label("", "hsub")
         self._chips: list[Chip] = []
         self._shown: WindowState | None = None
+        self._coloured = ""
         self._chip_row = row(spacing=6)
         self._buttons = [
             IconButton(theme, name, words, role="hflat", on_header=True)
@@ -126,8 +127,9 @@ class Header(QFrame):
         if wider:
             self._fit()
         word, clock = clock_text(snapshot)
-        colour = _CLOCK_COLOURS[snapshot.state]
-        if self._state.text() != word:
+        colour = _colour(snapshot)
+        if (word, colour) != (self._state.text(), self._coloured):
+            self._coloured = colour
             self._state.setText(word)
             self._state.setStyleSheet(
                 f"color: {colour}; font-weight: 700; font-size: 15px;"
@@ -149,3 +151,12 @@ class Header(QFrame):
         clock.setContentsMargins(0, 14, 0, 12)
         whole = bar(self, (16, 0, 14, 0), 11, logo, words, 8, self._chip_row, STRETCH)
         filled(whole, (*self._buttons, 6, clock, self.stop))
+
+
+def _colour(snapshot: Snapshot) -> str:
+    """Of the state's word: green only where the instruments answered lately."""
+    if snapshot.manual:
+        return look.LAMP_BLUE
+    if snapshot.state is WindowState.READY and not snapshot.known:
+        return look.LAMP_AMBER
+    return _CLOCK_COLOURS[snapshot.state]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
@@ -10,7 +12,7 @@ from gui.session.log import Log, Severity
 from gui.session.status import Status
 from gui.state import WindowState
 from tactile_lab.engine.engine import Reply
-from tactile_lab.engine.jobs import Checked, check_bench, read_field
+from tactile_lab.engine.jobs import Checked, InstrumentAnswer, check_bench, read_field
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request, bench_request
 from tactile_lab.errors import TactileLabError
@@ -21,6 +23,12 @@ from tactile_lab.scene.load import load_bench
 
 if TYPE_CHECKING:
     from tactile_lab.engine.manual import FieldReading
+
+WATCH = 60.0
+"""Age of an answer, s, at which it is asked for anew while nothing uses the bench."""
+
+STALE = 2 * WATCH
+"""Seconds after which an answer no longer says that an instrument is there."""
 
 ROLES = {"coil": "Coil source", "scope": "Oscilloscope", "meter": "Teslameter"}
 
@@ -33,20 +41,33 @@ class ConnectedBench(QObject):
         spec: what the file says, with what was changed.
         found: who answered; None before, and where somebody did not, or the coil
             was not verified off.
+        answers: of each instrument that was asked last.
         overrides: ``bench.key=value`` texts that change the file.
         request: a run that needs every instrument.
         field: as read last, T.
         reading: the field is being read.
+
+    Args:
+        link: to the engine.
+        status: of the window.
+        log: of the window.
+        free: whether nothing uses the bench.
     """
 
     ready = Signal()
 
-    def __init__(self, link: Link, status: Status, log: Log) -> None:
+    def __init__(
+        self, link: Link, status: Status, log: Log, free: Callable[[], bool]
+    ) -> None:
         super().__init__()
-        self._link, self._status, self._log = link, status, log
+        self._link, self._status, self._log, self._free = link, status, log, free
+        self._answered: float | None = None
+        self._looking = False
+        status.faulted.connect(self._doubt)
         self.choice: str | None = None
         self.spec: BenchSpec | None = None
         self.found: Checked | None = None
+        self.answers: tuple[InstrumentAnswer, ...] = ()
         self.overrides: tuple[str, ...] = ()
         self.request: Request | None = None
         self.field: float | None = None
@@ -71,8 +92,32 @@ class ConnectedBench(QObject):
     def check(self) -> None:
         """Ask the instruments who they are, and have the coil verified off."""
         if self.request is not None:
+            self._looking = False
             self._status.enter(WindowState.CONNECTING)
             self._link.ask(self._checked, check_bench, self.request)
+
+    def look(self) -> None:
+        """Ask who is still there, between runs; what is gone becomes a fault.
+
+        A simulated bench is there as long as the program is.
+        """
+        real = self.spec is not None and not self.spec.simulated
+        if real and self.request is not None and self._free() and not self._looking:
+            self._looking = True
+            self._link.ask(self._looked, check_bench, self.request)
+
+    @property
+    def age(self) -> float | None:
+        """Seconds since all instruments answered; None: not since the last fault."""
+        if self._answered is None:
+            return None
+        simulated = self.spec is not None and self.spec.simulated
+        return 0.0 if simulated else time.monotonic() - self._answered
+
+    @property
+    def known(self) -> bool:
+        """Whether the last answer still says that the instruments are there."""
+        return self.age is not None and self.age < STALE
 
     def let_go(self) -> None:
         """No bench any more."""
@@ -125,6 +170,35 @@ class ConnectedBench(QObject):
             self._log.add(Severity.INFO, "meter", f"Field {mean} ± {spread}")
         self._status.changed.emit()
 
+    def confirm(self) -> None:
+        """A run has used the instruments to its end: they are there."""
+        self._answered = time.monotonic()
+
+    def watch(self) -> None:
+        """Look at who is still there where the last answer has become old."""
+        if self.age is not None and self.age > WATCH:
+            self.look()
+
+    def _doubt(self) -> None:
+        """What answered before a fault need not be there any more."""
+        self._answered = None
+
+    def _looked(self, reply: Reply[Checked]) -> None:
+        """Whoever uses the bench by now finds out by itself."""
+        wanted, self._looking = self._looking, False
+        if not wanted or not self._free():
+            return
+        if reply.value is None or not reply.value.sound:
+            self._checked(reply)
+            return
+        self._take(reply.value)
+        self._status.changed.emit()
+
+    def _take(self, found: Checked) -> None:
+        self.answers, self._answered = found.found, time.monotonic()
+        self.found = found if found.sound else None
+        self._status.coil.left(found.off)
+
     def _checked(self, reply: Reply[Checked]) -> None:
         status, found = self._status, reply.value
         if reply.lost:
@@ -139,18 +213,16 @@ class ConnectedBench(QObject):
             status.set_fault(*words)
             return
         broken = [one for one in found.found if one.problem]
-        unknown = found.off is not None and not found.off.verified
-        self.found = None if broken or unknown else found
         coil = self.spec.coil if self.spec is not None else None
         has_coil = coil is not None and any(one.role == "coil" for one in found.found)
         status.coil.use(coil.limits if has_coil and coil is not None else None)
-        status.coil.left(found.off)
+        self._take(found)
         for one in found.found:
             if one.problem:
                 self._log.add(Severity.ERROR, one.role, one.problem)
             else:
                 self._log.add(Severity.GOOD, one.role, one.identity)
-        if found.off is not None and unknown:
+        if found.off is not None and not found.off.verified:
             status.set_fault("The coil's state is unknown.", found.off.text)
         elif broken:
             names = " and ".join(ROLES[one.role].lower() for one in broken)
@@ -159,3 +231,6 @@ class ConnectedBench(QObject):
         else:
             status.enter(WindowState.READY)
             self.ready.emit()
+            return
+        self._take(found)  # a fault puts in doubt what answered before it
+        status.changed.emit()

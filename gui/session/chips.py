@@ -51,9 +51,7 @@ class Chips:
 
     def _roles(self, plan: Expectation | None) -> list[str]:
         if plan is None:
-            checked = self._bench.found
-            found = checked.found if checked is not None else ()
-            return [one.role for one in found] or ["coil", "scope"]
+            return [one.role for one in self._bench.answers] or ["coil", "scope"]
         needs = plan.needs
         wanted = {
             "coil": needs.coil,
@@ -66,29 +64,34 @@ class Chips:
         """Lamp and words of an instrument that is not in use now."""
         if self._status.state is WindowState.CONNECTING:
             return Lamp.WAITING, "asking …"
-        if self._bench.found is None:
+        here = [one for one in self._bench.answers if one.role == role]
+        if self._status.state is WindowState.DISCONNECTED or not here:
             return Lamp.ABSENT, "no device"
-        for one in self._bench.found.found:
-            if one.role == role:
-                if one.problem:
-                    return Lamp.BAD, "no answer"
-                return Lamp.GOOD, one.identity
-        return Lamp.GOOD, "opens when a run starts"
+        if self._bench.age is None:
+            return Lamp.WAITING, "not asked since the fault"
+        if here[0].problem:
+            return Lamp.BAD, "no answer"
+        if not self._bench.known:
+            return Lamp.WAITING, f"answered {self._bench.age / 60:.0f} min ago"
+        return Lamp.GOOD, here[0].identity
 
     def _coil(self, coil: CoilView | None) -> InstrumentView:
         state, name = self._status.state, ROLES["coil"]
         what = truth(state, coil)
         if coil is None or what is CoilKnowledge.NONE:
             return InstrumentView(name, *self._found("coil"))
+        idle, words = self._found("coil")
         lamp = {
             CoilKnowledge.UNKNOWN: Lamp.BAD,
             CoilKnowledge.LIVE: Lamp.ACTIVE,
             CoilKnowledge.FALLING: Lamp.WAITING,
-            CoilKnowledge.OFF: Lamp.BAD if state is WindowState.FAULT else Lamp.GOOD,
+            CoilKnowledge.OFF: Lamp.BAD if state is WindowState.FAULT else idle,
         }[what]
         value = "—" if coil.current is None else milliamperes(coil.current)
         if what is CoilKnowledge.UNKNOWN:
             return InstrumentView(name, lamp, "state unknown", "?")
+        if what is CoilKnowledge.OFF and not self._bench.known:
+            return InstrumentView(name, lamp, words, value)
         return InstrumentView(name, lamp, limit_text(coil), value)
 
     def _scope(self, plan: Expectation | None) -> InstrumentView:

@@ -56,9 +56,7 @@ class CoilWatch:
                 False, off.current, 0.0, verified_off=off.verified, limit=limit
             )
         if not state.live:
-            off = self._off
-            current = None if off is None else off.current
-            return CoilView(False, current, 0.0, verified_off=True, limit=limit)
+            return self.view(None)  # nothing was switched on: as it was left before
         now = time.monotonic()
         if state.measured != self._current:
             self._current, self._since, self._sign = state.measured, now, now

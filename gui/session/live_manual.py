@@ -63,5 +63,7 @@ class LiveManual(LiveTask):
             status.set_fault("The coil's state is unknown.", reason or off.text)
         elif ending.state is RunState.FAULTED:
             status.set_fault("Manual control ended.", reason)
-        self._log.add(Severity.GOOD, "safety", "Manual control off", safety=True)
+        level = Severity.GOOD if off.verified else Severity.ERROR
+        words = f"Manual control off. {off.text}"
+        self._log.add(level, "safety", words, safety=True)
         status.changed.emit()

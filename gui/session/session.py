@@ -64,7 +64,9 @@ class Session(QObject):
         self.link = Link(separate=separate, realtime=realtime, lost=self._engine_lost)
         self.desk = Link(separate=separate, lost=self._desk_lost)
         parts = self.link, self.status, self.log
-        self.bench = ConnectedBench(*parts)
+        self.bench = ConnectedBench(
+            *parts, lambda: self._free and not self.monitor.alive
+        )
         self.plan = FormPlan(self.link)
         self.run = LiveRun(*parts, out, self.bench.note_field)
         self.monitor = LiveMonitor(*parts)
@@ -83,6 +85,7 @@ class Session(QObject):
         self.run.completed.connect(self.queue.next)
         self.plan.arrived.connect(self.status.changed)
         self.run.begun.connect(self._show_live)
+        self.run.ended.connect(self.bench.confirm)
         self.monitor.begun.connect(self._show_live)
         self.monitor.ended.connect(self._start_after_monitor)
 
@@ -244,6 +247,7 @@ class Session(QObject):
             elapsed=self.run.elapsed,
             expected=self.run.expected,
             manual=self.manual.alive,
+            known=self.bench.known,
             fault=self.status.fault,
         )
 
@@ -251,6 +255,7 @@ class Session(QObject):
         """Take all that the engine told; whether samples came too."""
         self.link.poll()
         self.desk.poll()
+        self.bench.watch()
         return self.source is not None and self.source.take_new()
 
     def close(self) -> None:
@@ -265,6 +270,11 @@ class Session(QObject):
         """Whether something may begin to use the bench."""
         ready = self.state is WindowState.READY and not self.manual.alive
         return ready and self._after_monitor is None
+
+    @property
+    def _idle(self) -> bool:
+        """Whether nothing uses the bench."""
+        return self._free and not self.monitor.alive
 
     def _show_live(self, source: LiveSource) -> None:
         self.source = source

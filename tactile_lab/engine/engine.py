@@ -76,12 +76,15 @@ class Engine:
 
     Attributes:
         tasks: by number; those that have ended go when another begins.
+        instruments: held by whoever uses them: a task waits while somebody asks who
+            is there.
     """
 
     def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
         self._pipe, self.realtime = pipe, realtime
         self._sending = threading.Lock()
         self.tasks: dict[int, ServedTask] = {}
+        self.instruments = threading.Lock()
 
     def serve(self) -> None:
         """Do what is asked until the other end has gone; then leave every coil off."""
@@ -105,6 +108,7 @@ class Engine:
             lambda served: act(served, *arguments, **named),
             lambda told: self.tell(number, told),
             realtime=self.realtime,
+            instruments=self.instruments,
         )
 
     def say(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
@@ -133,6 +137,7 @@ class ServedTask:
         make: makes the task, or raises because it is refused.
         tell: tells the other end, from any thread.
         realtime: pace a simulated bench by the wall clock.
+        instruments: held while it uses them.
 
     Attributes:
         task: None until it is made.
@@ -146,8 +151,10 @@ class ServedTask:
         tell: Callable[[TaskEvent], None],
         *,
         realtime: bool,
+        instruments: threading.Lock,
     ) -> None:
         self._make, self._tell, self.realtime = make, tell, realtime
+        self._instruments = instruments
         self.task: Task[Any] | None = None
         self.model: LiveModel | None = None
         self.answers: SimpleQueue[str] = SimpleQueue()
@@ -237,7 +244,8 @@ class ServedTask:
             follow = self.model
             beside.append(start(lambda: self._tell_model(follow, task, over), "model"))
         try:
-            ending: Ending = task.run()
+            with self._instruments:
+                ending: Ending = task.run()
         except BaseException as error:
             off = task.coil_state.off or OffReport(False, None, "not verified")
             what = f"It broke. {type(error).__name__}: {error}"

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.request import Request
-from tactile_lab.errors import RecordingError, TactileLabError
+from tactile_lab.errors import RecordingError, RefusedError, TactileLabError
 
 if TYPE_CHECKING:
     from tactile_lab.bench import Bench, OffReport
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 LONGEST = 300.0
 """Seconds a report may take."""
+
+
+BUSY = 10.0
+"""Seconds that somebody who asks who is there waits for a task to end."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +62,29 @@ class Checked:
     found: tuple[InstrumentAnswer, ...]
     off: OffReport | None
 
+    @property
+    def sound(self) -> bool:
+        """Whether everybody answered and no coil is in doubt."""
+        silent = any(one.problem for one in self.found)
+        return not silent and (self.off is None or self.off.verified)
+
 
 def check_bench(engine: Engine, request: Request) -> Checked:
-    """Ask every instrument of a request's bench who it is; make the coil safe."""
-    return check(_open(request.load(), realtime=engine.realtime))
+    """Ask every instrument of a request's bench who it is; make the coil safe.
+
+    Raises:
+        RefusedError: something uses them, and goes on doing so.
+    """
+    bench = _open(request.load(), realtime=engine.realtime)
+    if not engine.instruments.acquire(timeout=BUSY):
+        raise RefusedError(
+            "The instruments are still in use by what was begun last; wait until it "
+            "has ended, or switch the source off at its front panel."
+        )
+    try:
+        return check(bench)
+    finally:
+        engine.instruments.release()
 
 
 def check(bench: Bench) -> Checked:

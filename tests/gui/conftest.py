@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtWidgets import QApplication
+from served_source import Source
 
 from gui.app import application, begin
 from gui.dialogs.overlay import Overlay
@@ -163,3 +164,13 @@ def opened(
 def lab(opened: Lab) -> Lab:
     opened.ready()
     return opened
+
+
+@pytest.fixture
+def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Source]:
+    if os.name != "posix":
+        pytest.skip("needs a pseudo-terminal")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    made = Source(tmp_path)
+    yield made
+    made.served.close()

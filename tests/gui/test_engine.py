@@ -5,18 +5,16 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from importlib import resources
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
-from benches import SERVED
 from PySide6.QtWidgets import QApplication
+from served_source import Source
 
 from gui.session.session import Session
 from gui.state import CoilKnowledge, WindowState, truth
-from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.commands import begin_manual, begin_run, hold, renew, stop
 from tactile_lab.engine.engine import Engine, Reply
@@ -105,42 +103,6 @@ def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
     session.close()
     assert not session.link.alive
     assert ended(tmp_path / "runs")["status"] == "running", "`recover` mends it"
-
-
-class Source:
-    """A current source at a port of its own: it outlives window and engine."""
-
-    def __init__(self, folder: Path) -> None:
-        self.log = folder / "changes.jsonl"
-        self.served = ServedBench(coil="pty", log=self.log)
-        self.served.start()
-        row = resources.files("tactile_lab.instruments").joinpath(
-            "rows", "coil", "kepco-bop.toml"
-        )
-        (folder / "patient.toml").write_text(
-            row.read_text().replace("[serial]", '[serial]\ntimeout = "2 s"')
-        )
-        self.bench = folder / "bench.toml"
-        self.bench.write_text(SERVED.format(port=self.served.addresses["coil"]))
-        self.request = Request("demo", ('record.signals=["force"]',), str(self.bench))
-
-    @property
-    def output(self) -> bool:
-        """Whether the output is on, from what the source was told."""
-        told = self.log.read_text()
-        whole = told[: told.rfind("\n") + 1]
-        changes = [json.loads(line) for line in whole.splitlines()]
-        return bool([d["value"] for d in changes if d["what"] == "output"][-1])
-
-
-@pytest.fixture
-def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Source]:
-    if os.name != "posix":
-        pytest.skip("needs a pseudo-terminal")
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    made = Source(tmp_path)
-    yield made
-    made.served.close()
 
 
 def wait_for(done: Callable[[], object], poll: Callable[[], object]) -> None:
