@@ -1,10 +1,12 @@
 """Numpy arrays onto a painter: the fast path of every trace.
 
-Pen width is 1 px exactly: wider antialiased polylines cost tens of times more.
+Traces are stroked 1 device pixel wide, on fine screens several times side by side:
+wider antialiased polylines cost tens of times more.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -144,14 +146,36 @@ def polyline(
     starts: NDArray[np.intp] | None = None,
 ) -> None:
     """Draw a line through pixels; a new stroke begins at each index in `starts`."""
-    painter.setPen(line)
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    if starts is None or starts.size <= 1:
-        painter.drawPolyline(polygon(x, y))
+    pieces = [polygon(x, y)]
+    if starts is not None and starts.size > 1:
+        ends = np.append(starts[1:], x.size)
+        each = zip(starts, ends, strict=True)
+        pieces = [polygon(x[first:last], y[first:last]) for first, last in each]
+    fine = painter.deviceTransform().m11()
+    if fine <= 1:
+        painter.setPen(line)
+        for piece in pieces:
+            painter.drawPolyline(piece)
         return
-    ends = np.append(starts[1:], x.size)
-    for first, last in zip(starts, ends, strict=True):
-        painter.drawPolyline(polygon(x[first:last], y[first:last]))
+    painter.setPen(_hairline(line.color().name(), line.style()))
+    # jagged lines fill an area: they may leave no gaps between their columns
+    smooth = painter.testRenderHint(QPainter.RenderHint.Antialiasing)
+    count = round(fine) if smooth else math.ceil(fine)
+    for number in range(count):
+        by = (number - (count - 1) / 2) / fine
+        painter.translate(by, by)
+        for piece in pieces:
+            painter.drawPolyline(piece)
+        painter.translate(-by, -by)
+
+
+@lru_cache(maxsize=256)
+def _hairline(colour: str, style: Qt.PenStyle) -> QPen:
+    """A pen of 1 device pixel, however fine the screen."""
+    made = QPen(QColor(colour), 1, style)
+    made.setCosmetic(True)
+    return made
 
 
 def fill(painter: QPainter, frame: Frame, shown: Trace, colour: QColor) -> None:
