@@ -65,6 +65,8 @@ class MeasuredTrial:
         rest: V_C1 just before the trial, V, or None.
         drift: change of that since the first trial, V, less what the film still
             remembers of the forces; None where it was not judged.
+        complete: it came to its end; what was cut short has the spikes it gave, and
+            the part of its hold that was held.
         clock_uncertainty: bound on how far spike times lie from the coil's, s: how well
             the scope's clock is aligned with the host's; None if not known.
     """
@@ -79,6 +81,7 @@ class MeasuredTrial:
     pause: bool = False
     rest: float | None = None
     drift: float | None = None
+    complete: bool = True
     clock_uncertainty: float | None = None
 
     @property

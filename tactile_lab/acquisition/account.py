@@ -17,7 +17,7 @@ from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
 from tactile_lab.trace import Trace
-from tactile_lab.trial import Outcome
+from tactile_lab.trial import Outcome, Trial
 
 
 class Rate:
@@ -106,6 +106,12 @@ class Account:
         """Something a person should know."""
         self.note("warning", text)
         self.emit(events.Message("warning", text))
+
+    def begun(self, index: int, trial: Trial, start: float) -> None:
+        """A trial begins at `start` s of run time."""
+        if self.journal is not None:
+            self.journal.begun(index, trial, start)
+        self.emit(events.TrialStarted(index, trial, start))
 
     def outcome(self, outcome: Outcome) -> None:
         """A trial ended."""

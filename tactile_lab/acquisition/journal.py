@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.bench import Block, Stream
-from tactile_lab.trial import Outcome
+from tactile_lab.trial import Outcome, Trial
 
 
 class Journal(Protocol):
@@ -52,8 +52,12 @@ class Journal(Protocol):
         """Something happened."""
         ...
 
+    def begun(self, index: int, trial: Trial, start: float) -> None:
+        """Trial number `index` begins at `start` s; it may never end."""
+        return
+
     def outcome(self, outcome: Outcome) -> None:
-        """A trial ended."""
+        """The trial that began last has ended."""
         return
 
     def pause(self, start: float, end: float) -> None:

@@ -74,7 +74,6 @@ class Runner:
         emit = events.until_it_fails(emit, self._note_watcher)
         self._account = Account(bench.clock, journal, emit)
         self._stop = stop
-        self._emit = emit
         self._lease = Lease(bench.clock)
         self.instruments = Instruments.of(bench, stop, self._lease)
         self._pump = Pump(
@@ -287,7 +286,7 @@ class Runner:
         """Begin a trial now: its start in clock time and in run time, s."""
         begin, start = self._clock.now(), self._account.now
         self.intake.forget_spikes_before(start)
-        self._emit(events.TrialStarted(index, trial, start))
+        self._account.begun(index, trial, start)
         return begin, start
 
     def _play_current(self, trial: Trial, begin: float, end: float) -> int:

@@ -98,8 +98,9 @@ def describe(path: Path) -> dict[str, Any]:
                     "start_s": float(row["start"]),
                     "end_s": float(row["end"]),
                     "spikes": int(row["spikes"]),
+                    "complete": whole,
                 }
-                for row in run.trials
+                for row, whole in zip(run.trials, run.completed, strict=True)
             ]
             summary["overrange_blocks"] = int(run.records("overrange").size)
     return summary
@@ -107,7 +108,7 @@ def describe(path: Path) -> dict[str, Any]:
 
 def _rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     """Names and what is shown beside them; rows without a value are left out."""
-    from tactile_lab.quantity import show
+    from tactile_lab.quantity import count, show
     from tactile_lab.scene.tables import ZERO_CELSIUS
 
     for key in ("reason", "started", "protocol", "scene", "bench"):
@@ -131,7 +132,9 @@ def _rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         yield "spikes", str(summary["spikes"])
     for trial in summary["trials"]:
         times = f"{trial['start_s']:.3f} to {trial['end_s']:.3f} s"
-        yield "trial", f"{trial['label']:<12} {times}, {trial['spikes']} spikes"
+        cut = "" if trial["complete"] else ", cut short"
+        told = count(trial["spikes"], "spike")
+        yield "trial", f"{trial['label']:<12} {times}, {told}{cut}"
     if summary["overrange_blocks"]:
         yield "over range", f"in {summary['overrange_blocks']} blocks"
     if summary["loss"]:

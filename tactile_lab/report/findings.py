@@ -70,10 +70,12 @@ def find(run: RunData) -> Findings:
             run, twin = with_twin(run)
         except TactileLabError as reason:
             missing.append(f"No model beside the run: {reason}")
-    conclusion = _conclusion(run)
+    # a trial that was cut short is told and drawn, but nothing is concluded from it
+    whole = replace(run, trials=tuple(t for t in run.trials if t.complete))
+    conclusion = _conclusion(whole)
     answers: tuple[Plot, ...] = ()
     try:
-        answers = tuple(run.protocol.plots(run))
+        answers = tuple(run.protocol.plots(whole))
         for plot in answers:
             if not isinstance(plot, Plot):
                 kind = type(plot).__name__

@@ -39,13 +39,11 @@ def read(folder: Path) -> RunData:
     with Run.load(folder) as run:
         info, scene = run.info, run.scene
         current = run.applied.steps
-        spikes = run.spikes["time"]
         onset = stimulus_onset(scene)
         started = _for_people(str(info.get("started", "")))
         settings: Mapping[str, Mapping[str, str]] = info.get("instruments") or {}
         changed = tuple(info.get("instruments_changed") or ())
         warnings = (*(info.get("warnings") or ()), *changed)
-        segments = run.records("segments")
         return RunData(
             title=str(info.get("title", scene.protocol.title)),
             protocol=scene.protocol,
@@ -57,7 +55,7 @@ def read(folder: Path) -> RunData:
             bench=scene.bench.name,
             duration=run.duration,
             took=info.get("took_s"),
-            trials=tuple(_trial(row, spikes, onset, segments) for row in run.trials),
+            trials=_trials(run, onset),
             force=run.force,
             current=current,
             warming=_warming(run),
@@ -109,8 +107,36 @@ def stimulus_onset(scene: Scene) -> float:
     return float(force.time[changed[0] - 1]) if changed.size else 0.0
 
 
+def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
+    """The trials, and what came after the last in a run that ended before its time."""
+    spikes, segments = run.spikes["time"], run.records("segments")
+    trials = [
+        _trial(row, complete, spikes, onset, segments)
+        for row, complete in zip(run.trials, run.completed.tolist(), strict=True)
+    ]
+    end = max((t.start + t.duration for t in trials), default=0.0)
+    late = spikes[spikes >= end] - end
+    if late.size and run.status != "complete":
+        trials.append(
+            MeasuredTrial(
+                label="not known",
+                level=None,
+                start=end,
+                duration=run.duration - end,
+                spike_times=late,
+                complete=False,
+                clock_uncertainty=_clock_uncertainty(segments, end),
+            )
+        )
+    return tuple(trials)
+
+
 def _trial(
-    row: Any, spikes: NDArray[np.float64], onset: float, segments: Records
+    row: Any,
+    complete: bool,
+    spikes: NDArray[np.float64],
+    onset: float,
+    segments: Records,
 ) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
@@ -123,6 +149,7 @@ def _trial(
         onset=onset,
         hold=None if np.isnan(held[0]) else held,
         pause=bool(row["pause"]),
+        complete=complete,
         rest=_number(row, "rest_V_C1"),
         drift=_number(row, "drift_V_C1"),
         clock_uncertainty=_clock_uncertainty(segments, start),

@@ -77,12 +77,13 @@ def _force(run: Measurement, axis: ClosedTime) -> Panel:
         known = np.where(force == 0, 0.0, run.force_uncertainty.of(force))
         low, high = force - known, force + known
     pushed = [
-        (t.level, t.held)
+        (t.level, t.held, t.label)
         for t in run.trials
         if t.level is not None and t.held is not None and not t.pause
     ]
     tops = [
-        level + math.copysign(run.uncertain(level) or 0.0, level) for level, _ in pushed
+        level + math.copysign(run.uncertain(level) or 0.0, level)
+        for level, _, _ in pushed
     ]
     least, most = min(0.0, float(force.min())), max(0.0, float(force.max()))
     span = (most - least) or 1e-3
@@ -93,11 +94,11 @@ def _force(run: Measurement, axis: ClosedTime) -> Panel:
         series=(
             Series(x=time, y=force, mark="filled", colour="force", low=low, high=high),
             Series(
-                x=[axis.at(sum(held) / 2) for _, held in pushed],
+                x=[axis.at(sum(held) / 2) for _, held, _ in pushed],
                 y=tops,
                 mark="text",
                 colour="force",
-                texts=tuple(show(level, "N", 3) for level, _ in pushed),
+                texts=tuple(label for _, _, label in pushed),
             ),
         ),
         limits=(least - (0.22 if least < 0 else 0) * span, most + 0.26 * span),

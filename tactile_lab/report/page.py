@@ -75,10 +75,11 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
 
 
 def _key_numbers(run: RunData) -> dict[str, str]:
+    cut = any(not trial.complete for trial in run.results)
     cells = {
         "Status": run.status,
         "Duration": show(run.duration, "s"),
-        "Trials": str(len(run.results)),
+        "Trials": f"{len(run.results)}{', the last cut short' if cut else ''}",
         "Spikes": str(sum(t.response.spikes for t in run.results)),
     }
     if run.loss is not None:

@@ -77,6 +77,7 @@ def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
     response, fit = trial.response, trial.adaptation
     return {
         "label": trial.label,
+        "complete": trial.complete,
         "level_N": trial.level,
         "level_uncertainty_N_95": run.uncertain(trial.level),
         "start_s": trial.start,

@@ -10,13 +10,13 @@ NONE = "–"
 
 
 def trials_table(run: Measurement) -> Table:
-    """One row per trial: force, spikes, latency, rates, fall, time constant."""
+    """One row per trial: name unless that is the force, force, spikes, rates, decay."""
     if not run.searched:
         return Table(
             headings=("Trial", "Start", "Length", "V_C1 before"),
             rows=tuple(
                 (
-                    trial.label,
+                    _name(trial),
                     show(trial.start, "s"),
                     show(trial.duration, "s"),
                     _shown(trial.rest, "V", 4),
@@ -33,11 +33,13 @@ def trials_table(run: Measurement) -> Table:
     )
     if run.force_uncertainty is not None:
         note += " Force: ± its 95 % uncertainty by calibration and geometry."
+    named = any(_name(trial) != _force(trial) for trial in run.results)
     headings = (
-        "Force", "Spikes", "First spike", "Peak rate", "Final rate", "Fall in hold",
+        *("Trial",) * named,
+        *("Force", "Spikes", "First spike", "Peak rate", "Final rate", "Fall in hold"),
         "Time constant",
-    )  # fmt: skip
-    rows = tuple(_row(run, trial) for trial in run.results)
+    )
+    rows = tuple((*(_name(trial),) * named, *_row(run, trial)) for trial in run.results)
     return Table(headings=headings, rows=rows, note=note)
 
 
@@ -48,7 +50,7 @@ def fits_table(run: Measurement) -> Table:
         fit = trial.adaptation
         if fit is None:
             continue
-        cells = [trial.label]
+        cells = [_name(trial)]
         for estimate, unit in ((fit.alpha, "Hz"), (fit.beta, "1/s"), (fit.gamma, "Hz")):
             spread = f"{_true(estimate.low)} to {_true(estimate.high)}"
             cells.append(f"{_true(estimate.value)} {unit} ({spread})")
@@ -65,7 +67,7 @@ def fits_table(run: Measurement) -> Table:
 
 
 def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
-    response, force = trial.response, trial.label
+    response, force = trial.response, NONE
     if trial.level is not None:
         force = _with(trial.level, run.uncertain(trial.level), "N", 4)
     latency = NONE
@@ -80,6 +82,16 @@ def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
         NONE if response.fall is None else f"{100 * response.fall:.0f} %",
         _time_constant(trial),
     )
+
+
+def _name(trial: MeasuredTrial) -> str:
+    """What its protocol calls it, and whether it came to its end."""
+    return trial.label if trial.complete else f"{trial.label}, cut short"
+
+
+def _force(trial: MeasuredTrial) -> str | None:
+    """How a trial is called that is told from the others by its force alone."""
+    return None if trial.level is None else show(trial.level, "N")
 
 
 def _time_constant(trial: MeasuredTrial) -> str:

@@ -29,6 +29,8 @@ BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s."""
 BIN_TIME = 5e-4
 """Bins of the shunt that edges are looked for in, s."""
+MOST_BINS = 1000
+"""Bins read at once: of a longer stretch only the mean is asked for."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_spa
 from tactile_lab.store.layout import RECORDS, Layout
 from tactile_lab.store.sample_counter import SampleCounter
 from tactile_lab.store.write_queue import QUEUE_BYTES, WhenFull, Write, WriteQueue
-from tactile_lab.trial import Outcome
+from tactile_lab.trial import Outcome, Trial
 
 CADENCE = 0.5
 """Longest time anything stays in memory only, s of real time."""
@@ -72,6 +72,7 @@ class Recorder:
         self._waiting: dict[str, list[tuple[Any, ...]]] = {name: [] for name in RECORDS}
         self._file: DataFile | None = None
         self._spikes = 0
+        self._trial_open = False
         self._rows: tuple[int, ...] = ()
         self._counter = SampleCounter()
         self._flushed = time.monotonic()
@@ -142,25 +143,17 @@ class Recorder:
         self._do(partial(self.folder.log, kind, text, time=time))
         self._add("events", time, _fixed(kind, 16), _fixed(text, 160))
 
+    def begun(self, index: int, trial: Trial, start: float) -> None:
+        """Store that a trial begins, so that it is known should it be cut short."""
+        nothing = (0, 0), (math.nan, math.nan)
+        self._do(partial(self._trial, _trial_row(index, trial, start, *nothing), False))
+
     def outcome(self, outcome: Outcome) -> None:
-        """Store that a trial ended, and what came of it in numbers."""
-        trial = outcome.trial
-        begin, end = trial.hold or (math.nan, math.nan)
-        self._add(
-            "trials",
-            outcome.index,
-            outcome.start,
-            outcome.start + trial.length,
-            _number(trial.level),
-            begin,
-            end,
-            outcome.spike_times.size,
-            outcome.skipped,
-            trial.pause,
-            _fixed(trial.label, 48),
-            _number(outcome.rest.get("V_C1")),
-            _number(outcome.drift),
-        )
+        """Store that the trial that began ended, and what came of it in numbers."""
+        counts = outcome.spike_times.size, outcome.skipped
+        rests = _number(outcome.rest.get("V_C1")), _number(outcome.drift)
+        row = _trial_row(outcome.index, outcome.trial, outcome.start, counts, rests)
+        self._do(partial(self._trial, row, True))
 
     def pause(self, start: float, end: float) -> None:
         """Store a planned pause, s: nothing was streamed, and that is no gap."""
@@ -222,6 +215,21 @@ class Recorder:
         self._waiting[table].append(row)
         self._tick()
 
+    def _trial(self, row: tuple[Any, ...], complete: bool) -> None:
+        """A trial begins, or the one that began last ends: one row for both."""
+        if self._trial_open:
+            self._replace_last("trials", (*row, complete))
+            self._tick()
+        else:
+            self._row("trials", (*row, complete))
+        self._trial_open = not complete
+
+    def _replace_last(self, table: str, row: tuple[Any, ...]) -> None:
+        if self._waiting[table]:
+            self._waiting[table][-1] = row
+        elif self._file is not None:
+            self._guard(self._file.replace_last, table, row)
+
     def _segment(self, stream: Stream, start: float) -> None:
         if self._file is None:
             self._guard(self._open, stream)
@@ -250,11 +258,7 @@ class Recorder:
 
     def _align(self, offset: float, drift: float, uncertainty: float) -> None:
         self._counter.align(offset, drift, uncertainty)
-        row = self._counter.segment
-        if self._waiting["segments"]:
-            self._waiting["segments"][-1] = row
-        elif self._file is not None:
-            self._guard(self._file.replace_last, "segments", row)
+        self._replace_last("segments", self._counter.segment)
 
     def _add_spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
         samples = self._counter.stored(found["sample"])
@@ -330,6 +334,27 @@ class Recorder:
                 f"{kept} samples per channel are kept; free space on the disk or "
                 "choose another --out, and run `tactile-lab recover` on this run."
             ) from error
+
+
+def _trial_row(
+    index: int,
+    trial: Trial,
+    start: float,
+    counts: tuple[int, int],
+    rests: tuple[float, float],
+) -> tuple[Any, ...]:
+    """A row of the table of trials but its last column.
+
+    Args:
+        index: its number.
+        trial: what was asked.
+        start: s.
+        counts: its spikes, and the coil's set-points that were skipped.
+        rests: V_C1 just before it and its drift, V; NaN where not known.
+    """
+    begin, end = trial.hold or (math.nan, math.nan)
+    place = (index, start, start + trial.length, _number(trial.level), begin, end)
+    return (*place, *counts, trial.pause, _fixed(trial.label, 48), *rests)
 
 
 def _number(value: float | None) -> float:

@@ -15,6 +15,7 @@ from tactile_lab.quantity import count, show
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.applied import (
     BIN_TIME,
+    MOST_BINS,
     AppliedCurrent,
     Shunt,
     applied_current,
@@ -22,7 +23,6 @@ from tactile_lab.store.applied import (
 )
 from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import DATA, is_live, read_info
-from tactile_lab.store.layout import BIN
 from tactile_lab.store.signal import Axis, StoredSignal
 from tactile_lab.waveform import Waveform
 
@@ -176,10 +176,10 @@ class StoredRun:
         ends = [0.0]
         if self.samples:
             ends.append(float(self.axis.time_of(float(self.samples))))
-        for name, column in (("trials", "end"), ("current", "time")):
-            rows = self.records(name)[column]
-            if rows.size:
-                ends.append(float(rows[-1]))
+        trials = self.records("trials")
+        ended = trials[self.completed]["end"]
+        ends += [float(last) for last in ended[-1:]]
+        ends += [float(last) for last in self.records("current")["time"][-1:]]
         return max(ends)
 
     def records(self, name: str) -> Records:
@@ -239,8 +239,31 @@ class StoredRun:
 
     @property
     def trials(self) -> Records:
-        """Trials: index, start, end (s), level (N), hold, spikes, label (bytes)."""
-        return self.records("trials")
+        """Trials: index, start, end (s), level (N), hold, spikes, label (bytes).
+
+        One that was cut short, or goes on, is not `complete` and ends with the run; so
+        does its hold, if it was reached.
+        """
+        rows = self.records("trials")
+        for number in np.flatnonzero(~self.completed):
+            row = rows[number]
+            row["end"] = min(row["end"], self.duration)
+            length, times = row["end"] - row["start"], self.spikes["time"]
+            inside = (times >= row["start"]) & (times < row["end"])
+            row["spikes"] = np.count_nonzero(inside)
+            row["hold_end"] = min(row["hold_end"], length)
+            if not row["hold_start"] < row["hold_end"]:
+                row["hold_start"] = row["hold_end"] = np.nan
+        return rows
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """Which trials came to their end; older runs stored only those."""
+        rows = self.records("trials")
+        if "complete" not in (rows.dtype.names or ()):
+            return np.ones(rows.size, np.bool_)
+        ended: NDArray[np.bool_] = rows["complete"] != 0
+        return ended
 
     @property
     def current(self) -> Records:
@@ -260,12 +283,12 @@ class StoredRun:
         if "coil_current" not in self.signals:
             return None
         signal = self.signal("coil_current")
-        # whole bins of the run's pyramid where they are fine enough
-        together = min(BIN, max(1, round(BIN_TIME / signal.interval)))
 
         def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
             part = signal.between(start, end)
-            cells = max(1, (part.stop - part.start) // together)
+            # as fine as edges are looked for in; a long level is read from the pyramid
+            wanted = round((part.stop - part.start) * signal.interval / BIN_TIME)
+            cells = min(max(1, wanted), MOST_BINS)
             found = signal.trace(part.start, part.stop, cells=cells)
             # the last may be short
             return found.time[:-1] + found.width / 2, found.mean[:-1]

@@ -11,6 +11,9 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
+from tactile_lab.report.findings import find
+from tactile_lab.report.from_run import read
+from tactile_lab.report.table import trials_table
 from tactile_lab.scene.load import load
 from tactile_lab.store.columns import SampleColumn
 from tactile_lab.store.verify import verify
@@ -181,6 +184,26 @@ def test_stopping_keeps_the_data_and_leaves_the_coil_off(run_scene, short):
         assert run.info["status"] == "aborted"
         assert 0.5e6 < len(run.signal("V_K")) < 1.6e6
     assert dict(ran.done.loss) == {"samples": 0, "spikes": 0}
+
+
+def test_a_trial_that_was_cut_short_is_reported_with_all_its_spikes(run_scene, short):
+    def stop_late(execution, event):
+        if isinstance(event, events.Progress) and event.elapsed > 1.0:
+            execution.stop("a person pressed STOP")
+
+    ran = run_scene(*short, watch=stop_late)
+    findings = find(read(ran.folder))
+    (trial,) = findings.run.results
+    assert ran.done.spikes == trial.response.spikes > 3
+    assert not trial.complete
+    assert (trial.label, trial.level) == ("200 mN", 0.2)
+    assert trial.start + trial.duration == findings.run.duration
+    assert trial.hold[1] == pytest.approx(trial.duration)
+    assert trials_table(findings.run).rows[0][0] == "200 mN, cut short"
+    assert "No trial was completed" in findings.missing[0]
+    drawn = next(p for p in findings.plots if p.name == "figure")
+    ticks = [s for p in drawn.panels for s in p.series if s.mark == "ticks"]
+    assert sum(np.size(s.x) for s in ticks) == ran.done.spikes
 
 
 def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(

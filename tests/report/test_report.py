@@ -196,3 +196,17 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
 )
 def test_latency_counts_from_where_the_force_begins(scene, overrides, onset):
     assert stimulus_onset(load(scene, overrides)) == pytest.approx(onset)
+
+
+def test_what_a_protocol_calls_its_trials_stands_in_table_and_figure(demo):
+    trials = [
+        replace(t, label=f"gap {i} s", level=0.15) for i, t in enumerate(demo.trials)
+    ]
+    run = replace(demo, trials=tuple(trials))
+    told = trials_table(run)
+    assert told.headings[:2] == ("Trial", "Force")
+    assert [row[:2] for row in told.rows][1] == ("gap 1 s", "150 mN")
+    force = overview(run).panels[0]
+    texts = [text for s in force.series for text in s.texts]
+    assert texts == [t.label for t in trials]
+    assert trials_table(demo).headings[0] == "Force", "there the force is the name"

@@ -1,8 +1,14 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 
+from tactile_lab.bench import Block
 from tactile_lab.report.driven import shunt_over_source
 from tactile_lab.store.applied import applied_current
+from tactile_lab.store.layout import Layout
+from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.run import Run
 
 STEPS = np.array([0.0, 0.5, 1.0, 0.2])
 CAME = np.array([0.0, 1.0, 2.0, 3.0])
@@ -85,3 +91,24 @@ def test_steps_the_shunt_cannot_show_come_as_early_as_the_others():
     assert found.edges == 6
     assert found.lead == pytest.approx(0.03, abs=1.5e-3)
     assert found.steps[1:, 0] == pytest.approx(came[1:], abs=2e-3)
+
+
+def test_a_long_level_is_read_from_the_pyramid(bench, folder):
+    """A minute at 1 MS/s once took a GB: every sample, and eight bytes to count it."""
+    layout = Layout(signals=("coil_current",), simulated=True)
+    recorder = Recorder(folder, layout, reserve=0)
+    recorder.segment(bench.stream(interval=1e-6, names=("coil_current",)), 0.0)
+    second = np.full((1, 1_000_000), 256, np.int16)
+    for first in range(0, 60_000_000, 1_000_000):
+        recorder.append(
+            Block(first=first, codes=second, overrange=(False,), received=0.0)
+        )
+    recorder.close("complete", 60_000_000)
+    with Run.load(folder.path) as run:
+        tracemalloc.start()
+        time, value = run.shunt(0.0, 60.0)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert most < 20e6
+        assert value == pytest.approx(run.signal("coil_current")[0])
+        assert time[0] < 0.1 and time[-1] > 59.9

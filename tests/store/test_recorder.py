@@ -163,6 +163,25 @@ def test_slow_records_events_and_trials_come_back(bench, recorder, folder):
     assert lines[1]["text"] == "x" * 159 + "µ"
 
 
+def test_a_trial_has_one_row_from_its_begin_on(bench, recorder, folder):
+    push = Waveform.pulse(0.12, ramp=0.25, hold=2.0)
+    trial = Trial(force=push, label="120 mN", level=0.12, hold=(0.25, 2.25))
+    nothing = np.empty(0)
+    recorder.begun(0, trial, 0.0)
+    recorder.outcome(
+        Outcome(trial=trial, index=0, start=0.0, spike_times=nothing, current=nothing)
+    )
+    recorder.begun(1, trial, 2.5)
+    bench.play(recorder, bench.codes(4000), 500)  # 4 s, a spike every 0.701 s
+    recorder.close("aborted", 4000)
+    with Run.load(folder.path) as run:
+        assert run.completed.tolist() == [True, False]
+        assert run.duration == pytest.approx(4.0)
+        assert run.trials["end"] == pytest.approx([2.5, 4.0])
+        assert run.trials["hold_end"] == pytest.approx([2.25, 1.5])
+        assert run.trials["spikes"].tolist() == [0, 2]
+
+
 def test_alignment_moves_the_segment(bench, recorder, folder):
     bench.play(recorder, bench.codes(2000), 500)
     recorder.align(offset=0.25, drift=1e-4, uncertainty=1e-5)
