@@ -53,11 +53,11 @@ class Repeat(ForceProtocol):
             return Conclusion((), values, (why,))
         rated = [r for r in rates if r is not None]
         said = (
-            "Peak rate from one presentation to the next: "
+            "Highest rate in the hold, from one presentation to the next: "
             f"{', '.join(f'{r:.3g}' for r in rated)} Hz"
         )
         if silent := len(rates) - len(rated):
-            said += f"; the other {silent} gave fewer than two spikes"
+            said += f"; the other {silent} gave fewer than two spikes in it"
         return Conclusion((f"{said}.",), values)
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
@@ -66,13 +66,16 @@ class Repeat(ForceProtocol):
         if len(trials) < 2:
             return
         number = np.arange(1, len(trials) + 1)
-        rate = np.array([t.response.peak_rate or 0.0 for t in trials])
+        # one spike has no rate: its place stays empty
+        rate = np.array([t.response.peak_rate for t in trials], dtype=np.float64)
+        if np.isnan(rate).all():
+            return
         counts = tuple(str(t.response.spikes) for t in trials)
         yield Plot(
             name="summary",
             title="decrement",
-            caption="Highest rate from one presentation of the same force to the next, "
-            "as in Fig. 5d (right).",
+            caption="Highest rate in the hold from one presentation of the same force "
+            "to the next, as in Fig. 5d (right).",
             x_label="Presentation (numbers: spikes)",
             whole=True,
             panels=(
@@ -81,7 +84,7 @@ class Repeat(ForceProtocol):
                     unit="Hz",
                     prefix="",
                     series=(Series(x=number, y=rate, mark="joined", texts=counts),),
-                    limits=(0, max(float(rate.max()) * 1.15, 1.0)),
+                    limits=(0, float(np.nanmax(rate)) * 1.15),
                 ),
             ),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,8 +87,9 @@ class ThresholdSearch(Recovering):
         """Rate against force, with the critical force."""
         yield from rate_against_force(
             run,
-            "Highest rate of each trial against its force; open: silent. Grey band: "
-            "the critical force lies within.",
+            "Highest rate in the hold, where it has two spikes or more, and number of "
+            "spikes of each trial against its force; open: silent. Grey band: the "
+            "critical force lies within.",
         )
 
 
@@ -125,7 +126,7 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
 
 
 def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterator[Plot]:
-    """The highest rate of each trial against its force; none below two trials.
+    """Rate and spikes of each trial against its force; none below two trials.
 
     Args:
         run: what was measured.
@@ -136,8 +137,10 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
     if len(trials) < 2:
         return
     force = np.array([t.level for t in trials], dtype=np.float64)
-    rate = np.array([t.response.peak_rate or 0.0 for t in trials])
-    fired = np.array([t.response.spikes > 0 for t in trials])
+    # one spike has no rate
+    rate = np.array([t.response.peak_rate for t in trials], dtype=np.float64)
+    count = np.array([t.response.spikes for t in trials])
+    fired = count > 0
     known = run.force_uncertainty
     error = None if known is None else known.of(force)
     bands: tuple[Guide, ...] = ()
@@ -147,17 +150,20 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
         bands = (Guide(at=found.middle - half, to=found.middle + half),)
     except NotIdentifiableError:
         pass  # no band to draw; the conclusion says why
-    kinds: tuple[tuple[str, Mark, NDArray[np.bool_]], ...] = (
-        (run.origin, "points", fired), ("silent", "open", ~fired),
-    )  # fmt: skip
-    points = tuple(
-        Series(
-            x=force[which], y=rate[which], name=name, mark=mark,
+
+    def points(values: NDArray[Any], mark: Mark, which: NDArray[np.bool_]) -> Series:
+        return Series(
+            x=force[which],
+            y=values[which],
+            name=run.origin if mark == "points" else "silent",
+            mark=mark,
             x_error=None if error is None else error[which],
         )
-        for name, mark, which in kinds
-        if which.any()
-    )  # fmt: skip
+
+    rated = [points(rate, "points", np.isfinite(rate))] if np.any(rate > 0) else []
+    counted = [points(count, "points", fired)] if fired.any() else []
+    if not fired.all():
+        counted.append(points(count, "open", ~fired))
     yield Plot(
         name="summary",
         caption=caption,
@@ -168,9 +174,17 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
                 label="Highest rate",
                 unit="Hz",
                 prefix="",
-                series=(*more, *points),
+                series=(*more, *rated),
                 guides=bands,
                 limits=(0, None),
+            ),
+            Panel(
+                label="Spikes",
+                prefix="",
+                series=tuple(counted),
+                guides=bands,
+                limits=(0, None),
+                height=1.0,
             ),
         ),
     )

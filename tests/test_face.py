@@ -145,7 +145,9 @@ def test_pandas_tables(run):
     trials = run.to_pandas("trials")
     assert trials["label"].tolist() == ["180 mN"]
     assert len(run.to_pandas("spikes")) == run.trials[0]["spikes"]
-    assert len(run.to_pandas("rate")) == run.trials[0]["spikes"] - 1
+    rate = run.to_pandas("rate")
+    assert len(rate) == run.trials[0]["spikes"], "one for each interval, and silence"
+    assert rate["rate"].iloc[-1] == 0.0
     with pytest.raises(RunFolderError, match="no table"):
         run.to_pandas("nonsense")
     with pytest.raises(RunFolderError, match="V_C9"):

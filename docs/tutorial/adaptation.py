@@ -8,7 +8,8 @@ import sys
 
 import tactile_lab
 from tactile_lab.analysis.adaptation import fit_adaptation
-from tactile_lab.analysis.spike_train import rate, respond
+from tactile_lab.analysis.spike_train import respond
+from tactile_lab.spikes.rate import rate
 
 out = sys.argv[1] if len(sys.argv) > 1 else "runs"
 

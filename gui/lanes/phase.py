@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gui.lanes.rate import LEAST_SILENCE, SILENCE, begins
+from tactile_lab.spikes.rate import LEAST_SILENCE, SILENCE, begins
 from tactile_lab.trace import FloatArray
 
 

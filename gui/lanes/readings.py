@@ -9,8 +9,8 @@ import numpy as np
 from gui.lanes.axis import number
 from gui.lanes.expected import starts
 from gui.lanes.lane import Lane
-from gui.lanes.rate import LEAST_SILENCE, NEVER, SILENCE, begins, rate_at
 from gui.lanes.source import Source
+from tactile_lab.spikes.rate import LEAST_SILENCE, NEVER, SILENCE, begins, rate_at
 from tactile_lab.trace import FloatArray, Trace
 
 NEAR = 0.02

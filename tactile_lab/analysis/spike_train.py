@@ -1,7 +1,6 @@
-"""What a spike train says: intervals, rate, latency, adaptation.
+"""What a spike train says of a stimulus: intervals, latency, rates, adaptation.
 
-Times are seconds, rates hertz. The instantaneous rate at t is one over the interval of
-the last two spikes at or before t, and 0 before the second spike.
+Times are seconds, rates hertz.
 """
 
 from __future__ import annotations
@@ -28,16 +27,6 @@ def intervals(spike_times: ArrayLike) -> FloatArray:
     return np.diff(_checked(spike_times))
 
 
-def rate(spike_times: ArrayLike, at: ArrayLike) -> FloatArray:
-    """Instantaneous rate at the times `at` (any shape, s), Hz, right-continuous."""
-    times = _checked(spike_times)
-    steps = np.zeros(times.size + 1)
-    steps[2:] = 1.0 / np.diff(times)
-    seen = np.searchsorted(times, np.asarray(at, dtype=np.float64), side="right")
-    values: FloatArray = steps[seen]
-    return values
-
-
 def adaptation_index(spike_times: ArrayLike) -> float | None:
     """Mean of (ISI[i+1] - ISI[i]) / (ISI[i+1] + ISI[i]); None below three spikes.
 
@@ -56,7 +45,9 @@ class Response:
     Attributes:
         spikes: number of spikes in the whole trial.
         latency: from the stimulus's onset to the first spike after it, s.
-        peak_rate: highest instantaneous rate in the trial, Hz.
+        ramp_spikes: those of them outside the hold, while the force changes; 0 where
+            there is no hold.
+        peak_rate: highest instantaneous rate within the hold, Hz.
         final_rate: rate of the last two spikes at or before the hold's end, Hz.
         fall: from the highest rate within the hold to the final one, as a part of
             the former: 0.4 for a fall by 40 %.
@@ -68,6 +59,7 @@ class Response:
 
     spikes: int
     latency: float | None
+    ramp_spikes: int
     peak_rate: float | None
     final_rate: float | None
     fall: float | None
@@ -95,7 +87,6 @@ def respond(
     times = _checked(spike_times)
     after = times[times >= onset]
     held = within(times, hold)
-    isi = np.diff(times)
     held_rates = 1.0 / np.diff(held)
     fall = None
     if held_rates.size:
@@ -103,7 +94,8 @@ def respond(
     return Response(
         spikes=int(times.size),
         latency=float(after[0] - onset) if after.size else None,
-        peak_rate=float(1.0 / isi.min()) if isi.size else None,
+        ramp_spikes=int(times.size - held.size),
+        peak_rate=float(held_rates.max()) if held_rates.size else None,
         final_rate=float(held_rates[-1]) if held_rates.size else None,
         fall=fall,
         adaptation_index=adaptation_index(held),

@@ -11,6 +11,7 @@ from tactile_lab.model import sampling
 from tactile_lab.model.circuit import Circuit, FloatArray
 from tactile_lab.model.equations import I_C, I_DS, T1_currents
 from tactile_lab.model.need import Need
+from tactile_lab.spikes.rate import rate
 from tactile_lab.waveform import Waveform
 
 
@@ -108,12 +109,10 @@ class Solution:
 
     def _after_spikes(self, signal: str, t: FloatArray) -> FloatArray:
         spikes = np.concatenate([np.array(self.before), self.spike_times])
+        if signal == "rate":
+            return rate(spikes, t)
         last = np.searchsorted(spikes, t, side="right") - 1
         out = np.zeros(t.size)
-        if signal == "rate":
-            known = last >= 1
-            out[known] = 1 / (spikes[last[known]] - spikes[last[known] - 1])
-            return out
         self.stages["V_K"] += t.size
         known = last >= 0
         since = t[known] - spikes[last[known]]

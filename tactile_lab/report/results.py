@@ -86,6 +86,7 @@ def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
         "rest_V_C1_V": trial.rest,
         "drift_V": trial.drift,
         "spikes": response.spikes,
+        "ramp_spikes": response.ramp_spikes,
         "spike_times_s": [float(t) for t in trial.spike_times],
         "latency_s": response.latency,
         "latency_uncertainty_s": None

@@ -26,8 +26,9 @@ def trials_table(run: Measurement) -> Table:
             note="V_K was not searched for spikes.",
         )
     note = (
-        "First spike: time from the onset of the force, ± how well the clocks of coil "
-        "and scope are aligned. Final rate: of the last two spikes within the hold. "
+        "In ramps: spikes outside the hold, part of the whole. First spike: time from "
+        "the onset of the force, ± how well the clocks of coil and scope are aligned. "
+        "Peak and final rate: highest, and of the last two spikes, within the hold. "
         "Fall: from the highest rate within the hold to the final one. Time constant: "
         "1/|β| with its 95 % interval."
     )
@@ -36,8 +37,8 @@ def trials_table(run: Measurement) -> Table:
     named = any(_name(trial) != _force(trial) for trial in run.results)
     headings = (
         *("Trial",) * named,
-        *("Force", "Spikes", "First spike", "Peak rate", "Final rate", "Fall in hold"),
-        "Time constant",
+        *("Force", "Spikes", "In ramps", "First spike", "Peak rate", "Final rate"),
+        *("Fall in hold", "Time constant"),
     )
     rows = tuple((*(_name(trial),) * named, *_row(run, trial)) for trial in run.results)
     return Table(headings=headings, rows=rows, note=note)
@@ -76,6 +77,7 @@ def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
     return (
         force,
         str(response.spikes),
+        str(response.ramp_spikes) if response.ramp_spikes else NONE,
         latency,
         _shown(response.peak_rate, "Hz"),
         _shown(response.final_rate, "Hz"),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count, show
 from tactile_lab.spikes.detection import Detection
+from tactile_lab.spikes.rate import rate_changes
 from tactile_lab.store.applied import (
     BIN_TIME,
     MOST_BINS,
@@ -337,13 +338,14 @@ class StoredRun:
 
     @property
     def rate(self) -> Records:
-        """Instantaneous rate: time of each spike from the second on, s, and 1/ISI, Hz.
+        """Instantaneous rate: when it changes, s, and to what, Hz.
 
-        It holds from that time to the next; before the second spike it is 0.
+        Each row holds until the next: 1/ISI from each spike on, 0 in silences and
+        before the first row (`tactile_lab.spikes.rate`).
         """
-        times = self.spikes["time"]
-        found = np.empty(max(times.size - 1, 0), [("time", "f8"), ("rate", "f8")])
-        found["time"], found["rate"] = times[1:], 1.0 / np.diff(times)
+        time, rate = rate_changes(self.spikes["time"], self.trials["start"])
+        found = np.empty(time.size, [("time", "f8"), ("rate", "f8")])
+        found["time"], found["rate"] = time, rate
         return found
 
     def stored(self, name: str) -> int:

@@ -1,12 +1,9 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tactile_lab.analysis.spike_train import (
     adaptation_index,
     intervals,
-    rate,
     respond,
     within,
 )
@@ -21,19 +18,6 @@ def test_intervals_are_differences():
     assert intervals([3.0]).size == 0
 
 
-def test_rate_is_right_continuous_and_zero_before_the_second_spike():
-    at = [0.0, 1.0, 1.0999, 1.1, 1.2, 1.3, 1.5, 1.7, 9.0]
-    assert rate(TRAIN, at) == pytest.approx([0, 0, 0, 10, 10, 5, 5, 2.5, 2.5])
-    assert rate([], [1.0]) == pytest.approx([0.0])
-    assert rate([1.0], [2.0]) == pytest.approx([0.0])
-
-
-@given(st.lists(st.integers(1, 10**6), min_size=2, max_size=60))
-def test_rate_just_after_each_spike_is_one_over_the_last_interval(steps):
-    times = np.cumsum(steps) * 1e-3
-    assert rate(times, times)[1:] == pytest.approx(1 / np.diff(times))
-
-
 def test_adaptation_index_tells_slowing_from_regular():
     assert adaptation_index([0, 1, 2, 3]) == pytest.approx(0)
     assert adaptation_index(TRAIN) == pytest.approx(1 / 3)
@@ -45,11 +29,18 @@ def test_response_describes_one_trial():
     found = respond([0.6, 0.7, 0.9, 1.3, 2.9], onset=0.5, hold=(0.65, 1.35))
     assert found.spikes == 5
     assert found.latency == pytest.approx(0.1)
-    assert found.peak_rate == pytest.approx(10)
+    assert found.peak_rate == pytest.approx(5), "that of the ramp is not the hold's"
+    assert found.ramp_spikes == 2
     assert found.final_rate == pytest.approx(2.5)
     assert found.fall == pytest.approx(0.5)
     assert found.intervals == 2
     assert found.silent is None
+
+
+def test_a_hold_that_is_silent_has_no_rate_though_its_ramps_fire():
+    found = respond([0.1, 0.15, 0.2, 1.3, 1.35], hold=(0.25, 1.25))
+    assert found.spikes == found.ramp_spikes == 5
+    assert found.peak_rate is None
 
 
 def test_response_says_when_firing_stopped():

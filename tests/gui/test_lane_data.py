@@ -5,9 +5,10 @@ from hypothesis import strategies as st
 from gui.lanes.axis import decimals, nice_range, number, signed, ticks
 from gui.lanes.expected import Aligned, Preview, Stretch
 from gui.lanes.paint import zigzag
-from gui.lanes.rate import rate_at, rate_of
+from gui.lanes.rate import rate_of
 from gui.lanes.source import Readings
 from tactile_lab.pyramid import COARSE, FINE, Pyramid
+from tactile_lab.spikes.rate import rate_at
 from tactile_lab.trace import Trace
 from tactile_lab.waveform import Waveform
 

@@ -140,8 +140,22 @@ def test_repeat_tells_the_decrement():
     found = find(run)
     rates = found.conclusion.values["peak_rates_Hz"]
     assert rates == sorted(rates, reverse=True)
-    assert "Peak rate from one presentation" in found.conclusion.sentences[0]
+    assert "Highest rate in the hold, from one" in found.conclusion.sentences[0]
     assert [plot.name for plot in found.answers] == ["summary"]
+
+
+def test_a_trial_with_one_spike_is_drawn_with_no_rate(rate_force):
+    one = replace(rate_force.trials[2], spike_times=np.array([0.9]))
+    trials = (*rate_force.trials[:2], one, *rate_force.trials[3:])
+    (plot,) = find(replace(rate_force, trials=trials)).answers
+    rates, counts = plot.panels
+    drawn = next(s for s in rates.series if s.mark == "points")
+    assert list(drawn.x) == [0.15, 0.2]
+    assert all(value > 0 for value in drawn.y)
+    fired = next(s for s in counts.series if s.mark == "points")
+    assert (fired.x[0], fired.y[0]) == (0.11, 1)
+    silent = next(s for s in counts.series if s.mark == "open")
+    assert (list(silent.x), list(silent.y)) == ([0.085], [0])
 
 
 def test_bipolar_tells_the_currents_and_tau():

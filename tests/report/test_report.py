@@ -128,7 +128,7 @@ def test_text_of_others_cannot_break_the_page(demo, tmp_path):
 def test_the_table_has_one_row_per_trial(demo):
     shown = trials_table(find(demo).run)
     assert [row[0] for row in shown.rows] == ["80 mN", "120 mN", "160 mN", "200 mN"]
-    assert shown.rows[0][1:] == ("0", "–", "–", "–", "–", "–")
+    assert shown.rows[0][1:] == ("0", "–", "–", "–", "–", "–", "–")
     spikes = [int(row[1]) for row in shown.rows]
     assert spikes == sorted(spikes)
     assert "10 are needed" in shown.rows[1][-1]
