@@ -72,14 +72,9 @@ class Teslameter:
             NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
             BadReplyError: another instrument answers, or it does not take its settings.
         """
-        self._talk.link.open()
         try:
-            self._talk.recognise()
-            self._talk.clear_errors()
-            self._set_up()
-            if self._not_taken():  # a line may have been lost on the way
-                self._set_up()
-                self._refuse(self._not_taken())
+            self._talk.connect()
+            self._talk.set_up("its readings could be in another unit")
         except BaseException:
             self._talk.link.close()
             raise
@@ -120,27 +115,6 @@ class Teslameter:
             self._talk.offer(self.dialect.release)
             self._talk.link.close()
         self._talk.link.end_record()
-
-    def _set_up(self) -> None:
-        for line in (*self.dialect.optional, *self.dialect.init):
-            self._talk.command(line)
-
-    def _not_taken(self) -> list[str]:
-        """Questions whose answer is not what the row wants, and that answer."""
-        asked = {line: self._talk.query(line) for line in self.dialect.confirm}
-        return [
-            f"{line} answers {answer!r}"
-            for line, answer in asked.items()
-            if re.search(self.dialect.confirm[line], answer) is None
-        ]
-
-    def _refuse(self, wrong: list[str]) -> None:
-        if wrong:
-            raise BadReplyError(
-                f"The teslameter does not take its settings: {', '.join(wrong)} after "
-                f"{', '.join(self.dialect.init)}, so its readings could be in another "
-                "unit. Unlock its front panel, check cable and baud rate, try again."
-            )
 
     def _value(self) -> float:
         """What the meter shows, in its unit.

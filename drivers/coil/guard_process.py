@@ -114,6 +114,14 @@ def prepared(told: dict[str, Any]) -> serial.SerialBase:
     return port
 
 
+def send_on(port: serial.SerialBase) -> None:
+    """Send, though the source said XOFF and its XON may be lost."""
+    switch = getattr(port, "set_output_flow_control", None)
+    if switch is not None:
+        switch(False)  # Linux resumes only what it has stopped itself
+        switch(True)
+
+
 def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> bool:
     """Send and verify output-off, again and again while patience lasts."""
     give_up = time.monotonic() + PATIENCE
@@ -122,6 +130,7 @@ def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> 
     while time.monotonic() < give_up:
         try:
             with port:
+                send_on(port)
                 port.write(told[lines].encode("ascii"))
                 port.write(told["query"].encode("ascii"))
                 answers = []

@@ -119,12 +119,9 @@ class CoilSource:
             UnsafeError: the output could not be verified off.
         """
         wire = self._wire
-        wire.link.open()
         try:
-            wire.recognise()
+            wire.connect()
             self._reached = True
-            wire.clear_errors()
-            wire.offer(self.dialect.optional)
             if wire.output_is_on():
                 self.warnings.append(
                     f"The output was already on at {show(wire.current(), 'A')} when "
@@ -135,8 +132,7 @@ class CoilSource:
             report = self.safe_off()
             if not report.verified:
                 raise UnsafeError(report.text)
-            for line in self.dialect.init:
-                wire.command(line)
+            wire.set_up("it might regulate a voltage instead of the current")
             self._interval = wire.measured_interval()
             if self._guard is not None:
                 self._guard.start()

@@ -138,7 +138,7 @@ class CoilWire(Conversation[CoilDialect]):
         times, characters = [], 0
         for _ in range(CONNECT_QUERIES):
             begun = self.link.now
-            answers = [self.link.query(line) for line in lines]
+            answers = [self.query(line) for line in lines]
             times.append(self.link.now - begun)
             characters = sum(map(len, lines)) + sum(map(len, answers))
             if not all(answers):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Generic, TypeVar
 
 from drivers.serial_line.link import SerialLink
@@ -21,6 +21,9 @@ D = TypeVar("D", bound=SerialDialect)
 
 RETRY = 0.1
 """Time between two attempts to open a lost port again, s."""
+
+TRIES = 3
+"""Attempts to have an instrument say its name when it is opened."""
 
 MOST_ERRORS = 25
 """Answers of an error queue to read before giving up on emptying it."""
@@ -40,6 +43,48 @@ class Conversation(Generic[D]):
     def __init__(self, link: SerialLink, dialect: D) -> None:
         self.link = link
         self.dialect = dialect
+
+    def connect(self) -> None:
+        """Open the link, with more than one try, and have the instrument listen.
+
+        Raises:
+            NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
+            BadReplyError: another instrument answers, or none that can be understood.
+        """
+        for left in reversed(range(TRIES)):
+            try:
+                self.link.open()
+                if left < TRIES - 1:
+                    self.link.resynchronise()  # an earlier answer may come late
+                break
+            except (NoReplyError, BadReplyError):
+                self.link.close()
+                if not left:
+                    raise
+        self.recognise()
+        self._empty_errors(self.query)
+        self.offer(self.dialect.optional)
+
+    def set_up(self, danger: str) -> None:
+        """Send the row's settings and read back that they were taken.
+
+        Args:
+            danger: what would follow if they were not, for the message.
+
+        Raises:
+            BadReplyError: they are not taken.
+            RefusedError: the instrument reports an error.
+        """
+        self._send_settings()
+        if self._not_taken():  # a line may have been lost on the way
+            self._send_settings()
+            if wrong := self._not_taken():
+                raise BadReplyError(
+                    f"The {self.dialect.role} does not take its settings: "
+                    f"{', '.join(wrong)} after {', '.join(self.dialect.init)}, so "
+                    f"{danger}. Unlock its front panel, check cable and baud rate, "
+                    "try again."
+                )
 
     def recognise(self) -> None:
         """Refuse an instrument that is not of this row.
@@ -66,7 +111,7 @@ class Conversation(Generic[D]):
             return self.link.query(line, blank=blank)
         except (NoReplyError, BadReplyError):
             self.link.resynchronise()
-            self.clear_errors()
+            self._empty_errors(self.link.query)
             return self.link.query(line, blank=blank)
 
     def number(self, line: str, pattern: str | None = None) -> float:
@@ -127,12 +172,25 @@ class Conversation(Generic[D]):
                 self._blindly(line, trouble)
         return len(trouble) == before
 
-    def clear_errors(self) -> None:
+    def _send_settings(self) -> None:
+        for line in self.dialect.init:
+            self.command(line)
+
+    def _not_taken(self) -> list[str]:
+        """Questions whose answer is not what the row wants, and that answer."""
+        asked = {line: self.query(line) for line in self.dialect.confirm}
+        return [
+            f"{line} answers {answer!r}"
+            for line, answer in asked.items()
+            if re.search(self.dialect.confirm[line], answer) is None
+        ]
+
+    def _empty_errors(self, ask: Callable[[str], str]) -> None:
         """Read the error queue until it is empty."""
         if self.dialect.error is None:
             return
         for _ in range(MOST_ERRORS):
-            if re.search(self.dialect.error_ok, self.link.query(self.dialect.error)):
+            if re.search(self.dialect.error_ok, ask(self.dialect.error)):
                 return
         raise RefusedError(
             f"The instrument at {self.link.port} has no end of errors; switch it off "

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import serial
 
-from drivers.serial_line.port import PORT_ERRORS, open_port, release
+from drivers.serial_line.port import PORT_ERRORS, open_port, release, send_on
 from drivers.serial_line.transcript import Transcript
 from tactile_lab.clock import Clock
 from tactile_lab.errors import (
@@ -110,7 +110,7 @@ class SerialLink:
         """Let go of the port; idempotent, also after the link was lost."""
         held, self._serial = self._serial, None
         if held is not None:
-            release(held)
+            release(held, unsent=self._doubtful)
 
     def end_record(self) -> None:
         """Close the transcript, if there is one; idempotent."""
@@ -159,6 +159,7 @@ class SerialLink:
             NoReplyError: the far end takes nothing.
         """
         self._doubtful = True
+        self._resume()
         self._send("")
         self._send(line)
 
@@ -184,6 +185,7 @@ class SerialLink:
             NoReplyError: it does not answer.
             BadReplyError: it keeps talking, or answers with another name.
         """
+        self._resume()
         self.drain()
         self._send_preamble()
         answer = ""
@@ -229,6 +231,12 @@ class SerialLink:
                     "baud rate or its model is probably not the one expected."
                 )
             self._clock.sleep_until(now + quiet / 4)
+
+    def _resume(self) -> None:
+        """Send on, though the far end said XOFF: the XON after it may be lost."""
+        if self.wire.xonxoff:
+            with self._mapped() as port:
+                send_on(port)
 
     def _settle(self) -> None:
         if self._doubtful:

@@ -23,8 +23,9 @@ PORT_ERRORS = (serial.SerialException, OSError, TermiosError)
 """What pyserial raises when a port fails; `termios.error` is not an `OSError`."""
 
 
-CONNECT = 0.5
-"""Longest wait for a network port to accept, s; pyserial's own is ten times that."""
+CONNECT = 0.25
+"""Longest wait for a network port to accept, s; the guard takes twice that for a hang.
+pyserial's own is twenty times that."""
 
 
 def port_settings(port: str, wire: SerialSettings) -> dict[str, Any]:
@@ -71,10 +72,28 @@ def open_port(port: str, wire: SerialSettings, what: str) -> serial.Serial:
     return opened
 
 
-def release(port: serial.SerialBase) -> None:
-    """Close a port, also one whose far end is gone."""
+def send_on(port: serial.SerialBase) -> None:
+    """Have a port send that its far end has stopped by XOFF; others are left alone."""
+    switch = getattr(port, "set_output_flow_control", None)
+    if switch is not None:  # a network port has none
+        switch(False)  # Linux resumes only what it has stopped itself
+        switch(True)
+
+
+def release(port: serial.Serial, *, unsent: bool = False) -> None:
+    """Close a port, also one whose far end is gone.
+
+    Args:
+        port: to close; idempotent.
+        unsent: drop what could not be sent yet: Linux would wait for it for 30 s.
+    """
     # pyserial's socket:// forgets to close a socket whose peer is gone
     left_open = getattr(port, "_socket", None)
+    try:
+        if unsent and port.is_open:
+            port.reset_output_buffer()
+    except PORT_ERRORS:
+        pass  # nothing can be dropped on a port that is gone
     try:
         port.close()
         if left_open is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric, one_of
 from sim_backend.serial_line.scpi import Handler, ScpiError, boolean
 
@@ -58,6 +60,11 @@ def _commands(source: CoilPanel, model: str) -> dict[str, Handler]:
         if set(argument.replace(" ", "").split(",")) - {"'VOLT'", "'CURR'"}:
             raise ScpiError(-224, "Illegal parameter value")
 
+    modes = {"output": "NORM", "source": "FIX"}
+
+    def keep(name: str) -> Callable[[str], None]:
+        return lambda choice: modes.update({name: choice})
+
     def accept(_: str | float) -> None:
         """Settings that change nothing a coil could notice."""
 
@@ -69,7 +76,9 @@ def _commands(source: CoilPanel, model: str) -> dict[str, Handler]:
         "SYSTem:BEEPer:STATe": lambda argument: accept(str(boolean(argument))),
         "SYSTem:LOCal": bare(lambda: None),
         "SOURce:FUNCtion[:MODE]": one_of(function, "CURRent", "VOLTage"),
-        "SOURce:CURRent:MODE": one_of(accept, "FIXed", "LIST", "SWEep"),
+        "SOURce:FUNCtion[:MODE]?": lambda _: "CURR" if source.current_mode else "VOLT",
+        "SOURce:CURRent:MODE": one_of(keep("source"), "FIXed", "LIST", "SWEep"),
+        "SOURce:CURRent:MODE?": lambda _: modes["source"],
         "SOURce:CURRent:RANGe": numeric(ranges.set_range, 0.0, amperes),
         "SOURce:CURRent[:LEVel]": numeric(ranges.set_current, -amperes, amperes),
         "SOURce:CURRent[:LEVel]?": lambda _: f"{source.setpoint:+.6E}",
@@ -79,7 +88,9 @@ def _commands(source: CoilPanel, model: str) -> dict[str, Handler]:
         "SENSe:VOLTage:PROTection": numeric(source.set_compliance, 0.0, volts),
         "SENSe:VOLTage:PROTection?": lambda _: f"{source.compliance:+.6E}",
         "FORMat:ELEMents": ranges.set_elements,
-        "OUTPut:SMODe": one_of(accept, "NORMal", "ZERO", "HIMPedance", "GUARd"),
+        "FORMat:ELEMents?": lambda _: ",".join(ranges.elements),
+        "OUTPut:SMODe": one_of(keep("output"), "NORMal", "ZERO", "HIMPedance", "GUARd"),
+        "OUTPut:SMODe?": lambda _: modes["output"],
         "OUTPut[:STATe]": lambda argument: source.switch(boolean(argument)),
         "OUTPut[:STATe]?": lambda _: str(int(source.output_on)),
         "READ?": ranges.read,

@@ -29,6 +29,7 @@ Kind = Literal[
     "refused",
     "deaf",
     "stuck",
+    "xoff",
     "unplug",
 ]
 
@@ -47,7 +48,8 @@ class SerialFault:
             `carriage_return` instead of the terminator, `flow_control` characters
             around it, `noise` before it. To a line: `refused` with SCPI error -222,
             or `deaf`: neither acted on nor answered (switched off, adapter alive).
-            To the wire: `stuck` takes no more characters, `unplug`.
+            To the wire: `stuck` takes no more characters, `xoff` neither until the
+            port is told to send on (the XON was lost), `unplug`.
         line: pattern that the line must match.
         after: clock time from which it may strike, s.
         skip: matching lines that pass first.

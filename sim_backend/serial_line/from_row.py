@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from re import _parser  # type: ignore[attr-defined]
 from string import Formatter
 from typing import Any
@@ -43,6 +44,8 @@ class RowParser:
     ) -> None:
         name, fine = invented(row.match), invented(row.error_ok)
         self._answers = {row.identify: lambda: name} | answers
+        for query, wanted in row.confirm.items():
+            self._answers[query] = partial(invented, wanted)
         if row.error is not None:
             self._answers[row.error] = lambda: errors.popleft() if errors else fine
         self._accepted = {*row.init, *row.optional, *row.release}

@@ -19,6 +19,8 @@ from abc import ABC, abstractmethod
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import FarEnd
 
+XOFF = b"\x13"
+
 POLL = 0.05
 """Longest wait before a server looks whether it should end, s."""
 
@@ -76,11 +78,13 @@ class SerialServer(ABC):
         if self._each:
             time.sleep(len(data) * self._each)
         struck = self.far_end.faults.strike(
-            data, self.far_end.clock.now(), ("unplug", "stuck")
+            data, self.far_end.clock.now(), ("unplug", "stuck", "xoff")
         )
         for fault in struck:
-            self._break(fault)
-            return
+            if fault.kind != "xoff":
+                self._break(fault)
+                return
+            self._send(XOFF)
         for answer in self.far_end.take(data, began):
             self._order += 1
             due = time.monotonic() + answer.delay + len(answer.data) * self._each

@@ -178,6 +178,7 @@ class SimPort(serial.SerialBase):
         self._arriving: list[tuple[float, int]] = []
         self._line_free = 0.0
         self._last = b""
+        self._sends = True
         super().__init__(*args, **kwargs)  # type: ignore[arg-type]
 
     def open(self) -> None:
@@ -270,14 +271,24 @@ class SimPort(serial.SerialBase):
         far_end.unplugged = Unplugged(fault.form, back)
         self._arriving.clear()
 
+    def set_output_flow_control(self, enable: bool = True) -> None:
+        """Send, or not, whatever the far end said."""
+        self._sends = enable
+
     def _strike(self, far_end: FarEnd, group: bytes) -> None:
         """Let the wire's own faults happen before these bytes go out."""
-        clock = far_end.clock
-        for fault in far_end.faults.strike(group, clock.now(), ("unplug", "stuck")):
-            if fault.kind == "stuck":
-                clock.sleep_until(clock.now() + (self.write_timeout or 0.0))
-                raise serial.SerialTimeoutException("Write timeout")
-            self._unplug(far_end, fault)
+        clock, kinds = far_end.clock, ("unplug", "stuck", "xoff")
+        stuck = False
+        for fault in far_end.faults.strike(group, clock.now(), kinds):
+            if fault.kind == "unplug":
+                self._unplug(far_end, fault)
+            elif fault.kind == "stuck":
+                stuck = True
+            elif self.xonxoff:
+                self._sends = False
+        if stuck or not self._sends:
+            clock.sleep_until(clock.now() + (self.write_timeout or 0.0))
+            raise serial.SerialTimeoutException("Write timeout")
 
     def _read(self, size: int | None, end: bytes | None) -> bytes:
         far_end = self._connected()

@@ -148,6 +148,8 @@ class SerialDialect(Dialect):
         serial: settings and framing of the wire.
         identify: harmless query of its name.
         init: lines after identification.
+        confirm: queries after `init`, and the pattern that each answer must match: a
+            line may have been lost.
         optional: lines before `init` whose refusal is accepted.
         release: lines before the port is closed.
         error: query of the error queue; None where there is none.
@@ -159,6 +161,7 @@ class SerialDialect(Dialect):
     identify: str = "*IDN?"
     optional: Lines = ()
     init: Lines = ()
+    confirm: dict[str, Pattern] = Field(default={})
     release: Lines = ()
     error: str | None = None
     error_ok: Pattern = r"^[+-]?0\b"
@@ -293,8 +296,6 @@ class MeterDialect(SerialDialect):
         scale: tesla per unit of the answer.
         multiplier: query of a prefix letter (empty, u, m, k) that scales the answer.
         overload: pattern of an answer that says the range is exceeded.
-        confirm: queries after `init`, and the pattern that each answer must match: a
-            line that was lost would leave another unit.
         report: queries whose answers are kept with the run, by name.
         interval: shortest time between two readings, s.
     """
@@ -304,6 +305,5 @@ class MeterDialect(SerialDialect):
     scale: float = 1.0
     multiplier: str | None = None
     overload: Pattern = r"(?i)^\s*O(V)?L"
-    confirm: dict[str, Pattern] = Field(default={})
     report: dict[str, str] = Field(default={})
     interval: Pause = 0.1

@@ -1,6 +1,7 @@
 """Each serial fault, alone and lasting, in the middle of a waveform."""
 
 import itertools
+from dataclasses import replace
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -35,6 +36,7 @@ PASSING = [
     SerialFault(kind="noise"),
     SerialFault(kind="deaf"),
     SerialFault(kind="stuck"),
+    SerialFault(kind="xoff"),
 ]
 
 
@@ -55,6 +57,37 @@ def test_one_bad_exchange_does_not_end_the_run(serial_bench, fault):
     it.clock.sleep_until(it.clock.now() + 0.2)
     assert it.coil.read_current().value == pytest.approx(0.7)
     assert it.coil.safe_off().verified
+
+
+@pytest.mark.parametrize("skip", range(13))
+@pytest.mark.parametrize(
+    "fault",
+    [f for f in PASSING if f.kind in ("late", "garbled", "deaf", "stuck", "xoff")],
+    ids=named,
+)
+def test_one_bad_exchange_does_not_end_the_opening(serial_bench, fault, skip):
+    it = serial_bench
+    it.end.faults.add(replace(fault, skip=skip))
+    it.coil.open()
+    assert it.end.faults.struck
+    it.coil.energise()
+    it.drive(0.5)
+    assert it.source.setpoint == pytest.approx(0.5)
+    assert it.coil.safe_off().verified
+
+
+def test_a_source_that_never_says_xon_is_switched_off(serial_bench):
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="xoff", line="CURR", times=2))
+    with pytest.raises(NoReplyError, match="flow control"):
+        it.drive(0.7)
+    begun = it.clock.now()
+    assert it.coil.safe_off().verified
+    assert it.clock.now() - begun < 2
+    assert not it.source.output_on
 
 
 def test_an_answer_a_second_late_faults_and_ends_safely(serial_bench):

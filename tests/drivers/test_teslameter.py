@@ -90,6 +90,17 @@ def closed(request, resistor):
 LINES = r"^(UNIT|RDGMODE|ACDC|AUTO|SENSE:MODE|UNIT:FIELD)\b[^?]*$"
 
 
+@pytest.mark.parametrize("kind", ["late", "missing", "deaf"])
+@pytest.mark.parametrize("skip", range(6))
+def test_one_bad_exchange_does_not_end_the_opening(closed, kind, skip):
+    end, meter = closed
+    end.faults.add(SerialFault(kind=kind, amount=0.35, skip=skip))
+    meter.open()
+    assert meter.read().value == pytest.approx(5.5e-3, rel=1e-3)
+    assert end.faults.struck == 1
+    meter.close()
+
+
 @pytest.mark.parametrize("which", range(3))
 def test_a_setting_that_was_lost_is_sent_again(closed, which):
     end, meter = closed
