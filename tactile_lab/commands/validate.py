@@ -56,10 +56,11 @@ def cap_option(default: float) -> Callable[..., Any]:
 def accuracy(
     out: Path | None, names: tuple[str, ...], cap: float, repeats: int
 ) -> None:
-    """Error against run time: ours and other solvers, seven scenes easy to stiff.
+    """Error against run time: ours and other solvers, nine scenes easy to stiff.
 
-    Truth is a 40-digit reference. CVODE (scikit-sundae) and ngspice take part where
-    they are installed.
+    Truth is a 40-digit reference. Dormand-Prince, Rodas5P, Euler and RK4 are compiled
+    whole, as ours is. CVODE (scikit-sundae) and ngspice take part where they are
+    installed.
     """
     with refusing():
         from tactile_lab.validation.accuracy import compete, figure, report, write_csv

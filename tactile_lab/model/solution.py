@@ -60,6 +60,8 @@ class Solution:
     last: tuple[float, float, float]
     """V_P, V_C1, V_C2 at the end, after a jump or reset there."""
     stages: dict[str, int]
+    evaluations: int
+    """Evaluations of Eq. (16), of Eq. (17) or of both at once."""
     statistics: Statistics | None
     error_spike_time: float
     error_V_C1: float

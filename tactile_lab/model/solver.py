@@ -20,6 +20,7 @@ from tactile_lab.model.need import STAGES, Need
 from tactile_lab.model.packed import parameters
 from tactile_lab.model.solution import Solution, Statistics
 from tactile_lab.model.state import State
+from tactile_lab.model.tableau import ORDER
 from tactile_lab.waveform import Waveform
 
 MOST_SPIKES = 1e8
@@ -93,6 +94,8 @@ def solve(
         pieces=pieces[: counts[kernel.ROWS_2]].copy(),
         last=(after.V_P, after.V_C1, after.V_C2),
         stages=_stages(counts, S, need),
+        evaluations=ORDER * int(counts[kernel.ITERATIONS])
+        + (ORDER + 1) * int(counts[kernel.EXPANSIONS]),
         statistics=_statistics(S) if need.integrator else None,
         error_spike_time=float(S[spiking.LARGEST_ERROR]),
         error_V_C1=float(node[kernel.Y_LARGEST_ERROR]),

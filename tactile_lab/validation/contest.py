@@ -14,11 +14,15 @@ import numpy as np
 from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.simulate import simulate
-from tactile_lab.validation import general, spice
-from tactile_lab.validation.problem import OutOfTimeError, Problem, spent
+from tactile_lab.validation import general, rivals, spice
+from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem, spent
 from tactile_lab.validation.reference import reference
 
 OURS = "tactile_lab"
+
+
+COMPILED, CALLED, PROCESS = "compiled", "called from Python", "own process"
+"""Where a method's inner loop runs."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +32,17 @@ class Method:
     Attributes:
         name: of the solver.
         setting: tolerance or step, for tables.
-        solve: spike times and last V_C1 of a problem, within `cap` s of CPU time.
+        solve: answer to a problem, within `cap` s of CPU time.
         repeats: how often it is timed; the least counts.
+        runs: "compiled" whole, "called from Python" at each evaluation of the
+            right-hand side, or in its "own process".
     """
 
     name: str
     setting: str
-    solve: Callable[..., general.Answer]
+    solve: Callable[..., Answer]
     repeats: int = 1
+    runs: str = CALLED
 
 
 @dataclass(frozen=True)
@@ -46,10 +53,13 @@ class Row:
         scene: name.
         method: name.
         setting: tolerance or step.
+        runs: see `Method`.
         verdict: "right", "wrong count", "NaN", "timed out" or "failed".
         spikes: count found, None without an answer.
         spike_error: largest true error of a spike time, s, where the count is right.
         V_C1_error: true error of V_C1 at the end, V.
+        estimate: our own estimate of `spike_error`, s; None for others.
+        evaluations: of the right-hand side, None where unknown.
         run_time: least CPU time, s.
         note: why it failed.
     """
@@ -57,39 +67,60 @@ class Row:
     scene: str
     method: str
     setting: str
+    runs: str
     verdict: str
     spikes: int | None = None
     spike_error: float | None = None
     V_C1_error: float | None = None
+    estimate: float | None = None
+    evaluations: int | None = None
     run_time: float = 0.0
     note: str = ""
 
 
-def ours(problem: Problem, cap: float, tolerance: float = 1e-9) -> general.Answer:
+def ours(problem: Problem, cap: float, tolerance: float = 1e-9) -> Answer:
     """Our solver, spikes kept."""
     found = simulate(
         problem.circuit, problem.force, until=problem.until, start=problem.start,
         tolerance=tolerance,
     )  # fmt: skip
     assert found.spike_times is not None
-    return found.spike_times, found.end.V_C1
+    return Answer(
+        found.spike_times, found.end.V_C1, found.solution.evaluations,
+        found.error.spike_time,
+    )  # fmt: skip
 
 
 def methods(repeats: int, spice_too: bool = True) -> list[Method]:
     """All that are installed, each at several settings."""
 
-    def at(name: str, tolerance: float, solve: partial[Any], times: int = 1) -> Method:
-        return Method(name, f"tol {tolerance:g}", solve, times)
+    def at(
+        name: str, tolerance: float, solve: partial[Any], times: int = 1,
+        runs: str = CALLED,
+    ) -> Method:  # fmt: skip
+        return Method(name, f"tol {tolerance:g}", solve, times, runs)
 
+    fast = 20 * repeats
     found = [
-        at(OURS, tol, partial(ours, tolerance=tol), 20 * repeats)
-        for tol in (1e-3, 1e-6, 1e-9, 1e-12)
+        at(OURS, tol, partial(ours, tolerance=tol), fast, COMPILED)
+        for tol in (1e-2, 1e-3, 1e-5, 1e-6, 1e-7, 1e-9, 1e-11, 1e-12, 1e-13)
     ]
+    for name, kind in (
+        ("Dormand-Prince 5(4)", rivals.DORMAND_PRINCE), ("Rodas5P", rivals.RODAS),
+    ):  # fmt: skip
+        for tol in [10.0**-n for n in range(4, 14)]:
+            solve = partial(rivals.stepped, method=kind, tolerance=tol)
+            found.append(at(name, tol, solve, fast, COMPILED))
     for dt in (1e-3, 1e-4, 1e-5, 1e-6):
-        for name, order in (("Euler", 1), ("RK4", 4)):
-            solve = partial(general.fixed_step, order=order, dt=dt)
+        for name, order, events in (
+            ("Euler", rivals.EULER, rivals.ON_GRID),
+            ("Euler, interpolated", rivals.EULER, rivals.INTERPOLATED),
+            ("RK4", rivals.RK4, rivals.ON_GRID),
+            ("RK4, interpolated", rivals.RK4, rivals.INTERPOLATED),
+        ):
+            solve = partial(rivals.fixed_step, order=order, events=events, dt=dt)
             times = repeats if dt > 1e-5 else 1
-            found.append(Method(name, f"dt {dt:g}", solve, times))
+            found.append(Method(name, f"dt {dt:g}", solve, times, COMPILED))
     for tol in (1e-6, 1e-9, 1e-12):
         for name in general.SCIPY:
             solve = partial(general.scipy_solver, method=name, tolerance=tol)
@@ -102,7 +133,7 @@ def methods(repeats: int, spice_too: bool = True) -> list[Method]:
     if spice_too and spice.installed():
         for tol in (1e-3, 1e-5, 1e-6):
             solve = partial(spice.ngspice, reltol=tol)
-            found.append(Method("ngspice", f"reltol {tol:g}", solve))
+            found.append(Method("ngspice", f"reltol {tol:g}", solve, 1, PROCESS))
     return found
 
 
@@ -125,10 +156,10 @@ def truth(problem: Problem) -> Truth:
 
 def judge(problem: Problem, method: Method, exact: Truth, cap: float) -> Row:
     """Run once and compare; failures become verdicts."""
-    failed = Row(problem.name, method.name, method.setting, "failed")
+    failed = Row(problem.name, method.name, method.setting, method.runs, "failed")
     began = spent()
     try:
-        spikes, V_C1 = method.solve(problem, cap=cap)
+        answer = method.solve(problem, cap=cap)
     except (TactileLabError, ArithmeticError, ValueError, RuntimeError) as error:
         note = " ".join(str(error).split())[:120]
         verdict = "NaN" if "NaN" in note else "failed"
@@ -136,6 +167,7 @@ def judge(problem: Problem, method: Method, exact: Truth, cap: float) -> Row:
             verdict = "timed out"
         return replace(failed, verdict=verdict, note=note, run_time=spent() - began)
     took = spent() - began
+    spikes = answer.spike_times
     right = spikes.size == exact.spike_times.size
     gap = np.abs(spikes - exact.spike_times).max(initial=0.0) if right else None
     return replace(
@@ -143,7 +175,9 @@ def judge(problem: Problem, method: Method, exact: Truth, cap: float) -> Row:
         verdict="right" if right else "wrong count",
         spikes=int(spikes.size),
         spike_error=None if gap is None else float(gap),
-        V_C1_error=abs(V_C1 - exact.V_C1),
+        V_C1_error=abs(answer.V_C1 - exact.V_C1),
+        estimate=answer.estimate,
+        evaluations=answer.evaluations,
         run_time=took,
     )
 
@@ -161,7 +195,8 @@ def contest(
         # compilation is no part of it
         ours(problem, cap)
         with suppress(TactileLabError):  # nor is this answer, which may be NaN
-            general.fixed_step(problem, 1, 1e-2, cap)
+            rivals.fixed_step(problem, cap, rivals.EULER, rivals.ON_GRID, 1e-2)
+            rivals.stepped(problem, cap, rivals.RODAS, 1e-3)
         rows: dict[int, Row] = {}
         for turn in range(max(m.repeats for m in entrants)):
             for k, method in enumerate(entrants):

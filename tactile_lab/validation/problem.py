@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit, FloatArray
-from tactile_lab.model.compiled import entry
+from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.equations import V_P as closed_V_P
 from tactile_lab.model.equations import rest_point
 from tactile_lab.model.integrator import TAU_L, Q_at
@@ -28,6 +28,22 @@ from tactile_lab.waveform import Waveform
 
 class OutOfTimeError(SolverError):
     """A solver used more than the time it was given."""
+
+
+class Answer(NamedTuple):
+    """What a method found.
+
+    Attributes:
+        spike_times: s.
+        V_C1: at the end, V.
+        evaluations: of the right-hand side; None where it is not known.
+        estimate: its own estimate of the largest error of a spike time, s.
+    """
+
+    spike_times: FloatArray
+    V_C1: float
+    evaluations: int | None = None
+    estimate: float | None = None
 
 
 def spent() -> float:
@@ -106,6 +122,11 @@ class Problem:
             V_P = closed_V_P(self.circuit, V_P, p / k_F if k_F else 0.0, float(t1 - t0))
         return found
 
+    @cached_property
+    def table(self) -> FloatArray:
+        """`segments` as the compiled methods take them."""
+        return np.array(self.segments)
+
     @property
     def stiffness(self) -> float:
         """Largest over smallest rate of the Jacobian along the quasi-static path."""
@@ -133,26 +154,42 @@ def _fastest_rate(V_P: float, par: FloatArray) -> float:
     return float(par[1] + from_zero * np.exp(-y / par[0]))
 
 
-@entry
-def right_hand_side(
+@inner
+def slopes(
     s: float,
-    y1: float,
-    y2: float,
+    y: float,
+    v: float,
     V0: float,
     p: float,
     held: bool,
     par: FloatArray,
+    both: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Eqs. (7), (8) and (16) to (18), V/s, compiled for everybody."""  # fmt: skip
+    """Eqs. (7), (8) and (16) to (18), V/s; `both` holds six numbers of room."""
     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
     if par[SATURATES] != 0.0:
-        both = np.empty(6)
-        flow(B, y1, y2, held, par, both)
+        flow(B, y, v, held, par, both)
         out[0], out[1] = both[TO_A], both[TO_C2]
         return
-    out[0] = slope_at(B, y1, par)
-    out[1] = 0.0 if held else (Q_at(y1, par) - y2) / par[TAU_L]
+    out[0] = slope_at(B, y, par)
+    out[1] = 0.0 if held else (Q_at(y, par) - v) / par[TAU_L]
+
+
+def _build(stamp: int) -> Callable[..., Any]:
+    @entry
+    def right_hand_side(
+        s: float, y: float, v: float, V0: float, p: float, held: bool, par: FloatArray,
+        both: FloatArray, out: FloatArray,
+    ) -> None:  # fmt: skip
+        _ = stamp
+        slopes(s, y, v, V0, p, held, par, both, out)
+
+    return right_hand_side
+
+
+right_hand_side = _build(source_stamp())
+"""`slopes` for whoever calls from Python."""
 
 
 Piece = Callable[[float, float, FloatArray, bool, Any], tuple[float, FloatArray, bool]]
@@ -160,19 +197,17 @@ Piece = Callable[[float, float, FloatArray, bool, Any], tuple[float, FloatArray,
 state there, and whether V_C2 reached V_fire."""
 
 
-def march(
-    problem: Problem, piece: Piece, cap: float, most: int = 2_000_000
-) -> tuple[FloatArray, float]:
-    """Spike times and the last V_C1 by a general solver, restarted at every event.
+def march(problem: Problem, piece: Piece, cap: float, most: int = 2_000_000) -> Answer:
+    """The answer of a general solver called from Python, restarted at every event.
 
     Raises:
         OutOfTimeError: more than `cap` s of CPU time.
     """
     c, par = problem.circuit, problem.par
     deadline = Deadline(cap)
-    y = np.array(problem.first)
+    y, both = np.array(problem.first), np.empty(6)
     spikes: list[float] = []
-    resume = -1.0
+    resume, evaluations = -1.0, 0
     for t0, t1, V0, p in problem.segments:
         s, T = 0.0, t1 - t0
         while s < T:
@@ -183,12 +218,15 @@ def march(
                 at: float, state: FloatArray, V0: float = V0, p: float = p,
                 held: bool = held,
             ) -> FloatArray:  # fmt: skip
+                nonlocal evaluations
+                evaluations += 1
                 if deadline.passed():
                     raise OutOfTimeError(f"stopped after {cap:g} s")
                 out = np.empty(2)
                 right_hand_side(
-                    float(at), float(state[0]), float(state[1]), V0, p, held, par, out
-                )
+                    float(at), float(state[0]), float(state[1]), V0, p, held, par,
+                    both, out,
+                )  # fmt: skip
                 return out
 
             fired = False
@@ -205,4 +243,4 @@ def march(
                 y[1] = c.reset_voltage
                 if c.reset_time > 0:
                     resume = t0 + s + c.reset_time
-    return np.array(spikes), float(y[0])
+    return Answer(np.array(spikes), float(y[0]), evaluations)

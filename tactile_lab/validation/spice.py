@@ -11,7 +11,7 @@ import numpy as np
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import FloatArray
-from tactile_lab.validation.problem import OutOfTimeError, Problem
+from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem
 
 RESET_RESISTANCE = 100.0
 """Of the switch that empties C2, Ohm."""
@@ -83,7 +83,7 @@ def _force_points(problem: Problem) -> list[tuple[float, float]]:
     return found
 
 
-def ngspice(problem: Problem, reltol: float, cap: float) -> tuple[FloatArray, float]:
+def ngspice(problem: Problem, reltol: float, cap: float) -> Answer:
     """Run ngspice in a process of its own; spikes by interpolation of its output.
 
     Raises:
@@ -108,7 +108,7 @@ def ngspice(problem: Problem, reltol: float, cap: float) -> tuple[FloatArray, fl
         table = np.loadtxt(out, ndmin=2)
     c = problem.circuit
     spikes = resets(table[:, 0], table[:, 1], c.fire_voltage, c.reset_voltage, c.tau_L)
-    return spikes, float(table[-1, 2])
+    return Answer(spikes, float(table[-1, 2]))
 
 
 def resets(

@@ -5,10 +5,11 @@ import pytest
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.validation import general, spice
-from tactile_lab.validation.accuracy import fastest, table, write_csv
-from tactile_lab.validation.contest import Method, Truth, judge, ours
-from tactile_lab.validation.problem import OutOfTimeError, Problem
+from tactile_lab.model.state import Start
+from tactile_lab.validation import general, rivals, spice
+from tactile_lab.validation.accuracy import fastest, order, table, write_csv
+from tactile_lab.validation.contest import COMPILED, Method, Row, Truth, judge, ours
+from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem
 from tactile_lab.waveform import Waveform
 
 PROBLEM = Problem(
@@ -18,22 +19,78 @@ PROBLEM = Problem(
 
 @pytest.fixture(scope="module")
 def exact():
-    spikes, V_C1 = ours(PROBLEM, 10.0, 1e-12)
-    return Truth(spikes, V_C1)
+    found = ours(PROBLEM, 10.0, 1e-12)
+    return Truth(found.spike_times, found.V_C1)
 
 
 def test_a_general_solver_agrees(exact):
-    spikes, V_C1 = general.scipy_solver(PROBLEM, "LSODA", 1e-10, 30.0)
-    assert spikes == pytest.approx(exact.spike_times, abs=1e-7)
-    assert V_C1 == pytest.approx(exact.V_C1, abs=1e-7)
+    found = general.scipy_solver(PROBLEM, "LSODA", 1e-10, 30.0)
+    assert found.spike_times == pytest.approx(exact.spike_times, abs=1e-7)
+    assert found.V_C1 == pytest.approx(exact.V_C1, abs=1e-7)
 
 
-def test_fixed_steps_get_better_with_shorter_ones(exact):
-    errors = []
-    for dt in (1e-5, 1e-6):
-        spikes, _ = general.fixed_step(PROBLEM, 1, dt, 30.0)
-        errors.append(np.max(np.abs(spikes - exact.spike_times)))
-    assert errors[1] < 0.3 * errors[0]
+def error(answer, exact):
+    return np.max(np.abs(answer.spike_times - exact.spike_times))
+
+
+@pytest.mark.parametrize(
+    ("order", "events", "falls"),
+    [
+        (rivals.EULER, rivals.ON_GRID, 4),
+        (rivals.EULER, rivals.INTERPOLATED, 4),
+        (rivals.RK4, rivals.ON_GRID, 4),
+        (rivals.RK4, rivals.INTERPOLATED, 2000),
+    ],
+    ids="euler euler-located rk4 rk4-located".split(),
+)
+def test_fixed_steps_have_their_order(exact, order, events, falls):
+    """Ten times shorter steps: ten times less, or 10^4 with RK4 and a cubic."""
+    errors = [
+        error(rivals.fixed_step(PROBLEM, 30.0, order, events, dt), exact)
+        for dt in (4.1e-5, 4.1e-6)
+    ]
+    assert errors[0] > falls * errors[1]
+
+
+@pytest.mark.parametrize(
+    "circuit",
+    [Circuit(), Circuit(firing="put"), Circuit(saturation=True)],
+    ids="lif put saturated".split(),
+)
+@pytest.mark.parametrize("method", [rivals.DORMAND_PRINCE, rivals.RODAS])
+def test_compiled_rivals_converge(circuit, method):
+    force = Waveform.through([(0, 0), (0.02, 0), (0.03, 0.19)])
+    problem = Problem("ramp", circuit, force, 0.15)
+    exact = ours(problem, 10.0, 1e-12)
+    assert exact.spike_times.size
+    coarse, fine = (rivals.stepped(problem, 30.0, method, tol) for tol in (1e-6, 1e-11))
+    assert error(coarse, exact) < 1e-5
+    assert error(fine, exact) < 1e-9
+    assert fine.V_C1 == pytest.approx(exact.V_C1, abs=1e-9)
+    assert fine.evaluations > 2 * coarse.evaluations
+
+
+def test_a_rival_stops_in_time_and_says_nan():
+    with pytest.raises(OutOfTimeError, match="evaluations"):
+        rivals.stepped(PROBLEM, 1e-5, rivals.RODAS, 1e-9)
+    fast = Problem(
+        "1 N",
+        Circuit(),
+        Waveform.constant(0.0),
+        0.1,
+        Start(V_P=5.0, V_C1=4.0, V_C2=0.0),
+    )
+    with pytest.raises(SolverError, match="NaN"):
+        rivals.fixed_step(fast, 1.0, rivals.RK4, rivals.ON_GRID, 1e-3)
+
+
+def test_the_order_is_the_slope_over_the_evaluations():
+    rows = [
+        Row("s", "m", "dt", COMPILED, "right", 1, 1e-5 * n**-4.0, evaluations=n)
+        for n in (1, 2, 4, 8)
+    ]
+    assert order(rows) == pytest.approx(4.0)
+    assert order(rows[:2]) is None
 
 
 def test_a_charge_that_leaks_away_below_the_threshold_is_no_spike():
@@ -57,7 +114,7 @@ def test_verdicts(exact, tmp_path):
         raise SolverError("the solution is NaN")
 
     def wrong(problem, cap):
-        return np.array([0.1]), 1.0
+        return Answer(np.array([0.1]), 1.0)
 
     rows = [
         judge(PROBLEM, Method("m", "s", solve), exact, 5.0)
