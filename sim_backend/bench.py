@@ -2,47 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
 from sim_backend.world import WiredInputs, World
-from tactile_lab.bench import Bench, Channel
+from tactile_lab.bench import Bench, Channel, Followers
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.engine.bench import equipped
 from tactile_lab.instruments.registry import far_end
 from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.scene import Scene
-from tactile_lab.scene.tables import Simulated
+
+NO_FOLLOWERS = Followers(input_bias=0.0, bandwidth=0.0)
+"""Probes that lie at the nodes themselves."""
 
 
 def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
     """The physical world of a scene's simulated bench, or `world` with its sensor."""
+    true = scene.simulated.deviation.circuit(scene.sensor.circuit)
     return Plant(
-        scene.circuit,
-        scene.bench.magnet,
-        world or options(scene.simulated, _inputs(scene)),
-        scene.simulated.seed,
+        true, scene.bench.magnet, world or options(scene), scene.simulated.seed
     )
 
 
-def _inputs(scene: Scene) -> dict[str, str]:
-    """The scope's input of each wired signal."""
-    scope = scene.bench.scope
-    return {} if scope is None else {c.signal: c.input for c in scope.channels}
-
-
-def options(
-    simulated: Simulated, inputs: Mapping[str, str] | None = None
-) -> PlantOptions:
-    """Parts of the world as the scene's ``[simulated]`` table switches them.
-
-    Args:
-        simulated: the table.
-        inputs: scope input by signal, for mistakes in the wiring.
-    """
-    inputs = inputs or {}
+def options(scene: Scene) -> PlantOptions:
+    """Parts of the world: as the bench file has them, and how far that is wrong."""
+    bench, simulated = scene.bench, scene.simulated
+    scope, deviation = bench.scope, simulated.deviation
+    inputs = {} if scope is None else {c.signal: c.input for c in scope.channels}
+    followers = bench.followers or NO_FOLLOWERS
     here = [signal for signal in simulated.swapped if signal in inputs]
     return PlantOptions(
         wired={
@@ -55,15 +45,18 @@ def options(
             if s in inputs
         },
         inverted_coil=simulated.inverted_coil,
-        follower=simulated.follower,
-        offset=simulated.follower_offset,
-        bias=simulated.input_bias,
+        follower=followers.bandwidth > 0,
+        follower_pole=followers.bandwidth or 1.0,
+        slew=followers.slew,
+        offset=deviation.offset,
+        bias=followers.input_bias,
         noise=simulated.noise,
         hum=simulated.hum,
         hysteresis=simulated.hysteresis,
         attraction=simulated.attraction,
-        coil_lag=simulated.coil_lag,
-        eddy_lag=simulated.eddy_lag,
+        coil_lag=bench.magnet.coil_lag,
+        eddy_lag=bench.magnet.eddy_lag + deviation.lag,
+        force=1 + deviation.force,
         drift=simulated.clock_error,
     )
 

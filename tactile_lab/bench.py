@@ -44,6 +44,28 @@ class CoilLimits(SceneTable):
     resistance: Annotated[float, Unit("Ohm", above=0.0)] | None = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Followers(SceneTable):
+    """The voltage followers between the circuit's nodes and the scope: ``[followers]``.
+
+    A TL074: 65 pA typical and 200 pA at most, 3 mV and 10 mV, 3 MHz, 13 V/us.
+
+    Attributes:
+        input_bias: current of the follower at V_C2 into that node, A; 65 pA through
+            R_L is 32 mV.
+        input_bias_uncertainty: half of its 95 % band, A.
+        offset_uncertainty: half of the 95 % band of an output's offset, V.
+        bandwidth: Hz; 0 for infinitely fast ones.
+        slew: largest rate of the output, V/s.
+    """
+
+    input_bias: Annotated[float, Unit("A")] = 65e-12
+    input_bias_uncertainty: Annotated[float, Unit("A", least=0.0)] = 0.0
+    offset_uncertainty: Annotated[float, Unit("V", least=0.0)] = 0.0
+    bandwidth: Annotated[float, Unit("Hz", least=0.0)] = 3e6
+    slew: Annotated[float, Unit("V/s", above=0.0)] = 13e6
+
+
 @dataclass(frozen=True)
 class Reading:
     """One value an instrument reported, with the clock's time of its arrival, s."""

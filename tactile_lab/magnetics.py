@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.calibration import Calibration, CalibrationFile
 from tactile_lab.errors import LimitError, ParameterError
-from tactile_lab.quantity import Unit, show
+from tactile_lab.lag import Lag
+from tactile_lab.quantity import Pause, Unit, show
 from tactile_lab.table import SceneTable
 from tactile_lab.waveform import Waveform
 
@@ -61,6 +62,10 @@ class Magnet(SceneTable):
         geometry_uncertainty: half of the 95 % band of Eq. (2)'s r, A1, A2 and B1
             together, as a part of the force, from 0 to below 1; None where nobody has
             stated it.
+        coil_lag: L/R of the coil, s: the current's lag behind the set-point.
+        eddy_lag: lag of the field behind the current, s.
+        lag_uncertainty: half of the 95 % band of their sum, s; None where nobody has
+            measured the lags.
         allow_expired: use the calibration beyond its date nevertheless.
         allow_other_coil: use it with another source than it was made with.
 
@@ -75,6 +80,9 @@ class Magnet(SceneTable):
     B2_per_ampere: Annotated[float, Unit("T/A")] = 0.011
     calibration: Annotated[Calibration | None, CalibrationFile()] = None
     geometry_uncertainty: float | None = None
+    coil_lag: Pause = 0.0
+    eddy_lag: Pause = 0.0
+    lag_uncertainty: Pause | None = None
     allow_expired: bool = False
     allow_other_coil: bool = False
 
@@ -202,6 +210,23 @@ class Magnet(SceneTable):
             current = Waveform(current.time, np.clip(current.value, *ends))
         bent = _with_kinks(current, self.calibration.current)
         return Waveform(bent.time, self.force(bent.value))
+
+    @property
+    def lag(self) -> Lag:
+        """Of the field behind the set-point."""
+        return Lag(self.coil_lag, self.eddy_lag)
+
+    def lagged_force(
+        self, setpoint: Waveform, before: tuple[float, float] | None = None
+    ) -> tuple[Waveform, tuple[float, float]]:
+        """The force, N, while the source is set to `setpoint`, lags included.
+
+        Args:
+            setpoint: A, piecewise linear; beyond the calibration its last value holds.
+            before: as `Lag.follow` takes and gives it.
+        """
+        field, after = self.lag.follow(setpoint, before)
+        return self.force_for(field, beyond="hold"), after
 
     def _inverse(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         assert self.calibration is not None

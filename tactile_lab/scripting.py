@@ -166,7 +166,7 @@ def simulate(
         )
     from tactile_lab.planning.preview import model, modelled
 
-    scene = load(what, force)
+    scene = load(what, force).sensor_alone
     drive = timeline(scene, through_coil=False)
     wanted = keep or modelled(scene)
     return model(scene, drive.force, drive.duration, wanted, tolerance)

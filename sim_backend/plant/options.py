@@ -15,7 +15,7 @@ from tactile_lab.scene.tables import NOISE
 SCOPE_NOISE = {**NOISE, "field": 1e-3}
 """Standard deviation at the scope's input, V."""
 
-_POSITIVE = ("follower_pole", "slew", "mains")
+_POSITIVE = ("follower_pole", "slew", "mains", "force")
 _NOT_NEGATIVE = ("hum", "coil_lag", "eddy_lag", "hysteresis", "attraction", "pickup")
 
 
@@ -35,6 +35,7 @@ class PlantOptions:
         mains: its frequency, Hz.
         coil_lag: L/R of the coil, s.
         eddy_lag: lag of the field behind the current, s.
+        force: force over what the magnet gives at that field.
         hysteresis: half-width of the core's loop, A; 0.03 to 0.07 for mild steel.
         attraction: pull of the permanent magnet on the core, N; the same at every
             current, so it is no drive; 23 mN at 5 mm, 3.9 mN at 8 mm, by the
@@ -61,6 +62,7 @@ class PlantOptions:
     mains: float = 50.0
     coil_lag: float = 1.1e-3
     eddy_lag: float = 3e-3
+    force: float = 1.0
     hysteresis: float = 0.0
     attraction: float = 0.0
     winding: Winding = field(default_factory=Winding)

@@ -44,14 +44,14 @@ class _Drive:
     ) -> None:
         self._electromagnet = electromagnet
         self._magnet = magnet
-        self._attraction = options.attraction
+        self._attraction, self._scale = options.attraction, options.force
         self._sign = -1.0 if options.inverted_coil else 1.0
         self.next_command = electromagnet.next_command
         self.latest_command = electromagnet.latest_command
 
     def force(self, start: float, end: float) -> Waveform:
         time, current = self._electromagnet.foreseen(start, end)
-        drive = self._magnet.force(current * self._sign)
+        drive = self._magnet.force(current * self._sign) * self._scale
         return Waveform(time, drive + self._attraction)
 
 
@@ -95,7 +95,7 @@ class Plant(DrivenCoil):
         """Force on the cantilever at `time` s, the constant attraction included, N."""
         with self._lock:
             drive = float(self.magnet.force(self._effective(time)))
-            return drive + self.options.attraction
+            return drive * self.options.force + self.options.attraction
 
     def accuracy(self) -> str:
         """How far the computed circuit is from its equations' exact solution."""

@@ -148,7 +148,7 @@ class Account:
                 self._current.append(applied)
                 row = (self.axis(applied.time), applied.setpoint, applied.measured)
                 self.journal.current(*row, applied.ratio)
-                self.emit(events.CoilCurrent(*row))
+                self.emit(events.CoilCurrent(*row, asked=self.axis(applied.asked)))
         if meter is not None:
             for reading in meter.take_readings():
                 self.field(self.axis(reading.time), reading.value)

@@ -62,11 +62,26 @@ class Progress:
 
 @dataclass(frozen=True)
 class CoilCurrent:
-    """Set-point last sent and current read back, A, at a time on the run's axis, s."""
+    """Set-point last sent and current read back, A, at a time on the run's axis, s.
+
+    Attributes:
+        asked: when the source was addressed, s: it acted between then and `time`.
+    """
 
     time: float
     setpoint: float
     measured: float | None
+    asked: float | None = None
+
+    @property
+    def acted(self) -> float:
+        """When the source is taken to have acted, s: half-way, as far as is known."""
+        return self.time if self.asked is None else (self.asked + self.time) / 2
+
+    @property
+    def amperes(self) -> float:
+        """As read back, or where it was not, as sent."""
+        return self.setpoint if self.measured is None else self.measured
 
 
 @dataclass(frozen=True)

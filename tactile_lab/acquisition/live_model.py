@@ -37,7 +37,7 @@ class LiveModel:
         self._points: SimpleQueue[tuple[float, float]] = SimpleQueue()
         self._later: tuple[float, float] | None = None
         self._state = start or rest(circuit)
-        self._amperes = 0.0
+        self._amperes, self._field = 0.0, (0.0, 0.0)
 
     @classmethod
     def of(cls, scene: Scene) -> LiveModel:
@@ -78,8 +78,11 @@ class LiveModel:
             times.append(at)
             amperes.append(value)
         self._amperes = amperes[-1]
+        if end > times[-1]:
+            times.append(end)
+            amperes.append(amperes[-1])
         current = Waveform(np.array(times), np.array(amperes))
-        force = self._magnet.force_for(current, beyond="hold")
+        force, self._field = self._magnet.lagged_force(current, self._field)
         self._state, out = advance(
             self._circuit, self._state, force, end, keep=KEEP, tolerance=TOLERANCE
         )

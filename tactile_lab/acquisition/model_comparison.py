@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tactile_lab.acquisition.events import CoilCurrent
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import TactileLabError
@@ -11,12 +13,14 @@ from tactile_lab.quantity import printed
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome
 
+FloatArray = NDArray[np.float64]
+
 
 class ModelComparison:
     """Compares each outcome with the model under the current that was applied.
 
-    The host's times of set-points are used as they are; the report puts each edge where
-    the shunt saw it.
+    Each set-point is taken to act half-way between asking the source and hearing from
+    it, and how far that may be off is said; the report puts it where the shunt saw it.
 
     Args:
         scene: what is run.
@@ -26,12 +30,14 @@ class ModelComparison:
     def __init__(self, scene: Scene, *, searched: bool) -> None:
         self._model: LiveModel | None = LiveModel.of(scene)
         self._searched = searched
+        self._late = 0.0
         self._model.until(0.0)  # compiles, before the coil waits for anything
 
-    def add(self, at: float, amperes: float) -> None:
-        """The current `amperes` A was applied at run time `at` s."""
+    def add(self, applied: CoilCurrent) -> None:
+        """The source has given a current."""
         if self._model is not None:
-            self._model.add(at, amperes)
+            self._late = max(self._late, applied.time - applied.acted)
+            self._model.add(applied.acted, applied.amperes)
 
     def ended(self, outcome: Outcome) -> str:
         """One sentence on a trial; "" where there is nothing to compare.
@@ -54,7 +60,7 @@ class ModelComparison:
             told = []
             if self._searched:
                 spikes = out.spike_times
-                told.append(_spikes(outcome, np.empty(0) if spikes is None else spikes))
+                told.append(self._spikes(outcome, spikes))
             if inside.any():
                 predicted = out.sample("V_C1", time[inside])
                 off = trace[inside, 1] - predicted
@@ -69,16 +75,19 @@ class ModelComparison:
             return ""
         return f"{trial.label}: measured less model: {', '.join(told)}"
 
-
-def _spikes(outcome: Outcome, predicted: np.ndarray) -> str:
-    start, length = outcome.start, outcome.trial.length
-    mine = predicted[(predicted >= start) & (predicted < start + length)] - start
-    count = outcome.spike_times.size
-    text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
-    offsets = match(outcome.spike_times, mine).offsets
-    if offsets.size:
-        text += f", {_signed(1e3 * float(np.median(offsets)))} ms (median)"
-    return text
+    def _spikes(self, outcome: Outcome, spikes: FloatArray | None) -> str:
+        start, length = outcome.start, outcome.trial.length
+        predicted = np.empty(0) if spikes is None else spikes
+        mine = predicted[(predicted >= start) & (predicted < start + length)] - start
+        count = outcome.spike_times.size
+        text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
+        offsets = match(outcome.spike_times, mine).offsets
+        if offsets.size:
+            text += f", {_signed(1e3 * float(np.median(offsets)))} ms (median"
+            if self._late > 0:
+                text += f"; the coil's steps are known to ±{1e3 * self._late:.2g} ms"
+            text += ")"
+        return text
 
 
 def _signed(value: float) -> str:

@@ -193,9 +193,9 @@ class Narrator:
         if progress is None:
             return
         match event:
-            case events.CoilCurrent(time=at, setpoint=sent, measured=read):
+            case events.CoilCurrent():
                 if self._model is not None:
-                    self._model.add(at, sent if read is None else read)
+                    self._model.add(event)
             case events.TrialEnded(outcome=outcome):
                 told = "" if self._model is None else self._model.ended(outcome)
                 if told:

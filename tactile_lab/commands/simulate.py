@@ -42,14 +42,14 @@ def command(
 ) -> None:
     """Simulate the sensor of SCENE (the demo unless given) under its force.
 
-    Opens no bench and writes nothing: no coil, calibration or limit applies.
+    Opens no bench and writes nothing: no coil, calibration, follower or limit applies.
     """
     with refusing():
         from tactile_lab.planning.preview import model, modelled
         from tactile_lab.planning.timeline import timeline
         from tactile_lab.scene.load import load
 
-        loaded = load(scene, overrides, bench)
+        loaded = load(scene, overrides, bench).sensor_alone
         drive = timeline(loaded, through_coil=False)
         with working("solving the model"):
             result = model(

@@ -177,8 +177,7 @@ class ServedTask:
     def emit(self, event: Event) -> None:
         """The task tells something."""
         if self.model is not None and isinstance(event, CoilCurrent):
-            read = event.measured
-            self.model.add(event.time, event.setpoint if read is None else read)
+            self.model.add(event.acted, event.amperes)
         self._tell(event)
 
     def ask(self, text: str) -> str:

@@ -124,6 +124,7 @@ class _Driver:
         self._limited: list[tuple[str, str]] = []
         self._time = 0.0
         self._amperes = 0.0
+        self._field = (0.0, 0.0)
         self._heat = 0.0
 
     def take(self, trial: Trial) -> Outcome:
@@ -172,7 +173,8 @@ class _Driver:
                 f"{show(spent, 's')} after its start. Ask for less force, a shorter "
                 "hold, or a longer rest before it."
             )
-        return bench.magnet.force_for(current, beyond="hold"), current
+        force, self._field = bench.magnet.lagged_force(current, self._field)
+        return force, current
 
     def timeline(self) -> Timeline:
         force = joined([(step.start, step.force) for step in self.steps])

@@ -173,6 +173,13 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
             f"B1 = {show(magnet.B1, 'T')}, B2 = {show(magnet.B2_per_ampere, 'T')} "
             f"per ampere: {per_ampere}"
         ]
+    lines += _followers(scene)
+    if magnet.coil_lag or magnet.eddy_lag:
+        known = _band(magnet.lag_uncertainty, "s")
+        lines.append(
+            f"lags: coil {show(magnet.coil_lag, 's')}, core "
+            f"{show(magnet.eddy_lag, 's')}, together{known}"
+        )
     if not bench.simulated:
         return tuple(lines)
     world = scene.simulated
@@ -181,15 +188,32 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
         lines.append(
             f"simulated source: {bench.coil.dialect}{baud}, wire and parse time pass"
         )
-    shift = world.input_bias * scene.circuit.R_L
-    lines.append(
-        f"followers: input bias {show(world.input_bias, 'A')} shifts V_C2 by "
-        f"{show(shift, 'V', 2)}, offset {show(world.follower_offset, 'V')}, "
-        f"{'3 MHz and 13 V/µs' if world.follower else 'infinitely fast'}"
-    )
     noise = ", ".join(f"{name} {show(sd, 'V')}" for name, sd in world.noise.items())
     codes = ""
     if needed.channels and bench.scope is not None:
         codes = f"; {scope_capability(bench.scope).bits}-bit codes"
     lines.append(f"noise (seed {world.seed}): {noise}{codes}")
     return tuple(lines)
+
+
+def _followers(scene: Scene) -> Iterator[str]:
+    followers = scene.bench.followers
+    if followers is None:
+        return
+    bias, circuit = followers.input_bias, scene.circuit
+    fast = (
+        f"{show(followers.bandwidth, 'Hz')} and {followers.slew * 1e-6:g} V/µs"
+        if followers.bandwidth
+        else "infinitely fast"
+    )
+    yield (
+        f"followers: input bias {show(bias, 'A')}"
+        f"{_band(followers.input_bias_uncertainty, 'A')} shifts V_C2 by "
+        f"{show(bias * circuit.R_L, 'V', 2)}; offset "
+        f"±{show(followers.offset_uncertainty, 'V')}; {fast}"
+    )
+
+
+def _band(half: float | None, unit: str) -> str:
+    """An uncertainty behind its value."""
+    return " (not stated how well)" if half is None else f" ±{show(half, unit)} (95 %)"

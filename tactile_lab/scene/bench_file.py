@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, ValidationInfo
 from typing_extensions import TypedDict
 
-from tactile_lab.bench import Channel, CoilLimits
+from tactile_lab.bench import Channel, CoilLimits, Followers
 from tactile_lab.errors import choices
 from tactile_lab.instruments.registry import (
     BY_PERSON,
@@ -161,6 +161,7 @@ class BenchSpec(SceneTable):
         notes: kept with each run.
         coil, scope, field_meter: None where the bench has none.
         magnet: force per current.
+        followers: between circuit and scope; None: no follower loads the circuit.
         hand_set: circuit voltages set by hand, by name, V.
 
     Raises:
@@ -175,6 +176,7 @@ class BenchSpec(SceneTable):
     scope: ScopeSpec | None = None
     field_meter: FieldMeterSpec | None = None
     magnet: Magnet
+    followers: Followers | None = None
     hand_set: HandSet = field(default_factory=HandSet)
 
     def __post_init__(self) -> None:

@@ -38,6 +38,13 @@ SIMULATED = "sim"
 """Name of the built-in simulated bench."""
 DEAD = {"field_meter": ("interval",)}
 """Keys of a bench that nobody ever read; runs and bench files of before have them."""
+MOVED = {
+    "input_bias": ("followers", "input_bias"),
+    "coil_lag": ("magnet", "coil_lag"),
+    "eddy_lag": ("magnet", "eddy_lag"),
+}
+"""Keys of ``[simulated]`` that are the bench's now: table and key there; scenes and
+runs of before have them."""
 
 
 def load(
@@ -102,7 +109,7 @@ def resolve(
         if not isinstance(table, dict):
             raise complaint((name,), "this must be a table, not a value.", blame)
     _refuse_not_finite(data, blame)
-    frozen = _lists_to_tuples(data)
+    frozen = _moved(_lists_to_tuples(data))
     folder = path.parent
     spec = _bench(frozen.get("bench", {}), folder, blame)
     hand_set = dumped(spec).get("hand_set", {})
@@ -290,6 +297,26 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
     if path is not None:
         folder, merged["file"] = path.parent, str(path)
     return validated(BenchSpec, merged, ("bench",), blame, folder)
+
+
+def _moved(data: dict[str, Any]) -> dict[str, Any]:
+    """`data` with what `[simulated]` once said of the bench where it is now."""
+    bench = dict(data.get("bench", {}))
+    if "file" in bench and "simulated" not in bench:
+        return data  # what the file says of the bench counts
+    world = dict(data.get("simulated", {}))
+    old = {key: world.pop(key) for key in MOVED if key in world}
+    fast, offset = world.pop("follower", None), world.pop("follower_offset", None)
+    if offset is not None:
+        world["deviation"] = {"offset": offset, **world.get("deviation", {})}
+    # a real bench's run holds these keys too, and they meant nothing
+    if bench.get("simulated", True):
+        for key, value in old.items():
+            table, name = MOVED[key]
+            bench[table] = {name: value, **bench.get(table, {})}
+        if fast is False:
+            bench["followers"] = {"bandwidth": "0 Hz", **bench.get("followers", {})}
+    return {**data, "simulated": world, "bench": bench}
 
 
 def _living(bench: dict[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -48,10 +49,18 @@ class Scene:
     coil: CoilUse
     conditions: Conditions
 
-    @property
+    @cached_property
     def circuit(self) -> Circuit:
-        """The sensor's parameters."""
-        return self.sensor.circuit
+        """The sensor as it is believed to be on this bench, its followers connected."""
+        followers = self.bench.followers
+        if followers is None:
+            return self.sensor.circuit
+        return replace(self.sensor.circuit, I_bias=followers.input_bias)
+
+    @property
+    def sensor_alone(self) -> Scene:
+        """The same with nothing connected to the sensor."""
+        return replace(self, bench=replace(self.bench, followers=None))
 
     @property
     def start(self) -> Start | None:

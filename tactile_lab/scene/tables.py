@@ -10,14 +10,13 @@ from pydantic import AfterValidator, Field, ValidationInfo
 
 from tactile_lab.errors import choices
 from tactile_lab.quantity import (
-    Current,
     Duration,
     Pause,
     SampleRate,
     Unit,
-    Voltage,
     parse,
 )
+from tactile_lab.scene.deviation import Deviation
 from tactile_lab.signals import SIGNALS
 from tactile_lab.table import SceneTable
 
@@ -190,18 +189,13 @@ Probes = Annotated[tuple[str, ...], AfterValidator(_scope_signals)]
 class Simulated(SceneTable):
     """``[simulated]``: the physics of the simulated bench; no effect on a real one.
 
-    A 0 switches a part off.
+    A 0 switches a part off. Followers and lags are those of the bench file.
 
     Attributes:
         seed: of all noise; the same seed gives the same stored samples.
         noise: standard deviation per channel at the scope's input, V.
-        follower: voltage followers' bandwidth (3 MHz) and slew rate (13 V/us).
-        follower_offset: offset voltage of the followers, V.
-        input_bias: a follower's input bias into V_C2, A; 65 pA through R_L is 32 mV.
         field_noise: standard deviation of a teslameter's reading, T.
         hum: amplitude of 50 Hz mains hum on every channel, V.
-        coil_lag: the coil's L/R, s.
-        eddy_lag: lag of the field behind the current, s.
         hysteresis: half-width of the core's loop, A; 0.03 A to 0.07 A for mild steel.
         attraction: the magnet's pull on the core, N; the same at every current.
         clock_error: relative error of the scope's sample clock; 50e-6 is 50 ppm. More
@@ -212,19 +206,15 @@ class Simulated(SceneTable):
         inverted_coil: mistake: the coil's leads are exchanged.
         coil_unplugged: mistake: the current source's plug is pulled so long after the
             bench is opened, s; never if left out.
+        deviation: what bench file and sensor have wrong.
     """
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     noise: Annotated[dict[str, Noise], AfterValidator(_with_default_noise)] = field(
         default_factory=lambda: dict(NOISE)
     )
-    follower: bool = True
-    follower_offset: Voltage = 0.0
-    input_bias: Current = 65e-12
     field_noise: FieldNoise = 2e-6
     hum: Noise = 0.0
-    coil_lag: Pause = 1.1e-3
-    eddy_lag: Pause = 3e-3
     hysteresis: HalfWidth = 0.0
     attraction: Pull = 0.0
     clock_error: Annotated[float, Field(ge=-1e-4, le=1e-4)] = 0.0
@@ -235,6 +225,7 @@ class Simulated(SceneTable):
     )
     inverted_coil: bool = False
     coil_unplugged: Duration | None = None
+    deviation: Deviation = field(default_factory=Deviation)
 
 
 @dataclass(frozen=True, kw_only=True)

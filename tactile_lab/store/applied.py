@@ -7,6 +7,7 @@ scope code of a 0.1 Ohm shunt is 16 mA, so it gives no level by itself.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -38,7 +39,7 @@ class AppliedCurrent:
     """What the coil carried.
 
     Attributes:
-        steps: shape (n, 2): from that time on, s, this current, A.
+        steps: shape (n, 2): from that time on, s, the source gives this current, A.
         ends: shape (n,): when the host heard of what came after each step, s.
         edges: number of steps whose time the shunt gave.
         lead: by how much those came before the host heard of them, s (median): all
@@ -56,6 +57,7 @@ def applied_current(
     setpoint: ArrayLike,
     measured: ArrayLike,
     shunt: Shunt | None = None,
+    coil_lag: float = 0.0,
 ) -> AppliedCurrent:
     """Join what source and shunt tell.
 
@@ -64,6 +66,8 @@ def applied_current(
         setpoint: A.
         measured: read back, A; not a number where it was not read.
         shunt: the recorded coil current; None where the run has none.
+        coil_lag: L/R of the coil, s: the current passes half of a step ln 2 times
+            that after the source stepped.
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
@@ -79,7 +83,7 @@ def applied_current(
         seen = np.full(begin.size, np.nan)
         for i in range(1, begin.size):
             at = _edge(shunt, begin[i - 1], begin[i], level[i - 1], level[i])
-            seen[i] = np.nan if at is None else at
+            seen[i] = np.nan if at is None else at - math.log(2) * coil_lag
         edges = int(np.isfinite(seen).sum())
         if edges >= ENOUGH:  # the small ones came as early as those the shunt shows
             lead = float(np.nanmedian(begin - seen))

@@ -298,10 +298,18 @@ class StoredRun:
 
     @property
     def applied(self) -> AppliedCurrent:
-        """The coil current: levels as read back, edges where the shunt saw them."""
+        """What the source gave: levels as read back, edges by what the shunt saw.
+
+        Raises:
+            SceneError: the run's scene cannot be read any more.
+        """
         rows = self.current
         return applied_current(
-            rows["time"], rows["setpoint"], rows["measured"], self.shunt
+            rows["time"],
+            rows["setpoint"],
+            rows["measured"],
+            self.shunt,
+            self.scene.bench.magnet.coil_lag,
         )
 
     @property
@@ -324,7 +332,7 @@ class StoredRun:
         """
         magnet = self.scene.bench.magnet
         current = held(self.applied.steps, self.duration)
-        return magnet.force_for(current, beyond="hold")
+        return magnet.lagged_force(current)[0]
 
     @property
     def field(self) -> Records:

@@ -3,6 +3,7 @@ import re
 import numpy as np
 import pytest
 
+from tactile_lab.acquisition.events import CoilCurrent
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.acquisition.model_comparison import ModelComparison
 from tactile_lab.model.circuit import Circuit
@@ -11,7 +12,15 @@ from tactile_lab.scene.load import load
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 
-SCENE = load("demo")
+SCENE = load(
+    "demo",
+    {
+        "bench.followers.input_bias": 0.0,
+        "bench.magnet.coil_lag": 0.0,
+        "bench.magnet.eddy_lag": 0.0,
+    },
+)
+LAGGED = load("demo")
 MAGNET = SCENE.bench.magnet
 PUSH = Trial(
     force=Waveform.through([(0, 0), (0, 0.15), (2, 0.15), (2, 0), (3, 0)]),
@@ -36,7 +45,7 @@ def outcome(circuit, start=1.0):
 def follow(beside, start=1.0):
     amperes = 0.15 / MAGNET.newtons_per_ampere
     for at, value in ((0.0, 0.0), (start, amperes), (start + 2, 0.0)):
-        beside.add(at, value)
+        beside.add(CoilCurrent(at, value, value, at))
 
 
 def test_a_trial_like_the_model_s_has_nothing_to_tell_but_that():
@@ -71,7 +80,7 @@ def test_pauses_are_followed_in_silence():
 @pytest.mark.parametrize("ahead", [0.0, 0.5, 9.0])
 def test_slices_of_any_size_give_the_same_model(ahead):
     points = [(0.0, 0.0), (0.3, 0.6), (0.9, 0.9), (2.0, 0.0)]
-    whole, parts = LiveModel.of(SCENE), LiveModel.of(SCENE)
+    whole, parts = LiveModel.of(LAGGED), LiveModel.of(LAGGED)
     for point in points:
         whole.add(*point)
     expected = whole.until(3.0).spike_times
@@ -80,5 +89,5 @@ def test_slices_of_any_size_give_the_same_model(ahead):
         while rest and rest[0][0] <= end + ahead:  # told before its turn, or not
             parts.add(*rest.pop(0))
         seen.append(parts.until(end).spike_times)
-    assert np.concatenate(seen) == pytest.approx(expected, abs=1e-6)
+    assert np.concatenate(seen) == pytest.approx(expected, abs=3e-5)
     assert parts.reached == 3.0

@@ -21,7 +21,7 @@ SHORT = ("protocol.hold=0.6 s", "record.sample_rate=20 kS/s")
 def checked(folder, *overrides, **faults):
     """The conclusion of a wiring check of a bench with those faults."""
     scene = load("wiring_check", (*SHORT, *overrides))
-    world = replace(options(scene.simulated), **faults)
+    world = replace(options(scene), **faults)
     done = Execution(
         scene, folder, bench=open_bench(scene, needs(scene), world=world)
     ).run()

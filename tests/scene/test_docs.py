@@ -11,6 +11,7 @@ from tactile_lab.complaint import known_keys
 from tactile_lab.model.state import Start
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.scene.deviation import Deviation
 from tactile_lab.scene.load import load, load_bench
 from tactile_lab.scene.sensor import Sensor
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
@@ -44,7 +45,7 @@ def test_an_example_loads(number, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "table", [Record, Detect, Simulated, CoilUse, Conditions, Sensor]
+    "table", [Record, Detect, Simulated, Deviation, CoilUse, Conditions, Sensor]
 )
 def test_every_key_of_a_table_is_documented(table):
     assert [key for key in known_keys(table, ()) if f"`{key}`" not in SCENES] == []
@@ -74,6 +75,7 @@ def test_every_key_of_a_bench_file_is_in_the_example():
         ("scope", "channels"),
         ("field_meter",),
         ("magnet",),
+        ("followers",),
         ("hand_set",),
     ):
         missing = set(known_keys(BenchSpec, at)) - parts

@@ -1,0 +1,59 @@
+"""Followers and lags are the bench's: plan, model and world know the same of them."""
+
+import numpy as np
+import pytest
+
+from sim_backend.bench import options, plant_of
+from tactile_lab.planning.plan import plan
+from tactile_lab.scene.load import load
+
+
+def test_the_world_is_as_the_bench_says_unless_it_deviates():
+    scene = load("demo")
+    world = options(scene)
+    assert (world.bias, world.coil_lag, world.eddy_lag) == (65e-12, 1.1e-3, 3e-3)
+    assert scene.circuit.I_bias == 65e-12
+    assert plant_of(scene).circuit == scene.circuit
+    off = load(
+        "demo",
+        {
+            "simulated.deviation": {
+                "V_GS": 2e-3, "input_bias": 30e-12, "R1": 0.02, "force": -0.03,
+                "lag": 4e-3,
+            }
+        },
+    )  # fmt: skip
+    true = plant_of(off)
+    assert true.circuit.V_GS == pytest.approx(1.402)
+    assert true.circuit.I_bias == pytest.approx(95e-12)
+    assert true.circuit.R1 == pytest.approx(9.58e6 * 1.02)
+    assert true.options.eddy_lag == pytest.approx(7e-3)
+    assert true.options.force == pytest.approx(0.97)
+    assert off.circuit == scene.circuit  # nobody told the model
+
+
+def test_the_force_of_a_plan_lags_behind_its_current():
+    quick = load("demo", {"bench.magnet.eddy_lag": 0.0, "bench.magnet.coil_lag": 0.0})
+    late = plan(load("demo"), preview=False).timeline.force
+    ideal = plan(quick, preview=False).timeline.force
+    # in the middle of the first ramp the force is behind by slope times lag
+    times = np.linspace(0, 3, 30001)
+    middle = times[np.argmax(ideal.at(times) >= 0.04)]
+    behind = (ideal.at(middle) - late.at(middle)) / (0.08 / 0.25)
+    assert behind == pytest.approx(4.1e-3, rel=1e-3)
+
+
+def test_a_scene_of_before_still_says_what_it_said():
+    old = load("demo", ["simulated.input_bias=10 pA", "simulated.eddy_lag=5 ms"])
+    assert old.bench.followers.input_bias == pytest.approx(10e-12)
+    assert old.bench.magnet.eddy_lag == 5e-3
+    assert options(old).bias == pytest.approx(10e-12)
+    ideal = load(
+        "demo", {"simulated.follower": False, "simulated.follower_offset": 1e-3}
+    )
+    assert options(ideal).follower is False
+    assert options(ideal).offset == 1e-3
+
+
+def test_a_sensor_alone_has_no_follower():
+    assert load("demo").sensor_alone.circuit.I_bias == 0.0

@@ -1,0 +1,69 @@
+"""Two lags in a row, against the differential equations stepped finely."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tactile_lab.lag import FINE, Lag
+from tactile_lab.waveform import Waveform
+
+
+def stepped(lag, wave, end, step=2e-6):
+    """The field by small steps; good to about `step` over the lag."""
+    y = z = float(wave.value[0])
+    times = np.arange(0.0, end, step)
+    field = np.empty(times.size)
+    for i, u in enumerate(wave.at(times + step / 2)):
+        field[i] = z
+        y = u if lag.coil == 0 else y + (u - y) * -np.expm1(-step / lag.coil)
+        z = y if lag.eddy == 0 else z + (y - z) * -np.expm1(-step / lag.eddy)
+    return times, field
+
+
+STAIRS = Waveform.through(
+    [(0, 0), (0.01, 0), (0.01, 0.5), (0.03, 0.5), (0.05, 1.0), (0.052, -0.2), (0.2, 0)]
+)
+
+
+@pytest.mark.parametrize(
+    "lag", [Lag(1.1e-3, 3e-3), Lag(3e-3, 1.1e-3), Lag(0, 3e-3), Lag(1.1e-3, 0)]
+)
+def test_ramps_and_steps_are_followed_as_the_equations_say(lag):
+    found, _ = lag.follow(STAIRS)
+    times, field = stepped(lag, STAIRS, 0.2)
+    assert np.abs(found.at(times) - field).max() < 2e-3
+
+
+def test_lags_that_are_alike_are_told_by_their_sum():
+    one, _ = Lag(2e-3, 2e-3).follow(STAIRS)
+    times, field = stepped(Lag(2e-3, 2e-3), STAIRS, 0.2)
+    assert np.abs(one.at(times) - field).max() < 3e-3
+
+
+def test_slices_follow_as_the_whole_does():
+    lag = Lag(1.1e-3, 3e-3)
+    whole, after = lag.follow(STAIRS)
+    state, ends = None, (0.0, 0.011, 0.04, 0.0515, 0.2)
+    for start, end in pairwise(ends):
+        inner = (STAIRS.time > start) & (STAIRS.time < end)
+        time = np.concatenate([[start], STAIRS.time[inner], [end]])
+        value = np.concatenate(
+            [STAIRS.at([start]), STAIRS.value[inner], [STAIRS.at(end)]]
+        )
+        part, state = lag.follow(Waveform(time, value), state)
+        at = np.linspace(start, end, 301)[:-1]
+        assert np.abs(part.at(at) - whole.at(at)).max() < 2 * FINE
+    assert state == pytest.approx(after, abs=1e-12)
+
+
+def test_after_a_while_at_rest_there_is_exactly_nothing():
+    push = Waveform.through([(0, 0), (0, 1), (0.5, 1), (0.5, 0), (1, 0)])
+    found, after = Lag(1.1e-3, 3e-3).follow(push)
+    assert after == (0.0, 0.0)
+    assert found.value[-1] == 0.0
+    assert found.time.size < 400  # drawn, solved and stored: not without measure
+
+
+def test_without_lag_the_wave_is_left_alone():
+    assert Lag().follow(STAIRS)[0] is STAIRS
