@@ -180,6 +180,8 @@ class Channel(SceneTable):
         shunt: of coil_current: the shunt's resistance, Ohm.
         tesla_per_volt: of field: what the analogue output of a teslameter means, T/V.
         zero: what lies at the input where the signal is 0, V.
+        auto_range: of V_C1 and V_C2: whether a run may take a wider range where the
+            model expects more than this one sees.
 
     Raises:
         ValueError: keys contradict each other.
@@ -194,6 +196,7 @@ class Channel(SceneTable):
     shunt: Annotated[float, Unit("Ohm", above=0.0)] | None = None
     tesla_per_volt: Annotated[float, Unit("T/V")] | None = None
     zero: Annotated[float, Unit("V")] = 0.0
+    auto_range: bool = False
 
     def __post_init__(self) -> None:
         for key, belongs_to, given, scale in (

@@ -37,6 +37,7 @@ class RecordedSignal:
         source: "measured", "derived" or "model".
         scale: unit per volt at the scope's input.
         code: one code of the converter, SI; None where it is not digitised.
+        overrange: stretches in which it left its channel's range, shape (k, 2), s.
     """
 
     signal: str
@@ -47,6 +48,7 @@ class RecordedSignal:
     source: Source = "measured"
     scale: float = 1.0
     code: float | None = None
+    overrange: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

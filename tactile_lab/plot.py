@@ -78,8 +78,8 @@ class Guide:
         at: where it lies or begins, SI.
         to: where the band ends; None for a line.
         along: "x" for one across at that y, "y" for one upright at that x.
-        text: beside the line.
-        colour: as of a series; bands are grey.
+        text: beside the line, or at the beginning of a band.
+        colour: as of a series; "quiet" and "band" are greys.
         dashed: whether the line is.
     """
 

@@ -125,6 +125,8 @@ def command(
             return
         try:
             narrator.close()
+            for text in _overrange(done):
+                warn(text)
             if done.exit_code:
                 say(f"tactile-lab: {_why(done)}", sys.stderr)
             report = None if no_report else _report(done)
@@ -308,6 +310,19 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
         say(f"figure  {report.png}")
         say(f"report  {report.html}")
     say(f"run     {done.folder}")
+
+
+def _overrange(done: Executed) -> tuple[str, ...]:
+    """Which inputs left their range, and when."""
+    from tactile_lab.store.folder import read_info
+
+    if not read_info(done.folder).get("overrange"):
+        return ()
+    from tactile_lab.store.overrange import told
+    from tactile_lab.store.run import Run
+
+    with Run.load(done.folder) as run:
+        return told(run)
 
 
 def _unreported(done: Executed, failure: BaseException) -> None:

@@ -6,21 +6,19 @@ opened, enabled, streamed, stored or computed by any of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field
 
 from tactile_lab.bench import Channel
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.registry import BY_PERSON, check_scope, scope_capability
+from tactile_lab.planning.ranges import Extremes, expected, fitted, widened
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import SIGNALS
 
 SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
 """Signals that exist as samples of a scope channel and in no other way."""
-
-NODES = ("V_C1", "V_C2", "V_K")
-"""Voltages of the circuit between 0 V and its supply."""
 
 AVERAGED = "field"
 """Kept as readings, one for many samples, where a scope channel carries it."""
@@ -43,6 +41,8 @@ class Needs:
         guaranteed_rate: streaming rate the scope's maker guarantees for so many
             channels, S/s; infinite where it is not known.
         gapless: whether the scope streams without gaps; true without a scope.
+        expected: least and largest value that the model gives V_C1 and V_C2, V, where
+            they are streamed.
     """
 
     coil: bool
@@ -54,6 +54,7 @@ class Needs:
     model: tuple[str, ...]
     guaranteed_rate: float
     gapless: bool = True
+    expected: Extremes = field(default_factory=dict)
 
 
 def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
@@ -86,7 +87,8 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
             "neither [field_meter] nor a scope channel with the signal field."
         )
     by_hand = meter is not None and meter.driver == BY_PERSON
-    channels, rate, gapless = _as_the_scope_can(scene, channels, detect_on)
+    seen = expected(scene, channels, drive)
+    channels, rate, gapless = _as_the_scope_can(scene, channels, seen, detect_on)
     return Needs(
         coil=drive.drives,
         field_meter=metered and not by_hand,
@@ -106,6 +108,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
         ),
         guaranteed_rate=rate,
         gapless=gapless,
+        expected=seen,
     )
 
 
@@ -138,17 +141,20 @@ def _check_wired(
 
 
 def _as_the_scope_can(
-    scene: Scene, channels: tuple[Channel, ...], detect_on: str | None
+    scene: Scene,
+    channels: tuple[Channel, ...],
+    seen: Extremes,
+    detect_on: str | None,
 ) -> tuple[tuple[Channel, ...], float, bool]:
     """Channels as they will be set; the rate the scope surely keeps, S/s; gapless."""
     scope = scene.bench.scope
     if scope is None or not channels:
         return channels, float("inf"), True
     capability = scope_capability(scope)
+    ranges = capability.ranges
     if scene.protocol.moves_probes:
-        channels = tuple(
-            _widened(c, scene.circuit.V_S, capability.ranges) for c in channels
-        )
+        channels = tuple(widened(c, scene.circuit.V_S, ranges) for c in channels)
+    channels = tuple(fitted(c, seen, ranges) for c in channels)
     rate = check_scope(scope, channels, scene.record.sample_rate)
     if detect_on is not None and not capability.gapless:
         raise SceneError(
@@ -158,16 +164,6 @@ def _as_the_scope_can(
             "neither spikes nor rate."
         )
     return channels, rate, capability.gapless
-
-
-def _widened(channel: Channel, supply: float, ranges: Sequence[float]) -> Channel:
-    """A voltage channel that sees all from 0 V to the supply, with a margin of 10 %."""
-    if channel.signal not in NODES:
-        return channel
-    middle = supply / 2 / channel.scale
-    enough = [r for r in ranges if r >= 1.2 * abs(middle)]
-    chosen = min(enough) if enough else max(ranges)
-    return replace(channel, range=chosen, offset=-middle, coupling="DC")
 
 
 def _check_threshold(scene: Scene, channel: Channel) -> None:

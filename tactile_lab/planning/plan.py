@@ -6,11 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from tactile_lab.planning.calibrated import check_calibration
 from tactile_lab.planning.estimate import Cost, estimate
 from tactile_lab.planning.needs import Needs, needs
+from tactile_lab.planning.ranges import beyond
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, warnings
@@ -20,9 +19,6 @@ from tactile_lab.signals import BENCH_ONLY, SIGNALS
 
 if TYPE_CHECKING:
     from tactile_lab.model.simulate import Result
-
-GRID = 4000
-"""Points at which the preview is looked at."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -132,10 +128,14 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
     """
     drive = timeline(scene, through_coil=True)
     needed = needs(scene, drive)
-    told = (*check_calibration(scene, drive), *warnings(scene, needed, drive))
+    told = (
+        *check_calibration(scene, drive),
+        *warnings(scene, needed, drive),
+        *beyond(needed.channels, needed.expected),
+    )
     result = _model(scene, drive) if preview else None
     if result is not None:
-        told = (*told, *result.warnings, *_clipped(scene, needed, result))
+        told = (*told, *result.warnings)
     return Plan(
         scene=scene,
         timeline=drive,
@@ -155,26 +155,6 @@ def _model(scene: Scene, drive: Timeline) -> Result | None:
     from tactile_lab.planning.preview import model, modelled
 
     return model(scene, drive.force, drive.duration, modelled(scene))
-
-
-def _clipped(scene: Scene, needed: Needs, result: Result) -> tuple[str, ...]:
-    """Signals the model expects outside what their channel can see."""
-    times = np.linspace(0.0, result.duration, GRID)
-    lines = []
-    for channel in needed.channels:
-        if channel.signal not in ("V_C1", "V_C2"):
-            continue
-        if channel.signal not in scene.record.signals:
-            continue
-        values = result.sample(channel.signal, times)
-        low, high = channel.span
-        if channel.coupling == "DC" and (values.min() < low or values.max() > high):
-            lines.append(
-                f"{channel.signal} will leave its channel's range, {show(low, 'V')} "
-                f"to {show(high, 'V')}: the model has {show(values.min(), 'V')} to "
-                f"{show(values.max(), 'V')}. Change range or offset in the bench file."
-            )
-    return tuple(lines)
 
 
 def text(plan: Plan) -> str:

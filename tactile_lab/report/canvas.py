@@ -178,22 +178,29 @@ def _guide(axes: Axes, guide: Guide, factor: float) -> None:
     at, across = guide.at * factor, guide.along == "x"
     colour = _colour(guide.colour)
     if guide.to is not None:
-        grey = palette.BAND if guide.colour == "band" else RULE
+        grey = {"band": palette.BAND, "quiet": RULE}.get(guide.colour)
+        shade: Any = (
+            {"color": grey.light, "zorder": 0} if grey else _TINT | {"color": colour}
+        )
         span = axes.axhspan if across else axes.axvspan
-        span(at, guide.to * factor, color=grey.light, lw=0, zorder=0)
-        return
-    look: Any = {"color": colour, "lw": 0.6, "zorder": 1}
-    if guide.dashed:
-        look["ls"] = DASHES if guide.text else (0, (2, 2))
-    (axes.axhline if across else axes.axvline)(at, **look)
+        span(at, guide.to * factor, lw=0, **shade)
+    else:
+        look: Any = {"color": colour, "lw": 0.6, "zorder": 1}
+        if guide.dashed:
+            look["ls"] = DASHES if guide.text else (0, (2, 2))
+        (axes.axhline if across else axes.axvline)(at, **look)
     if guide.text:
         place, where = (0.01, at), axes.get_yaxis_transform()
         if not across:
-            place, where = (at, 0.99), axes.get_xaxis_transform()
+            up = 0.99 if guide.to is None else 0.55
+            place, where = (at, up), axes.get_xaxis_transform()
         axes.annotate(
             _math(guide.text), place, (0, -3) if across else (3, 0), xycoords=where,
             textcoords="offset points", va="top", size=7, color=colour, zorder=19,
         )  # fmt: skip
+
+
+_TINT: Any = {"alpha": 0.22, "zorder": 0.5}
 
 
 def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None:

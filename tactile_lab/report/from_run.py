@@ -20,6 +20,8 @@ from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.store.overrange import overrange
+from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import Records
 
@@ -70,7 +72,11 @@ def read(folder: Path) -> RunData:
             asks_I_DS="I_DS" in scene.record.signals,
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
-            warnings=(*warnings, *_doubts(scene, started, settings, warnings)),
+            warnings=(
+                *overrange_told(run),
+                *warnings,
+                *_doubts(scene, started, settings, warnings),
+            ),
             assumptions=(*(info.get("assumptions") or ()), *told(run)),
             parameters=_texts(scene, "protocol"),
             sensor=_texts(scene, "sensor"),
@@ -192,6 +198,7 @@ def _trace(run: Run, name: str) -> RecordedSignal:
         high=cells.high,
         scale=float(signal.attributes.get("scale", 1.0)),
         code=abs(signal.gain),
+        overrange=overrange(run, name),
     )
 
 

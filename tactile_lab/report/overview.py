@@ -39,7 +39,7 @@ def overview(run: Measurement) -> Plot:
             "model driven by the applied current"
         )
     if drain := run.trace("I_DS"):
-        panels.append(_drain(drain, axis))
+        panels.append(_drain(run, drain, axis))
         said.append("Drain current")
     if run.searched or run.spike_times.size:
         panels.append(_spikes(run, axis))
@@ -66,6 +66,20 @@ def overview(run: Measurement) -> Plot:
 def _holds(run: Measurement, axis: ClosedTime) -> list[Guide]:
     held = [t.held for t in run.trials if t.held is not None and not t.pause]
     return [Guide(at=axis.at(a), to=axis.at(b), colour="band") for a, b in held]
+
+
+def overranges(signals: list[RecordedSignal], axis: ClosedTime) -> list[Guide]:
+    """Bands where a signal left its channel's range; the first says so."""
+    return [
+        Guide(
+            at=axis.at(start),
+            to=axis.at(end),
+            colour=signal.signal,
+            text="" if number else f"{signal.signal} over range",
+        )
+        for signal in signals
+        for number, (start, end) in enumerate(signal.overrange)
+    ]
 
 
 def _force(run: Measurement, axis: ClosedTime) -> Panel:
@@ -115,6 +129,7 @@ def _voltages(
         at = run.circuit.critical_V_C1
         text = f"fires below {show(at, 'V')}"
         guides.append(Guide(at=at, along="x", text=text, colour="V_C1"))
+    guides += overranges(signals, axis)
     series = [_series(s, axis, name=s.signal) for s in signals]
     if model is not None:
         time, mean = axis.spliced(model.time, model.mean)
@@ -132,13 +147,16 @@ def _voltages(
     )
 
 
-def _drain(signal: RecordedSignal, axis: ClosedTime) -> Panel:
+def _drain(run: Measurement, signal: RecordedSignal, axis: ClosedTime) -> Panel:
+    derived = signal.source == "derived"
+    seen = run.trace("V_C1") if derived else signal
     return Panel(
         label="I_DS",
         unit="A",
+        guides=tuple(overranges([seen] if seen else [], axis)),
         series=(_series(signal, axis),),
         limits=(min(0.0, float(signal.mean.min()) * 1.05), None),
-        note="from V_C1, Eq. (16)" if signal.source == "derived" else "",
+        note="from V_C1, Eq. (16)" if derived else "",
         height=0.95,
     )
 

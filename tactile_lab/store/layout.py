@@ -152,6 +152,7 @@ def declare(file: h5py.File, layout: Layout, stream: Stream | None) -> None:
             analogue_offset=channel.offset,
             coupling=channel.coupling,
             scale=channel.scale,
+            row=layout.signals.index(channel.signal),
         )
 
 

@@ -109,6 +109,20 @@ class StoredSignal:
         return known.title if known else self.name
 
     @property
+    def span(self) -> tuple[float, float]:
+        """Lowest and highest value its channel could see, in the SI unit."""
+        full = float(self._samples.file.attrs["full_scale"]) / self.code_scale
+        ends = (end * self.gain + self.offset for end in (-full, full))
+        low, high = sorted(ends)
+        return low, high
+
+    @property
+    def row(self) -> int:
+        """Its bit in the table `overrange`; older runs have them as they are named."""
+        names = list(self._samples.parent)
+        return int(self._samples.attrs.get("row", names.index(self.name)))
+
+    @property
     def attributes(self) -> dict[str, Any]:
         """Scope input, range, coupling and scaling as stored."""
         return dict(self._samples.attrs)

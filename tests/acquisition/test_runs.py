@@ -1,6 +1,7 @@
 """Whole runs on the simulated bench: real drivers, simulated far ends, real files."""
 
 import shutil
+from importlib import resources
 from types import SimpleNamespace
 
 import numpy as np
@@ -204,6 +205,21 @@ def test_a_trial_that_was_cut_short_is_reported_with_all_its_spikes(run_scene, s
     drawn = next(p for p in findings.plots if p.name == "figure")
     ticks = [s for p in drawn.panels for s in p.series if s.mark == "ticks"]
     assert sum(np.size(s.x) for s in ticks) == ran.done.spikes
+
+
+def test_a_run_that_clipped_says_so_in_its_report(run_scene, tmp_path):
+    own = resources.files("tactile_lab.scene") / "simulated_bench.toml"
+    bench = tmp_path / "fixed.toml"
+    bench.write_text(own.read_text().replace("auto_range = true", ""))
+    overrides = (
+        f"bench.file={bench}", 'protocol.levels=["-200 mN"]', "protocol.hold=0.5 s",
+        "protocol.rest=0.3 s",
+    )  # fmt: skip
+    run = read(run_scene(*overrides, scene="bipolar").folder)
+    (text,) = [text for text in run.warnings if "left the range" in text]
+    assert text.startswith("V_C1 left the range of scope input A, 500 mV to 4.5 V")
+    ((start, end),) = run.trace("V_C1").overrange
+    assert 0.3 < start < 0.6 < end < 1.4
 
 
 def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(

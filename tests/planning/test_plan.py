@@ -1,6 +1,7 @@
 """Plans: what is needed, left out, estimated and warned of."""
 
 import json
+from importlib import resources
 
 import pytest
 
@@ -112,10 +113,44 @@ def test_a_real_core_refuses_the_demo_and_names_what_it_reaches():
         plan(load(None, ["bench.magnet.A2=2.25e-4 m^2"]))
 
 
-def test_a_signal_that_will_leave_its_range_is_warned_of():
-    scene = load(None, ['protocol.levels=["350 mN"]', "protocol.ramp=0.4 s"])
-    told = " ".join(plan(scene).warnings)
-    assert "V_C1 will leave its channel's range" in told
+@pytest.fixture
+def fixed_ranges(tmp_path):
+    """The built-in bench with the ranges it has."""
+    own = resources.files("tactile_lab.scene") / "simulated_bench.toml"
+    file = tmp_path / "fixed.toml"
+    file.write_text(own.read_text().replace("auto_range = true", ""))
+    return str(file)
+
+
+@pytest.mark.parametrize("preview", [True, False], ids=["plan", "run"])
+def test_a_signal_that_will_leave_its_range_is_warned_of(fixed_ranges, preview):
+    told = " ".join(plan(load("bipolar", bench=fixed_ranges), preview=preview).warnings)
+    assert "V_C1 will leave its channel's range, 500 mV to 4.5 V" in told
+
+
+def test_a_range_is_widened_where_the_model_expects_more(fixed_ranges):
+    """Such as by a pull, or after a long push; the demo keeps the finer one."""
+
+    def ranges(name):
+        made = plan(load(name), preview=False)
+        assert "leave" not in " ".join(made.warnings)
+        return {c.signal: c.range for c in made.needs.channels}
+
+    assert ranges("demo")["V_C1"] == 2.0
+    assert ranges("bipolar")["V_C1"] == ranges("hold_10s")["V_C1"] == 5.0
+    assert ranges("hold_10s")["V_C2"] == 2.0
+    # without a force nothing is expected beyond
+    assert ranges("monitor")["V_C1"] == 2.0
+
+
+def test_a_force_beyond_all_ranges_is_warned_of():
+    far = ['protocol.levels=["350 mN"]', "protocol.ramp=0.4 s"]
+    (channel,) = [
+        c
+        for c in plan(load(None, far), preview=False).needs.channels
+        if c.signal == "V_C1"
+    ]
+    assert channel.span[0] < 0.3 and channel.span[1] > 4.5
 
 
 def test_a_rate_no_scope_has_is_refused():

@@ -198,6 +198,18 @@ def test_latency_counts_from_where_the_force_begins(scene, overrides, onset):
     assert stimulus_onset(load(scene, overrides)) == pytest.approx(onset)
 
 
+def test_what_left_its_range_is_shaded_in_its_panels(demo):
+    V_C1 = replace(demo.trace("V_C1"), overrange=np.array([[1.0, 1.5], [3.0, 3.25]]))
+    others = (t for t in demo.traces if t.signal != "V_C1")
+    run = find(replace(demo, traces=(V_C1, *others))).run
+    shaded = {
+        panel.label: [(g.at, g.to) for g in panel.guides if g.colour == "V_C1"]
+        for panel in overview(run).panels
+    }
+    assert shaded["Voltage"] == shaded["I_DS"] == [(1.0, 1.5), (3.0, 3.25)]
+    assert shaded["Force"] == shaded["Rate"] == []
+
+
 def test_what_a_protocol_calls_its_trials_stands_in_table_and_figure(demo):
     trials = [
         replace(t, label=f"gap {i} s", level=0.15) for i, t in enumerate(demo.trials)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
+from tactile_lab.store.overrange import overrange, told
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.run import Run
 from tactile_lab.trial import Outcome, Trial
@@ -200,6 +201,13 @@ def test_over_range_is_flagged_per_block_and_channel(bench, recorder, folder):
     recorder.close("complete", 300)
     with Run.load(folder.path) as run:
         assert run.records("overrange").tolist() == [(100, 100, 2), (200, 100, 3)]
+        np.testing.assert_allclose(overrange(run, "V_K"), [[0.1, 0.3]])
+        np.testing.assert_allclose(overrange(run, "V_C1"), [[0.2, 0.3]])
+        assert [line.split(",")[0] for line in told(run)] == [
+            "V_C1 left the range of scope input A",
+            "V_K left the range of scope input B",
+        ]
+        assert "−5 V to 5 V, at 0.2 to 0.3 s (100 ms in all)" in told(run)[0]
 
 
 def test_only_asked_signals_are_stored(bench, folder):

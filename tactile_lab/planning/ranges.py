@@ -1,0 +1,103 @@
+"""What the model expects of the circuit's voltages, and whether their channels see it.
+
+A channel with ``auto_range`` is given a wider range where it would not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tactile_lab.bench import Channel
+from tactile_lab.errors import SolverError
+from tactile_lab.planning.timeline import Timeline
+from tactile_lab.quantity import show
+from tactile_lab.scene.scene import Scene
+
+NODES = ("V_C1", "V_C2", "V_K")
+"""Voltages of the circuit between 0 V and its supply."""
+
+GRID = 4000
+"""Points at which the model is looked at."""
+
+SPARE = 1 / 127
+"""Part of a range, one code of 8 bits, that should be left at either end."""
+
+Extremes = Mapping[str, tuple[float, float]]
+"""Least and largest value of a signal by its name, V."""
+
+
+def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extremes:
+    """What the model expects of V_C1 and V_C2 on DC-coupled channels, V.
+
+    A sensor that fires where the model does not takes V_C2 from 0 V up to the voltage
+    it fires at: that is always expected. Empty where the model cannot tell.
+    """
+    names = [
+        channel.signal
+        for channel in channels
+        if channel.signal in ("V_C1", "V_C2") and channel.coupling == "DC"
+    ]
+    if not names or scene.protocol.moves_probes:
+        return {}
+    from tactile_lab.planning.preview import model
+
+    try:
+        found = model(scene, drive.force, drive.duration, names)
+    except SolverError:
+        return {}
+    times = np.linspace(0.0, found.duration, GRID)
+    seen = {name: found.sample(name, times) for name in names}
+    told = {name: (float(v.min()), float(v.max())) for name, v in seen.items()}
+    if "V_C2" in told:
+        low, high = told["V_C2"]
+        told["V_C2"] = min(low, 0.0), max(high, scene.circuit.fire_voltage)
+    return told
+
+
+def fitted(channel: Channel, seen: Extremes, ranges: Sequence[float]) -> Channel:
+    """The channel, with the least wider range that sees what is expected of it.
+
+    Args:
+        channel: as the bench file has it; unchanged unless it says ``auto_range``.
+        seen: what is expected.
+        ranges: that the scope has, V.
+    """
+    if not channel.auto_range or channel.signal not in seen:
+        return channel
+    wider = (replace(channel, range=r) for r in sorted(ranges) if r > channel.range)
+    choices = (channel, *wider)
+    fits = (c for c in choices if _sees(c, seen[c.signal], SPARE * c.range))
+    return next(fits, choices[-1])
+
+
+def widened(channel: Channel, supply: float, ranges: Sequence[float]) -> Channel:
+    """A voltage channel that sees all from 0 V to the supply, with a margin of 10 %."""
+    if channel.signal not in NODES:
+        return channel
+    middle = supply / 2 / channel.scale
+    enough = [r for r in ranges if r >= 1.2 * abs(middle)]
+    chosen = min(enough) if enough else max(ranges)
+    return replace(channel, range=chosen, offset=-middle, coupling="DC")
+
+
+def beyond(channels: Sequence[Channel], seen: Extremes) -> Iterator[str]:
+    """A warning for each channel that is expected to leave its range."""
+    for channel in channels:
+        if channel.signal not in seen or _sees(channel, seen[channel.signal]):
+            continue
+        (low, high), (least, most) = channel.span, seen[channel.signal]
+        yield (
+            f"{channel.signal} will leave its channel's range, {show(low, 'V')} to "
+            f"{show(high, 'V')}: the model has {show(least, 'V')} to "
+            f"{show(most, 'V')}. Change range or offset in the bench file, or let "
+            "auto_range = true choose."
+        )
+
+
+def _sees(channel: Channel, extremes: tuple[float, float], spare: float = 0.0) -> bool:
+    low, high = channel.span
+    spare *= abs(channel.scale)
+    return low + spare <= extremes[0] and extremes[1] <= high - spare
