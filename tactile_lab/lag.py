@@ -20,7 +20,7 @@ from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
-FINE = 1e-4
+FINE = 2e-5
 """Largest deviation of the answer's straight pieces, as a part of the peak."""
 ALIKE = 0.05
 """Lags nearer to each other than this are drawn apart by it: their exponentials would
@@ -125,4 +125,6 @@ def _bends(size: float, lag: float, lasts: float) -> FloatArray:
     covered = -math.expm1(-end / (2 * lag))
     count = math.ceil(2 * math.sqrt(size / 8) * covered)
     part = np.arange(1, count + 1) / max(count, 1) * covered
-    return np.asarray(-2 * lag * np.log1p(-part))
+    # what is left then would be stretched over the rest of a long piece
+    gone = min(lasts, lag * math.log(1e4 * size))
+    return np.append(-2 * lag * np.log1p(-part), gone)

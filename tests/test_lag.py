@@ -62,7 +62,7 @@ def test_after_a_while_at_rest_there_is_exactly_nothing():
     found, after = Lag(1.1e-3, 3e-3).follow(push)
     assert after == (0.0, 0.0)
     assert found.value[-1] == 0.0
-    assert found.time.size < 400  # drawn, solved and stored: not without measure
+    assert found.time.size < 700  # solved and stored: 320 points a jump
 
 
 def test_without_lag_the_wave_is_left_alone():

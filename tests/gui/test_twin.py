@@ -49,10 +49,10 @@ def test_set_points_hold_until_the_next() -> None:
     part = in_one_piece()
     time, value = np.array(POINTS).T
     steps, held = np.repeat(time, 2)[1:], np.repeat(value, 2)[:-1]
-    force = Waveform(
-        np.concatenate([[0.0], steps]),
-        np.concatenate([[0.0], held]) * SCENE.bench.magnet.newtons_per_ampere,
+    current = Waveform(
+        np.concatenate([[0.0], steps, [1.5]]), np.concatenate([[0.0], held, [0.0]])
     )
+    force, _ = SCENE.bench.magnet.lagged_force(current)
     result = simulate(SCENE.circuit, force, keep=("spikes", "V_C1"), until=1.5)
     assert result.spike_times is not None
     assert np.allclose(part.spikes, result.spike_times, atol=1e-5)
