@@ -25,11 +25,16 @@ ARM, BEAT, DISARM, QUIT, TAKE_OVER = b"a", b".", b"d", b"q", b"t"
 PATIENCE = 60.0
 """Time for which a port that cannot be opened or verified is tried again, s."""
 
+TERMINAL = 2.0
+"""Time for which it speaks on the owner's terminal, s; a pipe is then let go of."""
+
 RETRY = 0.005
 """Pause between two attempts to open the port, s."""
 
 MOST_LINES = 12
 """Lines to read for an answer; echoes and late answers may come before it."""
+
+UNKNOWN = "OUTPUT STATE UNKNOWN: switch the coil source off at the instrument"
 
 LOOK = 0.02
 """Shortest wait between two looks at what the owner said, s."""
@@ -124,10 +129,12 @@ def send_on(port: serial.SerialBase) -> None:
 
 def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> bool:
     """Send and verify output-off, again and again while patience lasts."""
-    give_up = time.monotonic() + PATIENCE
+    begun = time.monotonic()
     reasons: set[str] = set()
     lines = "send"
-    while time.monotonic() < give_up:
+    while (spent := time.monotonic() - begun) < PATIENCE:
+        if spent > TERMINAL:
+            log.leave_terminal(f"{UNKNOWN}; it is tried for {PATIENCE:g} s")
         try:
             with port:
                 send_on(port)
@@ -150,12 +157,12 @@ def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> 
                 reasons.add(str(reason))
                 log.write(f"trying again: {reason}")
             time.sleep(RETRY)
-    log.write("OUTPUT STATE UNKNOWN: switch the coil source off at the instrument")
+    log.write(UNKNOWN)
     return False
 
 
 class GuardLog:
-    """Appends lines to a file and repeats them on standard error.
+    """Appends lines to a file and repeats them on standard error, as long as it has it.
 
     Args:
         path: of the file; its folder is made.
@@ -163,6 +170,7 @@ class GuardLog:
 
     def __init__(self, path: str) -> None:
         self._path = Path(path)
+        self._terminal = True
 
     def write(self, text: str) -> None:
         """One line, with date and this process's id."""
@@ -173,11 +181,22 @@ class GuardLog:
                 file.write(line)
         except OSError as reason:
             line += f"(this could not be logged: {reason})\n"
+        if not self._terminal:
+            return
         try:
             sys.stderr.write(line)
             sys.stderr.flush()
         except OSError:
-            return  # the terminal is gone; there is nobody left to tell
+            self._terminal = False  # it is gone; there is nobody left to tell
+
+    def leave_terminal(self, last: str) -> None:
+        """Write one more line and let go of standard error: a pipe may wait for it."""
+        if self._terminal:
+            self.write(f"{last}; see {self._path}")
+            self._terminal = False
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, 2)
+            os.close(nothing)
 
 
 def main() -> int:

@@ -75,6 +75,8 @@ class CoilSource:
         self._commanded = clock.now()
         self._energised = False
         self._reached = False
+        self._given_up: OffReport | None = None
+        """What could not be verified off and is the guard's from `close` on."""
         self._interlock = Interlock(self._limits, clock.now(), guard, self._warn)
 
     @property
@@ -280,6 +282,7 @@ class CoilSource:
                 "The source was never reached: this program switched nothing on, and "
                 "what its output does is unknown.",
             )
+        self._given_up = None
         report = self._wire.switch_off(
             setpoint=self._setpoint,
             slew=self._limits.slew,
@@ -294,6 +297,8 @@ class CoilSource:
                 self._guard.disarm()
         else:
             self._setpoint = None
+            if self._guard is not None:
+                self._given_up = report
         return report
 
     def close(self) -> None:
@@ -304,7 +309,7 @@ class CoilSource:
         """
         wire = self._wire
         if wire.link.is_open:
-            report = self.safe_off()
+            report = self._given_up or self.safe_off()
             if report.verified:
                 wire.offer(self.dialect.release)
             else:

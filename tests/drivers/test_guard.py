@@ -221,6 +221,29 @@ def guarded(served, tmp_path, monkeypatch):
     coil.close()
 
 
+LETS_GO = """
+import sys
+from drivers.coil.guard_process import GuardLog
+GuardLog(sys.argv[1]).leave_terminal("still not verified off")
+sys.stdin.read()
+"""
+
+
+def test_a_guard_that_tries_on_lets_go_of_the_terminal(tmp_path):
+    """`tactile-lab run | cat` waited a minute for it."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", LETS_GO, str(tmp_path / "guard.log")],
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    ) as process:
+        assert "see " in process.stderr.read()  # to its end, while the process lives
+        assert process.poll() is None
+        process.stdin.close()
+
+
 def test_a_dead_guard_stops_the_current(served, guarded):
     source, _ = served
     coil, guard = guarded
@@ -239,7 +262,10 @@ def test_a_port_that_cannot_be_made_safe_is_handed_over(served, guarded, tmp_pat
     coil.set_current(0.01)
     server.far_end.faults.add(SerialFault(kind="deaf", times=None))
     assert not coil.safe_off().verified
+    said = []
+    coil._wire.link.spy = lambda *told: said.append(told)
     coil.close()
+    assert said == []  # what was tried in vain is not tried again before it is handed
     log_of(tmp_path, "trying again")
     assert source.output_on
     server.far_end.faults.clear()
