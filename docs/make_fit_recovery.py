@@ -130,7 +130,7 @@ def decay(seed: int) -> dict[str, Estimate]:
     at = np.arange(0, 30, 0.02)
     noise = np.random.default_rng(seed).normal(0, 0.02, at.size)
     current = 25e-9 * np.exp(np.exp(-at / 8.69) + noise)
-    return {"tau": fit_decay(at, current, (0.0, 30.0)).tau}
+    return {"tau": fit_decay(at, current, [(0.0, 30.0)]).tau}
 
 
 def sixty_seconds() -> str:

@@ -8,19 +8,24 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from tactile_lab.analysis.decay import fit_decay
+from tactile_lab.analysis.decay import Decay, fit_decay
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.measurement import Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.drain_current import BOXCAR_3DB
-from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.quantity import Duration, Force, Pause, printed, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.levels import Levels
 from tactile_lab.trial import Trials
 
-LATE = 0.15
-"""A coil set over a serial line is late: the first part of a hold still rises, s."""
+SETTLING = 0.04
+"""Time after the force is there until the coil's field and node A have followed, s: the
+eddy currents' 3 ms and node A's 6 ms five times over."""
+BEFORE = 0.2
+"""The current before a push is averaged over so long, s."""
+MARGIN = BOXCAR_3DB / 20
+"""The coil's first set-point comes later than this after a trial's start, s."""
 
 
 class Bipolar(Levels):
@@ -46,71 +51,138 @@ class Bipolar(Levels):
         """What each force does to the drain current, and tau of the film."""
         if run.trace("I_DS") is None:
             return Conclusion(missing=("No drain current: V_C1 was not recorded.",))
-        changes: list[dict[str, Any]] = []
-        told = []
-        margin = BOXCAR_3DB / 20
-        for trial in run.results:
-            if trial.held is None:
-                continue
-            start, begin = trial.start, trial.held[0]
-            before = run.mean("I_DS", start - 0.1, start + margin)
-            during = run.mean("I_DS", begin, begin + 0.1)
-            if math.isnan(before) or math.isnan(during):
-                continue
-            changes.append(_change(run, trial.level, during - before))
-            told.append(
-                f"{trial.label}: I_DS from {show(before, 'A', 3)} to "
-                f"{show(during, 'A', 3)}"
-            )
-        if not changes:
+        held = [t for t in run.results if t.held is not None and t.level]
+        if not held:
             return Conclusion(missing=("No drain current: no force was completed.",))
-        said = ["; ".join(told) + "."]
-        per_force = [_sensitivity(c) for c in changes if c["level_N"]]
-        if per_force:
-            said.append(f"Per force: {'; '.join(per_force)}.")
+        try:
+            tau, changes = _changes(run, held)
+        except NotIdentifiableError as reason:
+            return Conclusion((), {"tau_s": None}, (f"No drain current: {reason}.",))
+        found = [
+            _change(run, trial, change)
+            for trial, change in zip(held, changes, strict=True)
+        ]
+        said = [
+            "; ".join(_told(c) for c in found)
+            + " (95 %), from before each push to when its force was there.",
+            f"Per force: {'; '.join(_sensitivity(c) for c in found)}.",
+        ]
         if run.force_uncertainty is None:
             said.append(NOT_STATED)
-        values: dict[str, Any] = {"I_DS_changes": changes}
-        try:
-            tau = values["tau_s"] = _tau(run)
-        except NotIdentifiableError as reason:
-            return Conclusion(tuple(said), values, (f"No tau: {reason}.",))
-        said.append(f"The decay gives tau = {tau.text('s')}.")
+        said.append(
+            f"The decays give tau = {tau.text('s')}, with R1, R2 and V_S as given; one "
+            "code of offset of V_C1 and its converter's steps are in the interval."
+        )
+        values = {
+            "I_DS_changes": found,
+            "tau_s": tau,
+        }
         return Conclusion(tuple(said), values)
 
 
-def _change(run: Measurement, level: float | None, change: float) -> dict[str, Any]:
+def _changes(
+    run: Measurement, held: list[MeasuredTrial]
+) -> tuple[Estimate, list[Estimate]]:
+    """Tau by the decays in the holds, and what each push changed I_DS by, A.
+
+    Raises:
+        NotIdentifiableError: no rest before the first push, or holds too short.
+    """
+    trace, first = run.trace("I_DS"), run.results[0]
+    rest = run.mean("I_DS", first.start - BEFORE, first.start + MARGIN)
+    if trace is None or math.isnan(rest):
+        raise NotIdentifiableError("the current at rest is not known")
+    begins = np.array(
+        [run.mean("I_DS", t.start - BEFORE, t.start + MARGIN) for t in held]
+    )
+    holds = [
+        (run.applied_edge(t) or t.start, t.held[1]) for t in held if t.held is not None
+    ]
+    averaged = 2 * float(np.median(np.diff(trace.time)))
+
+    def fitted(offset: float, at_rest: float) -> tuple[Decay, np.ndarray[Any, Any]]:
+        """With all currents shifted, and those before the pushes further, A."""
+        end = rest + offset + at_rest
+        found = fit_decay(
+            trace.time, trace.mean + offset, holds,
+            averaged=averaged, settling=SETTLING, rest=end,
+        )  # fmt: skip
+        size = np.array([a.value for a in found.amplitudes])
+        return found, end * np.exp(size) - (begins + offset + at_rest)
+
+    decay, changed = fitted(0.0, 0.0)
+    conductance, V_C1 = 0.0, run.trace("V_C1")
+    if run.circuit is not None:
+        conductance = 1 / run.circuit.R1 + 1 / run.circuit.R2
+    code = (0.0 if V_C1 is None else V_C1.code or 0.0) * conductance
+    steps = run.step_bias("V_C1") * conductance
+    moved = [fitted(*cause) for cause in ((code, 0.0), (0.0, steps)) if any(cause)]
+    log_tau = math.log(decay.tau.value)
+    logarithm = Estimate(
+        log_tau, decay.tau.error / decay.tau.value,
+        math.log(decay.tau.low), math.log(decay.tau.high),
+    ).widened(
+        *(abs(math.log(other.tau.value) - log_tau) for other, _ in moved)
+    )  # fmt: skip
+    tau = Estimate(
+        decay.tau.value, decay.tau.value * logarithm.error,
+        math.exp(logarithm.low), math.exp(logarithm.high),
+    )  # fmt: skip
+    # so many bins before each push are averaged
+    noise = _scatter(run) / math.sqrt(max(BEFORE / averaged, 1.0))
+    changes = []
+    for i, amplitude in enumerate(decay.amplitudes):
+        there = rest * math.exp(amplitude.value)
+        known = Estimate(
+            float(changed[i]), there * amplitude.error,
+            float(changed[i]) - there * amplitude.half,
+            float(changed[i]) + there * amplitude.half,
+        )  # fmt: skip
+        shifts = (abs(float(other[i] - changed[i])) for _, other in moved)
+        changes.append(known.widened(*shifts, 2 * noise))
+    return tau, changes
+
+
+def _scatter(run: Measurement) -> float:
+    """Standard deviation of I_DS from bin to bin before the first push, A."""
+    trace, first = run.trace("I_DS"), run.results[0]
+    if trace is None:
+        return 0.0
+    inside = (trace.time >= first.start - BEFORE) & (trace.time <= first.start + MARGIN)
+    return float(trace.mean[inside].std(ddof=1)) if inside.sum() > 2 else 0.0
+
+
+def _change(run: Measurement, trial: MeasuredTrial, found: Estimate) -> dict[str, Any]:
     """What a force did to I_DS, and per force."""
+    level = trial.level or math.nan
     known = run.uncertain(level)
-    slope = change / level if level else None
-    spread = None
-    if level and slope is not None and known is not None:
-        spread = abs(slope * known / level)
+    slope = Estimate(
+        found.value / level, abs(found.error / level),
+        *sorted((found.low / level, found.high / level)),
+    )  # fmt: skip
+    if known is not None:
+        slope = slope.widened(abs(slope.value * known / level))
     return {
+        "label": trial.label,
         "level_N": level,
         "level_uncertainty_N_95": known,
-        "change_A": change,
-        "sensitivity_A_per_N": slope,
-        "sensitivity_uncertainty_A_per_N_95": spread,
+        "change_A": found.value,
+        "change_uncertainty_A_95": found.half,
+        "sensitivity_A_per_N": slope.value,
+        "sensitivity_uncertainty_A_per_N_95": slope.half,
     }
+
+
+def _told(change: dict[str, Any]) -> str:
+    value, half = change["change_A"], change["change_uncertainty_A_95"]
+    verb = "raises" if value > 0 else "lowers"
+    return (
+        f"{change['label']} {verb} I_DS by {show(abs(value), 'A', 3)} ± "
+        f"{show(half, 'A', 2)}"
+    )
 
 
 def _sensitivity(change: dict[str, Any]) -> str:
     value = change["sensitivity_A_per_N"] * 1e6
-    known = change["sensitivity_uncertainty_A_per_N_95"]
-    spread = "" if known is None else f" ± {known * 1e6:.2g}"
-    return f"{show(change['level_N'], 'N')} {value:.3g}{spread} nA/mN"
-
-
-def _tau(run: Measurement) -> Estimate:
-    """Tau from the strongest trial, its end known from the rest before the first."""
-    trace, first = run.trace("I_DS"), run.results[0]
-    rest = run.mean("I_DS", first.start - 0.2, first.start + 0.02)
-    held = [t for t in run.results if t.held is not None]
-    if trace is None or math.isnan(rest) or not held:
-        raise NotIdentifiableError("the current at rest is not known")
-    strongest = max(held, key=lambda t: abs(t.level or 0.0))
-    start, end = strongest.held or (0.0, 0.0)
-    averaged = 2 * float(np.median(np.diff(trace.time)))
-    window = (start + LATE, end)
-    return fit_decay(trace.time, trace.mean, window, averaged=averaged, rest=rest).tau
+    half = change["sensitivity_uncertainty_A_per_N_95"] * 1e6
+    return printed(f"{show(change['level_N'], 'N')} {value:.3g} ± {half:.2g} nA/mN")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.adaptation import Adaptation, fit_adaptation
+from tactile_lab.analysis.converter import step_bias
 from tactile_lab.analysis.spike_train import Response, respond
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ForceUncertainty
@@ -38,6 +39,7 @@ class RecordedSignal:
         scale: unit per volt at the scope's input.
         code: one code of the converter, SI; None where it is not digitised.
         overrange: stretches in which it left its channel's range, shape (k, 2), s.
+        samples: of the converter in a bin.
     """
 
     signal: str
@@ -49,6 +51,7 @@ class RecordedSignal:
     scale: float = 1.0
     code: float | None = None
     overrange: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
+    samples: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,6 +207,25 @@ class Measurement:
             return float("nan")
         inside = (trace.time >= start) & (trace.time <= end)
         return float(trace.mean[inside].mean()) if inside.any() else float("nan")
+
+    def step_bias(self, signal: str) -> float:
+        """How far means of a signal may be off by its converter's steps, SI."""
+        trace = self.trace(signal)
+        if trace is None or trace.code is None:
+            return 0.0
+        return step_bias(trace.mean, trace.code, trace.samples)
+
+    def applied_edge(self, trial: MeasuredTrial) -> float | None:
+        """When the force had become that of the trial's hold, s of run time, or None.
+
+        A coil that is set over a serial line gets there after the hold's nominal start.
+        """
+        if trial.held is None:
+            return None
+        force, (start, end) = self.force, trial.held
+        changes = force.time[1:][np.diff(force.value) != 0]
+        before = changes[(changes >= trial.start) & (changes <= (start + end) / 2)]
+        return max(start, float(before[-1])) if before.size else start
 
     def field_between(self, start: float, end: float) -> FloatArray:
         """Field read in [start, end] s of run time, T; empty where none was."""

@@ -6,7 +6,8 @@ does not change: I_0 and the amplitude are fitted beside tau.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,44 +27,53 @@ _GRID = np.geomspace(0.05, 20.0, 120)
 
 @dataclass(frozen=True, kw_only=True)
 class Decay:
-    """A fitted decay.
+    """Fitted decays that share one time constant.
 
     Attributes:
         tau: leakage time constant, s; its interval is symmetric on the logarithm.
-        amplitude: of ln I_DS at the hold's start.
-        scatter: standard deviation of ln I_DS about the fit.
-        points: number of independent points used.
+        amplitudes: of ln I_DS at the start of each hold.
+        scatter: standard deviation of I_DS about the fit, part of its mean.
+        points: number of points used.
+        correlated: how many neighbouring points err alike, at least 1: the steps of a
+            converter do not average away like noise.
     """
 
     tau: Estimate
-    amplitude: Estimate
+    amplitudes: tuple[Estimate, ...]
     scatter: float
     points: int
+    correlated: float
 
 
 def fit_decay(
     time: ArrayLike,
     I_DS: ArrayLike,
-    hold: tuple[float, float],
+    holds: Sequence[tuple[float, float]],
     *,
     averaged: float = 0.0,
+    settling: float = 0.0,
     rest: float | None = None,
 ) -> Decay:
-    """Fit tau to I_DS within a hold.
+    """Fit tau, and an amplitude for each hold, to I_DS within holds.
 
     Args:
         time: s.
         I_DS: A, above 0.
-        hold: (start, end) of the constant force, s.
+        holds: (start, end) of each constant force, s; amplitudes are those at its
+            start.
         averaged: window over which I_DS was averaged, s: neighbours nearer than that
             are not independent and are thinned out.
+        settling: so much after each start is left out, s; what comes after it is
+            extrapolated back to the start.
         rest: I_DS at rest, A, if known: the decay's end. It narrows tau much where the
-            hold is shorter than tau.
+            holds are shorter than tau.
+
+    Intervals hold the scatter of I_DS, as far as neighbouring points err alike too.
 
     Raises:
         ParameterError: unequal shapes.
         NotIdentifiableError: too few points, a current at or below 0 A, no decay, or a
-            tau that the hold does not determine.
+            tau that the holds do not determine.
     """
     t, current = np.asarray(time, float), np.asarray(I_DS, float)
     if t.shape != current.shape or t.ndim != 1:
@@ -71,81 +81,117 @@ def fit_decay(
             f"A decay needs as many currents as times; got shapes {t.shape} and "
             f"{current.shape}."
         )
-    inside = (t >= hold[0] + averaged / 2) & (t <= hold[1] - averaged / 2)
-    t, current = t[inside] - hold[0], current[inside]
-    if averaged > 0 and t.size > 1:
-        every = max(1, round(averaged / np.median(np.diff(t))))
-        t, current = t[::every], current[::every]
-    if t.size < FEWEST:
+    pieces = [
+        _piece(t, current, (start + settling, end), start, averaged)
+        for start, end in holds
+    ]
+    since = np.concatenate([at for at, _ in pieces])
+    amperes = np.concatenate([value for _, value in pieces])
+    if any(at.size < FEWEST for at, _ in pieces):
+        fewest = min(at.size for at, _ in pieces)
         raise NotIdentifiableError(
-            f"{t.size} independent points lie in the hold, {FEWEST} are needed"
+            f"{fewest} independent points lie in the hold, {FEWEST} are needed"
         )
-    if np.any(current <= 0):
+    if np.any(amperes <= 0):
         raise NotIdentifiableError("I_DS is not above 0 A throughout the hold")
-    y = np.log(current) - (0.0 if rest is None else np.log(rest))
-    theta = _fit(t, y, hold[1] - hold[0], free=rest is None)
-    length, tau = hold[1] - hold[0], float(np.exp(theta[0]))
+    number = np.repeat(np.arange(len(pieces)), [at.size for at, _ in pieces])
+    y = np.log(amperes) - (0.0 if rest is None else np.log(rest))
+    points = _Points(
+        since, y, np.eye(len(pieces))[number], np.ones_like(y), rest is None
+    )
+    length = max(end - start for start, end in holds)
+    theta = _fit(points, length)
+    # the noise is one of currents: on its logarithm a small current is noisier
+    expected = np.exp(points.residual(theta) + y)
+    points = replace(points, weight=expected / expected.mean())
+    theta = _fit(points, length)
+    tau = float(np.exp(theta[0]))
     needed = SHORTEST_HOLD if rest is None else SHORTEST_HOLD_WITH_REST
     if length < needed * tau:
         raise NotIdentifiableError(
             f"a hold of {length:.3g} s does not determine tau, about {tau:.2g} s: "
             f"{needed:g} tau are needed"
         )
-    return _decay(theta, t, y)
+    return _decay(theta, points)
 
 
-def _fit(t: FloatArray, y: FloatArray, length: float, *, free: bool) -> FloatArray:
-    """(ln tau, amplitude, offset): the best tau of a grid, then least squares.
+def _piece(
+    t: FloatArray,
+    current: FloatArray,
+    hold: tuple[float, float],
+    start: float,
+    averaged: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Times since `start` and currents of independent points within a hold."""
+    inside = (t >= hold[0] + averaged / 2) & (t <= hold[1] - averaged / 2)
+    t, current = t[inside] - start, current[inside]
+    every = 1
+    if averaged > 0 and t.size > 1:
+        every = max(1, round(averaged / np.median(np.diff(t))))
+    return t[::every], current[::every]
 
-    Without `free` the offset is 0 and left out.
-    """
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Times since each hold's start, ln I_DS, which hold (n, k), and weights (n,)."""
+
+    t: FloatArray
+    y: FloatArray
+    hold: FloatArray
+    weight: FloatArray
+    free: bool
+
+    def design(self, tau: float) -> FloatArray:
+        """By each amplitude, and by the offset if it is free, shape (n, k or k + 1)."""
+        shape = self.hold * np.exp(-self.t / tau)[:, None]
+        return np.column_stack([shape, np.ones_like(self.t)]) if self.free else shape
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Weighted fit less data for (ln tau, amplitudes, offset if it is free)."""
+        left: FloatArray = self.design(np.exp(theta[0])) @ theta[1:] - self.y
+        return left * self.weight
+
+    def slopes(self, theta: FloatArray) -> FloatArray:
+        """Of the residual by each of `theta`."""
+        design = self.design(np.exp(theta[0]))
+        k = self.hold.shape[1]
+        by_tau = self.t / np.exp(theta[0]) * (design[:, :k] @ theta[1 : k + 1])
+        return np.column_stack([by_tau, design]) * self.weight[:, None]
+
+
+def _fit(points: _Points, length: float) -> FloatArray:
+    """(ln tau, amplitudes, offset if free): the best tau of a grid, then refined."""
     from scipy.optimize import least_squares
 
-    grid = _GRID * length
-    starts = [_linear(t, y, tau, free=free) for tau in grid]
-    costs = [
-        float(np.sum(_residual(np.array([np.log(tau), *linear]), t, y) ** 2))
-        for tau, linear in zip(grid, starts, strict=True)
-    ]
-    best = int(np.argmin(costs))
+    def starting(tau: float) -> FloatArray:
+        design = points.design(tau) * points.weight[:, None]
+        linear = np.linalg.lstsq(design, points.y * points.weight, rcond=None)[0]
+        return np.array([np.log(tau), *linear])
+
+    starts = [starting(tau) for tau in _GRID * length]
+    costs = [float(np.sum(points.residual(start) ** 2)) for start in starts]
     solved = least_squares(
-        _residual, [np.log(grid[best]), *starts[best]], _slopes, method="lm",
-        xtol=1e-12, ftol=1e-15, gtol=1e-15, args=(t, y),
+        points.residual, starts[int(np.argmin(costs))], points.slopes, method="lm",
+        xtol=1e-12, ftol=1e-15, gtol=1e-15,
     )  # fmt: skip
     return np.asarray(solved.x, dtype=np.float64)
 
 
-def _linear(t: FloatArray, y: FloatArray, tau: float, *, free: bool) -> FloatArray:
-    """Amplitude, and offset if it is free, of the best decay with that tau."""
-    shape = np.exp(-t / tau)
-    design = np.column_stack([shape, np.ones_like(t)]) if free else shape[:, None]
-    solved: FloatArray = np.linalg.lstsq(design, y, rcond=None)[0]
-    return solved
-
-
-def _residual(theta: FloatArray, t: FloatArray, y: FloatArray) -> FloatArray:
-    left: FloatArray = theta[1] * np.exp(-t / np.exp(theta[0])) + sum(theta[2:]) - y
-    return left
-
-
-def _slopes(theta: FloatArray, t: FloatArray, y: FloatArray) -> FloatArray:
-    """Of the residual by each of `theta`, shape (n, 2 or 3)."""
-    scaled = t / np.exp(theta[0])
-    shape = np.exp(-scaled)
-    columns = [theta[1] * scaled * shape, shape, np.ones_like(t)]
-    return np.column_stack(columns[: theta.size])
-
-
-def _decay(theta: FloatArray, t: FloatArray, y: FloatArray) -> Decay:
-    jacobian, residual = _slopes(theta, t, y), _residual(theta, t, y)
-    freedom = t.size - theta.size
-    scatter = float(np.sqrt(np.sum(residual**2) / freedom))
-    covariance = scatter**2 * np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-    log_error = float(np.sqrt(covariance[0, 0]))
-    amplitude = Estimate.of(theta[1], float(np.sqrt(covariance[1, 1])), freedom)
-    if amplitude.low <= 0 <= amplitude.high:
+def _decay(theta: FloatArray, points: _Points) -> Decay:
+    jacobian, residual = points.slopes(theta), points.residual(theta)
+    alike = _alike(residual, points.hold)
+    # so many points tell something of their own
+    freedom = max(1, int(points.t.size / alike) - theta.size)
+    scatter = float(np.sqrt(np.sum(residual**2) / (points.t.size - theta.size)))
+    inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    errors = scatter * np.sqrt(alike * np.diag(inverse))
+    amplitudes = tuple(
+        Estimate.of(theta[i], float(errors[i]), freedom)
+        for i in range(1, points.hold.shape[1] + 1)
+    )
+    if all(a.low <= 0 <= a.high for a in amplitudes):
         raise NotIdentifiableError("I_DS does not change during the hold")
-    factor = np.exp(student_95(freedom) * log_error)
+    factor = np.exp(student_95(freedom) * errors[0])
     tau = float(np.exp(theta[0]))
     if not np.isfinite(factor) or factor > 2:
         raise NotIdentifiableError(
@@ -153,8 +199,25 @@ def _decay(theta: FloatArray, t: FloatArray, y: FloatArray) -> Decay:
             "by a factor 2; hold longer or give the current at rest"
         )
     return Decay(
-        tau=Estimate(tau, tau * log_error, tau / float(factor), tau * float(factor)),
-        amplitude=amplitude,
+        tau=Estimate(
+            tau, tau * float(errors[0]), tau / float(factor), tau * float(factor)
+        ),
+        amplitudes=amplitudes,
         scatter=scatter,
-        points=int(t.size),
+        points=int(points.t.size),
+        correlated=alike,
     )
+
+
+def _alike(residual: FloatArray, hold: FloatArray) -> float:
+    """How many neighbouring points err alike: 1 + 2 times the sum of correlations."""
+    power, together = float(np.sum(residual**2)), 1.0
+    if power == 0:
+        return together
+    for lag in range(1, residual.size // 4):
+        same = np.sum(hold[lag:] * hold[:-lag], axis=1)
+        correlation = float(np.sum(same * residual[lag:] * residual[:-lag])) / power
+        if correlation < 2 / np.sqrt(residual.size):
+            break
+        together += 2 * correlation
+    return together

@@ -199,6 +199,7 @@ def _trace(run: Run, name: str) -> RecordedSignal:
         scale=float(signal.attributes.get("scale", 1.0)),
         code=abs(signal.gain),
         overrange=overrange(run, name),
+        samples=cells.width / signal.interval,
     )
 
 

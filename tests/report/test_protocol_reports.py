@@ -158,22 +158,60 @@ def test_a_trial_with_one_spike_is_drawn_with_no_rate(rate_force):
     assert (list(silent.x), list(silent.y)) == ([0.085], [0])
 
 
-def test_bipolar_tells_the_currents_and_tau():
+CODE = 4.0 / 254
+
+
+def pushed_and_pulled(seed, *, late=0.06):
+    """A `bipolar` run of +-80 mN as an 8 bit scope shows it; forces come `late` s."""
     steps = []
-    for level in (0.1, -0.1):
-        wave = Waveform.pulse(level, ramp=0.25, hold=6.0, rest=4.0)
-        steps.append((f"{level}", level, wave, False))
-    quiet = ("rest", 0.0, Waveform.through([(0.0, 0.0), (0.5, 0.0)]), False)
-    run = modelled("bipolar", [quiet, *steps], searched=False, bins=4000)
-    held = tuple(
-        replace(t, hold=(0.25, 6.25)) if t.level else replace(t, hold=None)
-        for t in run.trials
-    )
-    values = find(replace(run, trials=held)).conclusion.plain
-    push, pull = values["I_DS_changes"]
-    assert push["change_A"] > 30e-9
-    assert pull["change_A"] < -5e-9
-    assert values["tau_s"]["value"] == pytest.approx(8.69, rel=0.03)
+    for level in (0.08, -0.08):
+        pulse = Waveform.pulse(level, ramp=0.25, hold=5.0, rest=4.0)
+        wave = Waveform(np.append(0.0, pulse.time + late), np.append(0.0, pulse.value))
+        steps.append((f"{level * 1e3:g} mN", level, wave, False))
+    quiet = ("rest", None, Waveform.through([(0.0, 0.0), (0.5, 0.0)]), False)
+    run = modelled("bipolar", [quiet, *steps], searched=False, bins=2000)
+    held = tuple(replace(t, hold=t.level and (0.25, 5.25)) for t in run.trials)
+    V_C1, rng = run.traces[0], np.random.default_rng(seed)
+    noisy = V_C1.mean[:, None] + rng.normal(0, 5e-3, (2000, 100))
+    shown = 2.5 + CODE * np.rint((noisy - 2.5) / CODE).mean(axis=1)
+    seen = replace(V_C1, mean=shown, code=CODE, samples=100)
+    return replace(run, trials=held[1:], traces=(seen,))
+
+
+def test_bipolar_s_intervals_hold_though_the_converter_has_steps():
+    truth = {}
+    for seed in range(6):
+        run = pushed_and_pulled(seed)
+        values = find(run).conclusion.plain
+        tau = values["tau_s"]
+        assert tau["low_95"] < 8.69 < tau["high_95"]
+        assert tau["high_95"] - tau["low_95"] < 0.5
+        for change in values["I_DS_changes"]:
+            level = change["level_N"]
+            if level not in truth:
+                truth[level] = _changed_by_eq_8(run, level)
+            off = change["change_A"] - truth[level]
+            assert abs(off) < change["change_uncertainty_A_95"]
+            assert abs(off) < 0.03 * abs(truth[level])
+
+
+def _changed_by_eq_8(run, level):
+    """From before the push to when the force is there, node A having followed."""
+    trial = next(t for t in run.trials if t.level == level)
+    made = simulate(Circuit(), run.force, keep=("V_P",))
+    ends = np.array([trial.start, run.applied_edge(trial)])
+    before, after = np.exp(made.sample("V_P", ends) / (5.646 * 0.025))
+    return 24.69e-9 * (after - before)
+
+
+def test_bipolar_without_a_rest_before_it_says_so():
+    run = pushed_and_pulled(0)
+    late = tuple(replace(t, start=t.start - 0.5) for t in run.trials)
+    kept = run.traces[0].time >= 0.8
+    time, mean = (v[kept] for v in (run.traces[0].time - 0.5, run.traces[0].mean))
+    cut = replace(run.traces[0], time=time, mean=mean)
+    found = find(replace(run, trials=late, traces=(cut,))).conclusion
+    assert "current at rest is not known" in found.missing[0]
 
 
 def test_wiring_check_passes_a_right_bench_and_names_a_wrong_one():
