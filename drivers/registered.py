@@ -39,6 +39,7 @@ def _source_capability(table: CoilSpec) -> CoilCapability:
         title=row.title,
         bipolar=row.polarity == "both",
         update_interval=row.promised_interval(table.baud),
+        lists=row.lists(table.baud),
     )
 
 

@@ -27,16 +27,21 @@ SIMULATED_POLL = 0.05
 def serial_source(table: CoilSpec, world: World) -> CoilSource:
     """A serial current source that drives the plant's coil."""
     from drivers.coil.source import CoilSource
+    from sim_backend.coil.list_mode import ListFault
     from sim_backend.coil.source import coil_far_end
     from sim_backend.serial_line.faults import SerialFault
     from sim_backend.serial_line.wires import plug_in
 
     row = coil_dialect(table.dialect)
     wire = row.serial.model_copy(update={"baud": table.baud or row.serial.baud})
-    faults = list(world.faults.get("coil", ()))
+    given = world.faults.get("coil", ())
+    faults = [one for one in given if isinstance(one, SerialFault)]
     if (when := world.simulated.coil_unplugged) is not None:
         faults.append(SerialFault(kind="unplug", after=when, times=None))
     source = coil_far_end(world.plant, row, world.clock)
+    for one in given:
+        if isinstance(one, ListFault):
+            source.list.fault = one
     far_end = plug_in(source, wire, world.clock, "coil", faults)
     return CoilSource(row, far_end.url, table.limits, world.clock, baud=table.baud)
 

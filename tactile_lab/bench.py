@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.clock import Clock
+from tactile_lab.current_list import CurrentList, ListCapability
 from tactile_lab.quantity import Unit
 from tactile_lab.table import SceneTable
 
@@ -27,7 +28,9 @@ class CoilLimits(SceneTable):
 
     Attributes:
         current: largest magnitude, A.
-        slew: largest rate of change, A/s.
+        slew: largest rate of change from one set-point to the next, A/s.
+        list_slew: the same in a list or of a generator, which keep time by themselves,
+            A/s; `slew` where it is not given.
         compliance: voltage limit of the source, V.
         continuous: current that may flow for ever, A.
         heat: budget of the leaky integral of I^2 above `continuous`^2, A^2 s.
@@ -37,11 +40,17 @@ class CoilLimits(SceneTable):
 
     current: Annotated[float, Unit("A", above=0.0)] = 2.0
     slew: Annotated[float, Unit("A/s", above=0.0)] = 5.0
+    list_slew: Annotated[float, Unit("A/s", above=0.0)] | None = None
     compliance: Annotated[float, Unit("V", above=0.0)] = 14.0
     continuous: Annotated[float, Unit("A", above=0.0)] = 0.6
     heat: Annotated[float, Unit("A^2 s", above=0.0)] = 30.0
     recovery: Annotated[float, Unit("s", above=0.0)] = 60.0
     resistance: Annotated[float, Unit("Ohm", above=0.0)] | None = None
+
+    @property
+    def fastest(self) -> float:
+        """Largest rate of change where the instruments keep time themselves, A/s."""
+        return self.slew if self.list_slew is None else self.list_slew
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +159,27 @@ class Coil(Protocol):
         ...
 
 
+class ListCoil(Coil, Protocol):
+    """A current source that also plays lists of currents by its own clock."""
+
+    def load_list(self, points: CurrentList) -> None:
+        """Send a list to the source, which stands at 0 A; checked and verified.
+
+        Raises:
+            LimitError: a list that source, coil or heat budget do not allow.
+            RefusedError: the source does not hold all of it.
+        """
+        ...
+
+    def start_list(self) -> None:
+        """Have the list that was loaded last played once, from now on."""
+        ...
+
+    def end_list(self) -> None:
+        """Go back to a set-point of 0 A once the list has ended."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class CoilCapability:
     """What a source can do, as far as is known before it is opened.
@@ -158,11 +188,13 @@ class CoilCapability:
         title: of the model, for people.
         bipolar: gives current of both signs.
         update_interval: time between two set-points to plan with, s.
+        lists: what lists it plays by its own clock (a `ListCoil`), or None.
     """
 
     title: str
     bipolar: bool
     update_interval: float
+    lists: ListCapability | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

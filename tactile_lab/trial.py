@@ -119,6 +119,9 @@ class Protocol(BaseModel):
     moves_probes: ClassVar[bool] = False
     """The probes of the circuit's voltages are put on 0 V and V_S, too: their ranges
     are widened to see both, and the model is not compared with them."""
+    accuracy: ClassVar[float] = 1.0
+    """Largest error of the force, as a part of its range, that its answer bears: by
+    which way the coil plays it (`[coil] way`)."""
     checks: ClassVar[Literal["", "wiring", "field", "force"]] = ""
     """What of the bench it checks or calibrates; the connect dialog offers it there."""
 

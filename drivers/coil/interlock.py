@@ -6,12 +6,13 @@ Only hardware is a real interlock; these catch mistakes, not broken electronics.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 
 from drivers.coil.guard import Guard
 from tactile_lab.bench import COPPER, CoilLimits
+from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InterlockError, LimitError
 from tactile_lab.instruments.serial_dialect import CoilDialect
 from tactile_lab.quantity import show
@@ -36,6 +37,9 @@ NO_RESISTANCE = 0.05
 
 STEADY = 0.1
 """Time after a change of the set-point from which read-back must agree, s."""
+
+LAG = 0.02
+"""Time by which the measured current may lag behind a list, s."""
 
 THERMOMETER_EVERY = 1.0
 """Time between two looks at the coil's resistance, s."""
@@ -97,6 +101,7 @@ class Interlock:
         self._warn = warn
         self._readback = ReadbackCheck()
         self._setpoint: float | None = None
+        self._list: tuple[CurrentList, float, float] | None = None
         self._changed = time
         self._looked = -math.inf
 
@@ -105,9 +110,15 @@ class Interlock:
         if setpoint != self._setpoint:
             self._changed = time
             self._readback = ReadbackCheck()
-        self._setpoint = setpoint
+        self._setpoint, self._list = setpoint, None
         if setpoint is not None:
             self.heat.flow(time, setpoint if on else 0.0)
+
+    def plays(self, points: CurrentList, earliest: float, latest: float) -> None:
+        """A list has begun between `earliest` and `latest` s; counts all its heat."""
+        self.flows(latest, None, on=True)
+        self._list = points, earliest, latest
+        self.heat.spend_list(points, earliest)
 
     def refuse_when_tripped(self) -> None:
         """Refuse to go on before someone has looked.
@@ -130,12 +141,17 @@ class Interlock:
         return self.heat.complaint(time)
 
     def after_reading(
-        self, time: float, measured: float, voltage: Callable[[], float]
+        self, asked: float, time: float, measured: float, voltage: Callable[[], float]
     ) -> str | None:
         """Why the current must stop once `measured` A were read, or None.
 
-        `voltage` is asked, in V, when the resistance is due to be looked at.
+        It was measured between `asked` and `time` s. `voltage` is asked, in V, when the
+        resistance is due to be looked at.
         """
+        if self._list is not None:
+            points, earliest, latest = self._list
+            within = points.between(asked - latest - LAG, time - earliest)
+            return self._readback.list_complaint(within, measured)
         if self._setpoint is None or time - self._changed <= STEADY:
             return None
         why = self._readback.complaint(
@@ -182,21 +198,29 @@ class HeatBudget:
             return self._used + excess * passed
         return self._used * math.exp(-passed / self._limits.recovery)
 
-    def refuse_list(self, currents: Sequence[float], dwell: float, time: float) -> None:
-        """Refuse a list of currents (A, `dwell` s each) that would use too much.
+    def refuse_list(self, points: CurrentList, time: float) -> None:
+        """Refuse a list of currents that would use too much.
 
         Raises:
             LimitError: it would.
         """
-        foreseen = copy(self)
-        foreseen.spend_list(currents, dwell, time)
-        if (why := foreseen.complaint(time)) is not None:
-            raise LimitError(f"After this list: {why}")
+        if (why := copy(self).spend_list(points, time)) is not None:
+            raise LimitError(f"With this list: {why}")
 
-    def spend_list(self, currents: Sequence[float], dwell: float, time: float) -> None:
-        """Count a list of currents from `time` s on, all of it at once."""
-        for k, current in enumerate((*currents, 0.0)):
-            self.flow(time + k * dwell, current)
+    def spend_list(self, points: CurrentList, time: float) -> str | None:
+        """Count a list of currents from `time` s on, all of it at once.
+
+        Returns:
+            Why the current would have to stop on the way, or None.
+        """
+        starts = [*(time + points.starts).tolist(), time + points.duration]
+        why = None
+        for start, current in zip(
+            starts, [*points.currents.tolist(), 0.0], strict=True
+        ):
+            self.flow(start, current)
+            why = why or self.complaint(start)
+        return why
 
     def complaint(self, time: float) -> str | None:
         """Why the current must stop, or None."""
@@ -220,18 +244,37 @@ class ReadbackCheck:
         self, setpoint: float, measured: float, compliance: float
     ) -> str | None:
         """Why the current must stop, or None; A and V."""
-        allowed = max(DEVIATION_SHARE * abs(setpoint), DEVIATION)
-        if abs(measured - setpoint) <= allowed:
-            self.deviating = 0
-            return None
-        self.deviating += 1
-        if self.deviating < DEVIATING_READINGS:
+        if not self._deviates((setpoint, setpoint), measured):
             return None
         return (
             f"The source is set to {show(setpoint, 'A')} but {show(measured, 'A')} "
             f"flows, {self.deviating} readings in a row: the circuit is open, or the "
             f"compliance of {show(compliance, 'V')} is too low. Check leads and limit."
         )
+
+    def list_complaint(
+        self, within: tuple[float, float], measured: float
+    ) -> str | None:
+        """Why a list that gives what lies `within` must stop, or None; A."""
+        if not self._deviates(within, measured):
+            return None
+        told = " to ".join(show(current, "A") for current in dict.fromkeys(within))
+        return (
+            f"The source plays a list that gives {told} now but "
+            f"{show(measured, 'A')} flows, {self.deviating} readings in a row: the "
+            "list did not start or was cut short, or the circuit is open. Check the "
+            "front panel and the leads."
+        )
+
+    def _deviates(self, within: tuple[float, float], measured: float) -> bool:
+        """Whether one reading too many lies outside what is expected, A."""
+        low, high = within
+        allowed = max(DEVIATION_SHARE * max(abs(low), abs(high)), DEVIATION)
+        if low - allowed <= measured <= high + allowed:
+            self.deviating = 0
+            return False
+        self.deviating += 1
+        return self.deviating >= DEVIATING_READINGS
 
 
 @dataclass

@@ -1,29 +1,33 @@
-"""Lists of currents that a source plays by its own clock, checked before upload.
+"""Loading a list of currents into a source, checked before and after.
 
 A list runs on when this program dies, so it is always finite and ends at 0 A.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from itertools import pairwise
+
+import numpy as np
 
 from drivers.coil.interlock import check_current
 from drivers.coil.wire import CoilWire
 from tactile_lab.bench import CoilLimits
-from tactile_lab.errors import LimitError
+from tactile_lab.current_list import CurrentList
+from tactile_lab.errors import LimitError, RefusedError
 from tactile_lab.instruments.serial_dialect import CoilDialect, ListMode
 from tactile_lab.quantity import show
 
+LOADS = 2
+"""Times a list is sent: a line is repeated where its answer was lost, and then its
+points stand twice in the memory."""
 
-def check_list(
-    currents: Sequence[float], dwell: float, limits: CoilLimits, row: CoilDialect
-) -> ListMode:
+
+def check_list(points: CurrentList, limits: CoilLimits, row: CoilDialect) -> ListMode:
     """Refuse a list that may not be played; the row's list mode otherwise.
 
     Args:
-        currents: A, one per point; the last must be 0.
-        dwell: time of each point, s.
+        points: the last must be 0 A.
         limits: in force.
         row: the source's dialect.
 
@@ -37,44 +41,63 @@ def check_list(
             f"{row.title} has no list mode; play the waveform by host time, or use an "
             "external waveform generator."
         )
-    if not mode.shortest <= dwell <= mode.longest:
+    if not 1 <= len(points) <= mode.max_points:
         raise LimitError(
-            f"A dwell of {show(dwell, 's')} cannot be played; the source takes "
-            f"{show(mode.shortest, 's')} to {show(mode.longest, 's')}."
-        )
-    if not 1 <= len(currents) <= mode.max_points:
-        raise LimitError(
-            f"A list of {len(currents)} points cannot be played; the source takes 1 to "
+            f"A list of {len(points)} points cannot be played; the source takes 1 to "
             f"{mode.max_points}."
         )
-    for current in currents:
-        check_current(current, limits, row)
-    if currents[-1] != 0.0:
+    for dwell in (float(points.dwells.min()), float(points.dwells.max())):
+        if not mode.shortest * (1 - 1e-9) <= dwell <= mode.longest * (1 + 1e-9):
+            raise LimitError(
+                f"A dwell of {show(dwell, 's')} cannot be played; the source takes "
+                f"{show(mode.shortest, 's')} to {show(mode.longest, 's')}."
+            )
+    for current in points.currents:
+        check_current(float(current), limits, row)
+    if points.currents[-1] != 0.0:
         raise LimitError(
-            f"The list ends at {show(currents[-1], 'A')}; it must end at 0 A, because "
-            "its last point lasts until someone stops it."
+            f"The list ends at {show(float(points.currents[-1]), 'A')}; it must end at "
+            "0 A, because its last point lasts until someone stops it."
         )
-    steepest = max(abs(b - a) for a, b in pairwise((0.0, *currents)))
-    if steepest > limits.slew * dwell * (1 + 1e-9):
+    if points.steepest > limits.fastest * (1 + 1e-3):
         raise LimitError(
-            f"A step of {show(steepest, 'A')} in {show(dwell, 's')} exceeds the slew "
-            f"limit of {show(limits.slew, 'A/s')}. Use smaller or longer steps."
+            f"Steps of up to {show(points.steepest, 'A/s')} exceed the limit of "
+            f"{show(limits.fastest, 'A/s')}. Use smaller or longer steps, or allow "
+            "more by list_slew in [coil.limits] of the bench file."
         )
     return mode
 
 
-def upload(
-    wire: CoilWire, mode: ListMode, currents: Sequence[float], dwell: float
-) -> None:
-    """Send a checked list, to be played once; each line is verified."""
+def load(wire: CoilWire, mode: ListMode, points: CurrentList) -> None:
+    """Send a checked list, to be played once; each line and the count are verified.
+
+    Raises:
+        RefusedError: a line is refused, or the memory holds another number of points.
+    """
     digits = wire.dialect.digits
-    for line in mode.clear:
-        wire.command(line)
-    template = mode.points
-    for first in range(0, len(currents), mode.points_per_line):
-        part = currents[first : first + mode.points_per_line]
-        values = ",".join(f"{round(i, digits) + 0.0:.{digits}f}" for i in part)
-        wire.command(template.format(values=values))
-        template = mode.append or mode.points
-    wire.command(mode.dwell.format(t=dwell))
-    wire.command(mode.count.format(n=1))
+    currents = [f"{i:.{digits}f}" for i in points.currents]
+    dwells = [f"{t:.{mode.dwell_digits}f}" for t in points.dwells]
+    if np.all(points.dwells == points.dwells[0]):
+        dwells = dwells[:1]  # one stands for all
+    held = math.nan
+    for _ in range(LOADS):
+        for line in mode.clear:
+            wire.command(line)
+        _send(wire, mode, mode.points, currents)
+        _send(wire, mode, mode.dwells, dwells)
+        wire.command(mode.count.format(n=1))
+        if mode.points_query is None:
+            return
+        held = wire.number(mode.points_query)
+        if held == len(points):
+            return
+    raise RefusedError(
+        f"The source holds {held:g} points of a list of {len(points)}: it was not "
+        "loaded as it was sent. Check the link, and try again."
+    )
+
+
+def _send(wire: CoilWire, mode: ListMode, template: str, values: Sequence[str]) -> None:
+    for first in range(0, len(values), mode.points_per_line):
+        part = values[first : first + mode.points_per_line]
+        wire.command(template.format(values=",".join(part)))

@@ -6,16 +6,16 @@ heat budget, read-back, resistance. Every way out leads through `safe_off`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from drivers.coil.guard import Guard, in_process
 from drivers.coil.interlock import Interlock, check_current, narrowed
-from drivers.coil.list_mode import check_list, upload
+from drivers.coil.list_mode import check_list, load
 from drivers.coil.wire import CoilWire
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading
 from tactile_lab.clock import Clock
+from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError, InterlockError, LimitError, UnsafeError
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
@@ -72,6 +72,7 @@ class CoilSource:
         self._wire = CoilWire(link, dialect)
         self._interval = dialect.promised_interval(baud)
         self._setpoint: float | None = None
+        self._loaded: CurrentList | None = None
         self._commanded = clock.now()
         self._energised = False
         self._reached = False
@@ -196,28 +197,41 @@ class CoilSource:
         self._took(wanted)
         return wanted
 
-    def play_list(self, currents: Sequence[float], dwell: float) -> float:
-        """Have the source itself play `currents`, A, each for `dwell` s; its length, s.
+    def load_list(self, points: CurrentList) -> None:
+        """Send a list to the source, which stands at 0 A; checked and verified.
+
+        Raises:
+            LimitError: a list the source, coil or heat budget does not allow.
+            RefusedError: the source does not hold all of it.
+        """
+        mode = check_list(points, self._limits, self.dialect)
+        self._interlock.heat.refuse_list(points, self._clock.now())
+        self._loaded = None
+        load(self._wire, mode, points)
+        self._loaded = points
+
+    def start_list(self) -> None:
+        """Have the source play the list loaded last, once, from now on.
 
         Returns once it has started. The set-point is unknown until `end_list`.
 
         Raises:
-            LimitError: a list the source, coil or heat budget does not allow, or the
+            LimitError: nothing is loaded, the heat budget no longer allows it, or the
                 output is off or not at 0 A.
+            InterlockError: the guard is gone; the output is off by then.
         """
         self._interlock.refuse_when_tripped()
         self._trip_on(self._interlock.before_setting(self._clock.now()))
         if not self._energised or self._setpoint != 0.0:
             raise LimitError("A list starts with the output on and at 0 A.")
-        mode = check_list(currents, dwell, self._limits, self.dialect)
-        self._interlock.heat.refuse_list(currents, dwell, self._clock.now())
-        upload(self._wire, mode, currents, dwell)
-        for line in mode.start:
-            self._wire.command(line)
+        if self._loaded is None or self.dialect.list is None:
+            raise LimitError("No list is loaded that could start.")
+        asked = self._clock.now()
+        self._interlock.heat.refuse_list(self._loaded, asked)
         self._setpoint = None
-        self._interlock.flows(self._clock.now(), None, on=True)
-        self._interlock.heat.spend_list(currents, dwell, self._clock.now())
-        return len(currents) * dwell
+        for line in self.dialect.list.start:
+            self._wire.command(line)
+        self._interlock.plays(self._loaded, asked, self._clock.now())
 
     def end_list(self) -> None:
         """Go back to a set-point of 0 A, once the list has ended."""
@@ -236,9 +250,12 @@ class CoilSource:
         if not self._energised:
             return Reading(self._clock.now(), self._wire.current_when_off())
         self._trip_on(self._interlock.before_setting(self._clock.now()))
+        asked = self._clock.now()
         measured = self._wire.current()
         now = self._clock.now()
-        self._trip_on(self._interlock.after_reading(now, measured, self._wire.voltage))
+        self._trip_on(
+            self._interlock.after_reading(asked, now, measured, self._wire.voltage)
+        )
         return Reading(now, measured)
 
     @property

@@ -68,8 +68,9 @@ def _list(source: CoilPanel) -> dict[str, Handler]:
     def repetitions(count: float) -> None:
         source.list.count = int(count)
 
-    def dwell(seconds: float) -> None:
-        source.list.dwell = seconds
+    def dwells(argument: str) -> None:
+        for part in argument.split(","):
+            source.list.append_dwell(number(part.strip(), 0.0005, 10.0))
 
     def mode(choice: str) -> None:
         source.play_list(choice == "LIST")
@@ -78,7 +79,8 @@ def _list(source: CoilPanel) -> dict[str, Handler]:
         "LIST:CLEar": bare(source.list.clear),
         "LIST:CURRent": points,
         "LIST:CURRent:POINts?": lambda _: str(len(source.list.points)),
-        "LIST:DWELl": numeric(dwell, 0.0005, 10.0),
+        "LIST:DWELl": dwells,
+        "LIST:DWELl:POINts?": lambda _: str(len(source.list.dwells)),
         "LIST:COUNt": numeric(repetitions, 0, 255),
         "[SOURce:]CURRent:MODE": one_of(mode, "FIXed", "LIST"),
         "[SOURce:]CURRent:MODE?": lambda _: str(int(source.list.playing)),

@@ -66,11 +66,12 @@ class CoilPanel:
         if not self.list.playing:
             self.drive(current)
 
-    def drive(self, current: float) -> None:
-        """Regulate to `current`, A, from now on."""
-        self._note("set", current)
+    def drive(self, current: float, time: float | None = None) -> None:
+        """Regulate to `current`, A, from clock time `time` s on; now unless given."""
+        time = self._clock.now() if time is None else time
+        self.on_change(PanelChange("set", time, current))
         if self.current_mode:
-            self._plant.set_current(self._clock.now(), current)
+            self._plant.set_current(time, current)
 
     def play_list(self, yes: bool) -> None:
         """Play the list, or go back to the set-point."""

@@ -9,15 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.acquisition import events
-from tactile_lab.acquisition.alignment import CLUSTER, Edge, align, find_edges
-from tactile_lab.acquisition.coil_thread import Applied
+from tactile_lab.acquisition.alignment import (
+    CLUSTER,
+    Edge,
+    align,
+    find_edges,
+    find_list,
+)
+from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
+from tactile_lab.quantity import show
 from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome, Trial
+
+MOST_UNLIKE = 0.25
+"""Part of the sampled current's variance that a list may leave open."""
+
+MOST_LONGER = 3e-3
+"""Time by which a list may come too late half-way, s."""
 
 
 class Rate:
@@ -70,6 +83,8 @@ class Account:
         self._waiting: list[tuple[str, str]] = []
         self.edges: list[Edge] = []
         self._current: list[Applied] = []
+        self._unwritten: list[Applied] = []
+        self._written = float("-inf")
 
     @property
     def now(self) -> float:
@@ -146,12 +161,28 @@ class Account:
                 self.warn(text)
             for applied in coil.take_applied():
                 self._current.append(applied)
+                self._unwritten.append(applied)
                 row = (self.axis(applied.time), applied.setpoint, applied.measured)
-                self.journal.current(*row, applied.ratio)
                 self.emit(events.CoilCurrent(*row, asked=self.axis(applied.asked)))
+            if not any(one.listed for one in self._unwritten):
+                self.write_current()
         if meter is not None:
             for reading in meter.take_readings():
                 self.field(self.axis(reading.time), reading.value)
+
+    def write_current(self, later: float = 0.0) -> None:
+        """Write down what was applied; points of a list came `later`, s, than thought.
+
+        They wait for this until the samples have shown when the list began.
+        """
+        if self.journal is None:
+            return
+        for one in self._unwritten:
+            time = self.axis(one.time) + (later if one.listed else 0.0)
+            self._written = max(time, self._written)
+            row = self._written, one.setpoint, one.measured, one.ratio
+            self.journal.current(*row, listed=one.listed)
+        self._unwritten = []
 
     def field(self, time: float, tesla: float) -> None:
         """The field was read at run time `time` s."""
@@ -166,6 +197,33 @@ class Account:
             # the first and the newest fix the clocks; those between add nothing
             del self.edges[CLUSTER:-CLUSTER]
             self.edges.extend(found)
+
+    def note_list(self, played: PlayedList, shunt: Trace | None) -> None:
+        """A list has been played: find it in the binned coil current, where there is.
+
+        Its points are written down as the samples show them.
+        """
+        seen = None
+        if self._origin is not None and shunt is not None:
+            seen = find_list(played, self._origin, shunt)
+        if seen is None:
+            self.write_current()
+        elif seen.unlike > MOST_UNLIKE:
+            self.write_current()
+            self.warn(
+                "The coil current that was sampled is not that of the list: "
+                f"{100 * seen.unlike:.0f} % of it differs. What was sampled is kept. "
+                "Check the shunt's wiring, and the source's list mode."
+            )
+        else:
+            self.write_current(seen.edge.sampled - self.axis(played.began))
+            self.edges.append(seen.edge)
+            if abs(seen.longer) > MOST_LONGER:
+                self.warn(
+                    f"The source took {show(seen.longer, 's', 2)} longer than asked "
+                    "for half of a list: it rounds the dwells. What was sampled is "
+                    "kept."
+                )
 
     def align(self, start: float, stop: float, uncertainty: float) -> None:
         """Correct the segment from `start` to `stop` s of run time by its edges."""

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.coil_thread import Applied
+from tactile_lab.acquisition.coil_thread import Applied, PlayedList
+from tactile_lab.current_list import CurrentList
 from tactile_lab.trace import Trace
 
 SMALLEST = 0.03
@@ -30,6 +31,9 @@ STEEPEST = 5e-4
 
 SEARCH = 0.02
 """How far beyond its host times an edge is looked for, s."""
+
+SHIFT = 5e-4
+"""Step in which the place of a list is looked for, s."""
 
 CLUSTER = 20
 """Edges at either end of a segment that fix the clocks there."""
@@ -67,6 +71,8 @@ class Alignment:
 def find_edges(applied: Sequence[Applied], zero: float, shunt: Trace) -> list[Edge]:
     """Edges of the set-points in `applied`, as the binned coil current shows them.
 
+    The points of a list are too near each other for that: see `find_list`.
+
     Args:
         applied: consecutive set-points, clock times in s.
         zero: clock time of run time 0, s.
@@ -77,7 +83,7 @@ def find_edges(applied: Sequence[Applied], zero: float, shunt: Trace) -> list[Ed
     before: float | None = None
     for one in applied:
         step = 0.0 if before is None else one.setpoint - before
-        if before is not None and abs(step) >= SMALLEST:
+        if before is not None and abs(step) >= SMALLEST and not one.listed:
             earliest, latest = one.asked - zero, one.time - zero + COIL_LAG
             low, high = np.searchsorted(middle, [earliest - SEARCH, latest + SEARCH])
             # how far the current has come from the old level to the new one
@@ -87,6 +93,70 @@ def find_edges(applied: Sequence[Applied], zero: float, shunt: Trace) -> list[Ed
                 found.append(Edge(at, earliest, latest))
         before = one.setpoint
     return found
+
+
+@dataclass(frozen=True)
+class SeenList:
+    """A list of currents, as the samples show it.
+
+    Attributes:
+        edge: where it began, on both clocks.
+        unlike: part of the current's variance that the list does not account for.
+        longer: by how much its second half came later than its first, s.
+    """
+
+    edge: Edge
+    unlike: float
+    longer: float
+
+
+def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
+    """Where the binned coil current shows a list; None where it moves too little.
+
+    Args:
+        played: the list.
+        zero: clock time of run time 0, s.
+        shunt: coil current, A, on the run's axis.
+    """
+    points, began = played.points, played.began - zero
+    if float(np.std(points.currents)) < SMALLEST:
+        return None
+    spread = (played.latest - played.earliest) / 2
+    reach = spread + SEARCH
+    shifts = np.arange(-reach, reach + COIL_LAG, SHIFT)
+    inside = shunt.cut(began - reach, began + points.duration + reach)
+    if inside.time.size < 3:
+        return None
+    half = inside.time.size // 2
+    found = [_best(points, began, inside, shifts, part) for part in (
+        slice(None), slice(None, half), slice(half, None)
+    )]  # fmt: skip
+    (shift, unlike), first, last = found[0], found[1], found[2]
+    edge = Edge(began + shift, began - spread, began + spread + COIL_LAG)
+    return SeenList(edge, unlike, last[0] - first[0])
+
+
+def _best(
+    points: CurrentList,
+    began: float,
+    seen: Trace,
+    shifts: NDArray[np.float64],
+    part: slice,
+) -> tuple[float, float]:
+    """The shift, s, with which the list is most like what was seen, and how unlike."""
+    time, mean = seen.time[part], seen.mean[part].astype(np.float64)
+    variance = float(np.var(mean)) or 1.0
+    left = np.array([
+        np.var(points.mean(time - began - by, seen.width) - mean) for by in shifts
+    ])  # fmt: skip
+    k = int(np.argmin(left))
+    if 0 < k < shifts.size - 1:
+        before, at, after = left[k - 1 : k + 2]
+        bend = before - 2 * at + after
+        off = 0.5 * (before - after) / bend if bend > 0 else 0.0
+    else:
+        off = 0.0
+    return float(shifts[k] + off * SHIFT), float(left[k]) / variance
 
 
 def align(

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
 
 from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
 from tactile_lab.acquisition.stop import Lease, StopRequest
-from tactile_lab.bench import Coil, OffReport
+from tactile_lab.bench import Coil, ListCoil, OffReport
 from tactile_lab.clock import Clock
+from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError
 from tactile_lab.waveform import Waveform
 
@@ -30,10 +34,12 @@ class Applied:
 
     Attributes:
         asked: clock time at which the source was addressed, s.
-        time: clock time at which it had acted, s.
+        time: clock time at which it had acted, s; of a list's point, when its turn
+            came.
         setpoint: A.
         measured: current read back, A; None where only the set-point was sent.
         ratio: resistance over that of the cold coil, as last looked at, or None.
+        listed: it is a point of a list that the source played.
     """
 
     asked: float
@@ -41,13 +47,43 @@ class Applied:
     setpoint: float
     measured: float | None
     ratio: float | None = None
+    listed: bool = False
+
+
+@dataclass(frozen=True)
+class PlayedList:
+    """A list of currents that the source plays by its own clock.
+
+    Attributes:
+        points: the list.
+        earliest, latest: between which clock times it began, s.
+    """
+
+    points: CurrentList
+    earliest: float
+    latest: float
+
+    @property
+    def began(self) -> float:
+        """When it is taken to have begun, clock time, s."""
+        return (self.earliest + self.latest) / 2
+
+    @property
+    def end(self) -> float:
+        """When it has surely ended, clock time, s."""
+        return self.latest + self.points.duration
 
 
 class CoilThread(InstrumentThread):
     """Owns the current source.
 
     Each set-point is the waveform's value at the time it is sent, so a late one is
-    never queued: the latest value wins and slots that passed unused are counted.
+    never queued: the latest value wins and slots that passed unused are counted. A
+    list is loaded, started and watched; the source keeps its time.
+
+    Attributes:
+        loaded: the list that the source holds, or None.
+        list: the list of this trial, playing or played, or None.
     """
 
     def __init__(
@@ -73,6 +109,12 @@ class CoilThread(InstrumentThread):
         self._waveform: Waveform | None = None
         self._until = 0.0
         self._next = 0.0
+        self.loaded: CurrentList | None = None
+        self.list: PlayedList | None = None
+        self._load: CurrentList | None = None
+        self._start_list = False
+        self._playing = False
+        self._passed = 0
 
     @property
     def state(self) -> CoilState:
@@ -87,8 +129,23 @@ class CoilThread(InstrumentThread):
 
     def play(self, current: Waveform, until: float) -> None:
         """Play `current` (A against clock time, s) from now until `until` s."""
-        self._waveform, self._until = current, until
+        self._waveform, self._until, self.list = current, until, None
         self._next = self.clock.now()
+        self.clock.notify()
+
+    @property
+    def plays_list(self) -> bool:
+        """Whether a list plays."""
+        return self._playing
+
+    def load_list(self, points: CurrentList) -> None:
+        """Ask for a list to be loaded; it is once `loaded` is this one."""
+        self._load = points
+        self.clock.notify()
+
+    def play_list(self) -> None:
+        """Ask for the loaded list to be played; `list` tells when it began."""
+        self.list, self._start_list = None, True
         self.clock.notify()
 
     def take_warnings(self) -> list[str]:
@@ -120,6 +177,10 @@ class CoilThread(InstrumentThread):
                 self._note(self._read_back(self.clock.now(), 0.0))
                 self._energise, self.live = False, True
                 self.clock.notify()
+            if self._load is not None or self._start_list:
+                self._begin_list(cast("ListCoil", self.coil))
+            if self.list is not None and self._playing:
+                self._watch(self.list, self.clock.now())
             now = self.clock.now()
             if self._waveform is not None and now >= self._next:
                 self._update(self._waveform, now)
@@ -138,7 +199,8 @@ class CoilThread(InstrumentThread):
 
     def _called(self) -> bool:
         due = self._waveform is not None and self.clock.now() >= self._next
-        return due or self._leaving or self._stop.requested or self._energise
+        asked = self._energise or self._load is not None or self._start_list
+        return due or asked or self._leaving or self._stop.requested
 
     def _wake(self) -> float:
         pulse = self.clock.now() + 0.1
@@ -166,6 +228,42 @@ class CoilThread(InstrumentThread):
         arrived = self.last and abs(self.last.setpoint - setpoint) <= RESOLUTION
         if now >= self._until and arrived:
             self._waveform = None
+
+    def _begin_list(self, coil: ListCoil) -> None:
+        """Load a list, or start the one that is loaded."""
+        if self._load is not None:
+            if not self._load.same_as(self.loaded):
+                coil.load_list(self._load)
+            self.loaded, self._load = self._load, None
+        if self._start_list and self.loaded is not None:
+            asked = self.clock.now()
+            coil.start_list()
+            self.list = PlayedList(self.loaded, asked, self.clock.now())
+            self._start_list, self._playing, self._passed = False, True, 0
+            self._read = asked
+        self.clock.notify()
+
+    def _watch(self, played: PlayedList, now: float) -> None:
+        """Note the points that have passed, read back now and then, end the list."""
+        points, coil = played.points, cast("ListCoil", self.coil)
+        passed = int(np.searchsorted(points.starts, now - played.latest, side="right"))
+        for k in range(self._passed, passed):
+            at, current = float(points.starts[k]), float(points.currents[k])
+            point = Applied(
+                played.earliest + at, played.began + at, current, None, listed=True
+            )
+            self.last = point
+            self._applied.append(point)
+        self._passed = max(passed, self._passed)
+        if now >= played.end:
+            coil.end_list()
+            self._playing = False
+            self._note(self._read_back(now, 0.0))
+            self.clock.notify()
+        elif now - self._read >= READ_BACK_EVERY:
+            # judged by the driver; it belongs to no one point, so it is no `Applied`
+            reading = coil.read_current()
+            self.measured, self._read = reading.value, reading.time
 
     def _rests(self, waveform: Waveform, now: float) -> bool:
         """Whether a read-back delays no set-point: it takes about an update."""

@@ -36,8 +36,13 @@ class Journal(Protocol):
         setpoint: float,
         measured: float | None,
         ratio: float | None = None,
+        *,
+        listed: bool = False,
     ) -> None:
-        """A set-point as applied, A; read-back and resistance over cold, if known."""
+        """A set-point as applied, A; read-back and resistance over cold, if known.
+
+        `listed`: a point of a list, which the source took by its own clock.
+        """
         return
 
     def field(self, time: float, field: float) -> None:

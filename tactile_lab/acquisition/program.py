@@ -10,8 +10,8 @@ from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Channel
+from tactile_lab.drive import Drive
 from tactile_lab.trial import Trial, Trials
-from tactile_lab.waveform import Waveform
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class Program:
         channels: scope channels to enable, in row order.
         interval: sample interval asked for, s.
         search: how spikes are searched; None where they are not.
-        current_for: coil current, A(t), that gives a trial's force within all limits,
-            told the time between two set-points, s, and the last set-point, A.
+        drive_for: how the coil gives a trial's force within all limits, told the time
+            between two set-points, s, and the last set-point, A.
         ask: asks a person to put the probes elsewhere; None where nobody is there.
         expected: run time expected, s; None if it depends on outcomes.
         doubts: told the opened instruments' settings, says what a person should know
@@ -39,7 +39,7 @@ class Program:
     channels: tuple[Channel, ...]
     interval: float
     search: SpikeSearch | None
-    current_for: Callable[[Trial, float, float], Waveform]
+    drive_for: Callable[[Trial, float, float], Drive]
     expected: float | None
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
     drift: Drift | None = None

@@ -174,6 +174,7 @@ class Pump:
             self._tell_changes()
             self._take_blocks()
             self._account.readings(self._instruments)
+            self._account.write_current()
             if self._instruments.scope is not None:
                 self._end_intake(self._instruments.scope)
         except TactileLabError as failure:

@@ -16,6 +16,7 @@ import numpy as np
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
 from tactile_lab.acquisition.asked_field import AskedField
+from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
@@ -26,6 +27,8 @@ from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Bench, Stream
+from tactile_lab.current_list import CurrentList
+from tactile_lab.drive import Drive
 from tactile_lab.errors import (
     InstrumentError,
     RecordingError,
@@ -159,11 +162,15 @@ class Runner:
             self._move_probes(trial.probes)
         rest = self._live.levels(self.intake.reached - BASELINE, self.intake.reached)
         drift = self._drifted(rest)
+        drive = self._prepared(trial)
+        asked = self._program.asked_field if trial.hold is not None else None
+        coil = self.instruments.coil
+        if coil is not None and drive is not None and drive.points is not None:
+            self._start_list(coil)
         begin, start = self._begin(index, trial)
         end = begin + trial.length
-        asked = self._program.asked_field if trial.hold is not None else None
         # a current that waits for a person is watched as long as that takes
-        skipped = self._play_current(trial, begin, math.inf if asked else end)
+        skipped = self._play_current(drive, begin, math.inf if asked else end)
         scope = self.instruments.scope
         if scope is None:
             self._pump.rest_until(end)
@@ -180,7 +187,8 @@ class Runner:
                 )
         if asked is not None:
             self._ask_field(asked, trial, start)
-        coil = self.instruments.coil
+        if coil is not None:  # its last point is 0 A and may outlast the trial
+            self._pump.until(lambda: not coil.plays_list)
         self._note_edges(start)
         spikes = self.intake.spikes_between(start, start + trial.length)
         return Outcome(
@@ -241,9 +249,10 @@ class Runner:
 
     def _pause(self, index: int, trial: Trial) -> Outcome:
         """A planned recovery: the coil holds, nothing is streamed or stored."""
+        drive = self._prepared(trial)
         begin, start = self._begin(index, trial)
         self._pump.stop_stream()
-        self._play_current(trial, begin, begin + trial.length)
+        self._play_current(drive, begin, begin + trial.length)
         self._pump.rest_until(begin + trial.length)
         self._account.pause(start, self._account.now)
         self._pump.start_stream()
@@ -283,23 +292,53 @@ class Runner:
             self._pump.until(lambda: self.intake.reached > began, grace)
 
     def _begin(self, index: int, trial: Trial) -> tuple[float, float]:
-        """Begin a trial now: its start in clock time and in run time, s."""
-        begin, start = self._clock.now(), self._account.now
+        """Begin a trial now: its start in clock time and in run time, s.
+
+        A trial whose list has just begun is taken to have begun with it.
+        """
+        coil, begin = self.instruments.coil, self._clock.now()
+        if coil is not None and coil.plays_list and coil.list is not None:
+            begin = coil.list.began
+        start = self._account.axis(begin)
         self.intake.forget_spikes_before(start)
         self._account.begun(index, trial, start)
         return begin, start
 
-    def _play_current(self, trial: Trial, begin: float, end: float) -> int:
-        """Have the coil play the trial; set-points it had skipped before."""
+    def _prepared(self, trial: Trial) -> Drive | None:
+        """How the coil gives the trial; None where there is none."""
         coil = self.instruments.coil
         if coil is None:
-            return 0
+            return None
         before = coil.last.setpoint if coil.last is not None else 0.0
-        interval = coil.coil.update_interval
-        current = self._program.current_for(trial, interval, before)
+        drive = self._program.drive_for(trial, coil.coil.update_interval, before)
+        if drive.points is not None and not drive.points.same_as(coil.loaded):
+            self._load(coil, drive.points)
+        return drive
+
+    def _load(self, coil: CoilThread, points: CurrentList) -> None:
+        """Have a list loaded; nothing is streamed meanwhile."""
+        start = self._account.now
+        self._pump.stop_stream()
+        coil.load_list(points)
+        self._pump.until(lambda: coil.loaded is points)
+        self._account.pause(start, self._account.now)
+        self._pump.start_stream()
+        self._rest(2 * BASELINE)
+
+    def _start_list(self, coil: CoilThread) -> None:
+        """Have the loaded list played, and wait until it has begun."""
+        coil.play_list()
+        self._pump.until(lambda: coil.list is not None)
+
+    def _play_current(self, drive: Drive | None, begin: float, end: float) -> int:
+        """Have the coil play a trial; set-points it had skipped before."""
+        coil = self.instruments.coil
+        if coil is None or drive is None:
+            return 0
         if self._program.drift is not None:
-            self._program.drift.plays(current, self._account.axis(begin))
-        coil.play(current.shifted(begin), end)
+            self._program.drift.plays(drive.current, self._account.axis(begin))
+        if drive.points is None:
+            coil.play(drive.current.shifted(begin), end)
         return coil.skipped
 
     def _note_watcher(self, text: str) -> None:
@@ -309,9 +348,15 @@ class Runner:
 
     def _note_edges(self, start: float) -> None:
         """Let the trial that began at `start` s of run time tell where clocks lie."""
+        shunt = None
         if "coil_current" in self._live.signals and not self._record:
-            end = self.intake.reached
-            self._account.note_edges(self._live.between(start, end, "coil_current"))
+            shunt = self._live.between(
+                start - BASELINE, self.intake.reached, "coil_current"
+            )
+            self._account.note_edges(shunt)
+        coil = self.instruments.coil
+        if coil is not None and coil.list is not None:
+            self._account.note_list(coil.list, shunt)
 
 
 def _missing(*failures: BaseException | None) -> str | None:

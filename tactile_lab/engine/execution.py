@@ -24,20 +24,20 @@ from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, Stream
+from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
-from tactile_lab.planning.current import current_for
 from tactile_lab.planning.plan import plan
+from tactile_lab.planning.way import drive_for
 from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate
 from tactile_lab.store.folder import RunFolder, Status
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.trial import Trial
-from tactile_lab.waveform import Waveform
 
 STATUS: dict[events.RunState, Status] = {
     events.RunState.COMPLETE: "complete",
@@ -201,7 +201,7 @@ class Execution(Task[Executed]):
             channels=needed.channels,
             interval=1.0 / scene.record.sample_rate,
             search=self._search,
-            current_for=self._current_for,
+            drive_for=self._drive_for,
             expected=self.plan.estimate.duration,
             doubts=self._doubts,
             drift=self._drift(),
@@ -236,10 +236,5 @@ class Execution(Task[Executed]):
             return ()
         return check_coil(self.scene, settings)
 
-    def _current_for(
-        self, trial: Trial, update_interval: float, before: float
-    ) -> Waveform:
-        coil = self.scene.bench.coil
-        assert coil is not None
-        magnet = self.scene.bench.magnet
-        return current_for(trial, magnet, coil, before, update_interval)[0]
+    def _drive_for(self, trial: Trial, update_interval: float, before: float) -> Drive:
+        return drive_for(trial, self.scene, before, update_interval)

@@ -22,6 +22,7 @@ from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench
+from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
@@ -92,7 +93,7 @@ class Monitor(Task[Ending]):
                 channels=needed.channels,
                 interval=1.0 / scene.record.sample_rate,
                 search=self._search,
-                current_for=_no_current,
+                drive_for=_no_drive,
                 expected=None,
                 doubts=lambda _: (),
             ),
@@ -183,5 +184,5 @@ def _watched(length: float) -> Outcome:
     return Outcome(trial=trial, index=0, start=0.0, spike_times=none, current=none)
 
 
-def _no_current(trial: Trial, update_interval: float, before: float) -> Waveform:
+def _no_drive(trial: Trial, update_interval: float, before: float) -> Drive:
     raise SceneError(f'Trial "{trial.label}" asks for a current; a monitor has none.')

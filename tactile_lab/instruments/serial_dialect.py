@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from tactile_lab.bench import CoilLimits
+from tactile_lab.current_list import ListCapability
 from tactile_lab.errors import SceneError
 from tactile_lab.quantity import Current, Duration, Pause, Voltage, show
 
@@ -95,23 +96,25 @@ class ListMode(Strict):
 
     Attributes:
         clear, start, stop: lines.
-        points: template of the first part, `{values}` comma-separated.
-        append: template of further parts; None where `points` appends.
-        dwell: template, `{t}` s per point.
+        points: template, `{values}` A comma-separated; what is sent again is appended.
+        dwells: the same for the dwells, s: one for each point, or one for all.
         count: template, `{n}` repetitions; never sent with 0, which means for ever.
+        points_query: how many points the memory holds; None where nobody can ask.
         max_points, points_per_line: what the memory and one line hold.
+        dwell_digits: decimals of a dwell on the wire.
         shortest, longest: dwell, s.
     """
 
     clear: Lines = ()
     points: str
-    append: str | None = None
-    dwell: str
+    dwells: str
     count: str
+    points_query: str | None = None
     start: Lines
     stop: Lines
-    max_points: int
-    points_per_line: int
+    max_points: int = Field(ge=2)
+    points_per_line: int = Field(ge=1)
+    dwell_digits: int = Field(default=5, ge=2, le=8)
     shortest: Duration
     longest: Duration
 
@@ -230,17 +233,30 @@ class CoilDialect(SerialDialect):
                         )
             self.limit_line(self.voltage)
             if self.list is not None:
-                self.list.points.format(values="0.1,0.2")
-                self.list.dwell.format(t=self.list.shortest)
                 self.list.count.format(n=1)
+                self._try_list_lines(self.list, where)
         except (KeyError, IndexError, ValueError) as reason:
             if isinstance(reason, SceneError):
                 raise
             raise SceneError(
                 f"Dialect {where}: a template cannot be filled in ({reason!r}); it "
                 "takes {i} for the current and {v} for the voltage, in a list "
-                "{values}, {t} and {n}."
+                "{values} and {n}."
             ) from reason
+
+    def _try_list_lines(self, mode: ListMode, where: str) -> None:
+        """Refuse more points a line than a line can hold."""
+        current = f"{-self.current:.{self.digits}f}"
+        dwell = f"{mode.longest:.{mode.dwell_digits}f}"
+        for template, value in ((mode.points, current), (mode.dwells, dwell)):
+            line = template.format(values=",".join([value] * mode.points_per_line))
+            longest = max(map(len, self.verified(line))) + len(self.serial.send_end)
+            if longest > self.serial.max_line:
+                raise SceneError(
+                    f"Dialect {where}: {mode.points_per_line} points a line take "
+                    f"{longest} characters, more than max_line = "
+                    f"{self.serial.max_line}."
+                )
 
     def check_limits(self, limits: CoilLimits) -> None:
         """Refuse limits beyond what the model can do.
@@ -280,12 +296,40 @@ class CoilDialect(SerialDialect):
 
     def promised_interval(self, baud: int | None = None) -> float:
         """Update interval to plan with, s: wire time, gap and latency with margin."""
+        return MARGIN * self._exchange(self.set_line(-self.current), baud)
+
+    def lists(self, baud: int | None = None) -> ListCapability | None:
+        """What lists the model plays, and how long they take to load; None: none."""
+        mode = self.list
+        if mode is None:
+            return None
+        current = f"{-self.current:.{self.digits}f}"
+        dwell = f"{mode.shortest:.{mode.dwell_digits}f}"
+        per_line = sum(
+            self._exchange(template.format(values=",".join(values)), baud)
+            for template, values in (
+                (mode.points, [current] * mode.points_per_line),
+                (mode.dwells, [dwell] * mode.points_per_line),
+            )
+        )
+        others = (*mode.clear, mode.count, mode.points_query or "", *mode.start)
+        return ListCapability(
+            points=mode.max_points,
+            shortest=mode.shortest,
+            longest=mode.longest,
+            resolution=10.0**-mode.dwell_digits,
+            load_fixed=sum(self._exchange(line, baud) for line in others if line),
+            load_point=per_line / mode.points_per_line,
+        )
+
+    def _exchange(self, line: str, baud: int | None) -> float:
+        """Typical time to send `line` and to verify it, s."""
         wire = self.serial.model_copy(update={"baud": baud or self.serial.baud})
-        lines = self.verified(self.set_line(-self.current))
+        lines = self.verified(line)
         sent = sum(len(line) + len(wire.send_end) for line in lines)
         answer = len('0,"No error"\r\n') if self.error else 0
         typical = (sent + answer) * wire.character_time
-        return MARGIN * (typical + len(lines) * (wire.latency + wire.min_gap))
+        return typical + len(lines) * (wire.latency + wire.min_gap)
 
 
 class MeterDialect(SerialDialect):

@@ -1,4 +1,4 @@
-"""The current that plays a trial's force: one rule, for the plan and for the run.
+"""The current that plays a trial's force, and what the coil can follow of it.
 
 The force becomes a current by the magnet's calibration, within what coil and source
 can; that is then limited to what the coil can follow.
@@ -25,25 +25,13 @@ REVERSED = 1e-9
 """Current that counts as reversed, A."""
 
 
-def current_for(
-    trial: Trial,
-    magnet: Magnet,
-    coil: CoilSpec,
-    before: float,
-    update_interval: float | None = None,
-) -> tuple[Waveform, str | None]:
-    """The current that plays `trial`, A against s from 0 to its length.
+def wanted_current(trial: Trial, magnet: Magnet, coil: CoilSpec) -> Waveform:
+    """The current that would play `trial` exactly, A against s from 0 to its length.
 
     Args:
         trial: its force, or its current where it asks for one.
         magnet: what force a current gives.
         coil: limits, and the source that plays it.
-        before: current just before the trial, A.
-        update_interval: time between two set-points, s; what the source promises
-            unless given.
-
-    Returns:
-        The current, and a warning where the coil cannot follow what is asked.
 
     Raises:
         LimitError: beyond the coil's limit, the calibration, or a source that gives
@@ -67,9 +55,7 @@ def current_for(
     if not source.bipolar and wanted.value.min() < -REVERSED:
         told = _one_sign(wanted, magnet, limit, source.title)
         raise LimitError(f'trial "{trial.label}": {told}')
-    interval = update_interval or source.update_interval
-    played, warning = limited(wanted, coil.limits.slew, interval, before)
-    return cut(played, length), warning
+    return wanted
 
 
 def _one_sign(wanted: Waveform, magnet: Magnet, limit: float, title: str) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.drive import Drive
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome, Trial
@@ -29,12 +30,14 @@ class Step:
         start: on the run's time axis, s.
         force: N, from 0 to the trial's length: as given, or as the coil plays it.
         current: A, likewise; None where the force is taken as given.
+        drive: how the coil plays it; None where the force is taken as given.
     """
 
     trial: Trial
     start: float
     force: Waveform
     current: Waveform | None
+    drive: Drive | None = None
 
 
 class ModelOutcome(Outcome):

@@ -13,6 +13,7 @@ from tactile_lab.planning.ranges import beyond
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, warnings
+from tactile_lab.planning.ways import ways_used
 from tactile_lab.quantity import count, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY, SIGNALS
@@ -86,6 +87,7 @@ class Plan:
             "peak_current_A": cost.peak_current,
             "heat_A2s": {"used": cost.heat, "budget": cost.heat_budget},
             "coil_update": self._coil_update(),
+            "ways": [used.to_dict() for used in ways_used(self.timeline.steps)],
             "resolution": dict(cost.resolution),
             "preview": self._preview(),
             "assumptions": list(self.assumptions),
@@ -192,8 +194,11 @@ def sections(plan: Plan) -> list[tuple[str, list[tuple[str, str]]]]:
 
 def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     cost = plan.estimate
-    pauses = cost.duration - cost.streamed
-    paused = f", {_time(pauses)} of it pauses" if pauses > 0 else ""
+    loading = plan.timeline.loading
+    pauses = cost.duration - cost.streamed - loading
+    paused = f", {_time(pauses)} of it pauses" if pauses > 1e-9 else ""
+    if loading > 1e-9:
+        paused += f", {_time(loading)} to load lists"
     yield "duration", f"{_time(cost.duration)}, {count(cost.trials, 'trial')}{paused}"
     channels = len(plan.needs.channels)
     yield (
@@ -214,6 +219,8 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
             f"{show(cost.update_interval, 's', 3)}), steps up to "
             f"{show(cost.step_current, 'A', 3)} or {show(cost.step_force, 'N', 3)}",
         )
+    for used in ways_used(plan.timeline.steps):
+        yield ("by set-points" if used.way == "set-points" else "by lists"), str(used)
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
 

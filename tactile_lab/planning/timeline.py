@@ -8,10 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.current_list import CurrentList
+from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
-from tactile_lab.planning.current import current_for, cut
+from tactile_lab.planning.current import cut
 from tactile_lab.planning.heat import heat_along
 from tactile_lab.planning.outcome import ModelOutcome, Step, joined
+from tactile_lab.planning.way import drive_for
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome, Trial, Trials
@@ -41,6 +44,11 @@ class Timeline:
     def streamed(self) -> float:
         """Time during which samples are taken, s: all but planned pauses."""
         return sum(step.trial.length for step in self.steps if not step.trial.pause)
+
+    @property
+    def loading(self) -> float:
+        """Time during which lists are loaded, s: nothing is streamed meanwhile."""
+        return self.duration - sum(step.trial.length for step in self.steps)
 
     @property
     def drives(self) -> bool:
@@ -126,6 +134,7 @@ class _Driver:
         self._amperes = 0.0
         self._field = (0.0, 0.0)
         self._heat = 0.0
+        self._loaded: CurrentList | None = None
 
     def take(self, trial: Trial) -> Outcome:
         length = trial.length
@@ -134,20 +143,29 @@ class _Driver:
                 f'trial "{trial.label}" lasts {length} s; it must be longer.'
             )
         force, current = trial.force, trial.current
-        magnet = self.scene.bench.magnet
+        magnet, drive = self.scene.bench.magnet, None
         if self.through_coil:
-            force, current = self._played(trial)
+            drive = self._played(trial)
+            current = drive.current
+            force, self._field = magnet.lagged_force(current, self._field)
+            self._wait_for_load(drive)
         elif current is not None:
             force = cut(magnet.force_for(current, beyond="hold"), length)
         else:
             force = cut(force, length)
-        step = Step(trial, self._time, force, current)
+        step = Step(trial, self._time, force, current, drive)
         self.steps.append(step)
         self._time += length
         return ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)
 
-    def _played(self, trial: Trial) -> tuple[Waveform, Waveform]:
-        """Force and current as the coil plays them."""
+    def _wait_for_load(self, drive: Drive) -> None:
+        """The time that a list takes to load goes by, unless it is there already."""
+        if drive.points is not None and not drive.points.same_as(self._loaded):
+            self._loaded = drive.points
+            self._time += drive.load
+
+    def _played(self, trial: Trial) -> Drive:
+        """How the coil plays the trial."""
         bench, length = self.scene.bench, trial.length
         if bench.coil is None:
             if (trial.current or trial.force).peak > 0:
@@ -155,9 +173,9 @@ class _Driver:
                     f"bench {bench.name} has no [coil], but the protocol asks for a "
                     "force."
                 )
-            still = Waveform.through([(0, 0), (length, 0)])
-            return still, still
-        current, warning = current_for(trial, bench.magnet, bench.coil, self._amperes)
+            return Drive(Waveform.through([(0, 0), (length, 0)]))
+        drive = drive_for(trial, self.scene, self._amperes)
+        current, warning = drive.current, drive.warning
         if warning is not None:
             text = f'the coil cannot follow trial "{trial.label}": {warning}'
             if self.scene.coil.strict:
@@ -173,8 +191,7 @@ class _Driver:
                 f"{show(spent, 's')} after its start. Ask for less force, a shorter "
                 "hold, or a longer rest before it."
             )
-        force, self._field = bench.magnet.lagged_force(current, self._field)
-        return force, current
+        return drive
 
     def timeline(self) -> Timeline:
         force = joined([(step.start, step.force) for step in self.steps])

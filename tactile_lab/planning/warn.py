@@ -10,6 +10,7 @@ from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.estimate import resolution
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
+from tactile_lab.planning.ways import ways_used
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.spikes.detection import DEVIATIONS
@@ -25,12 +26,24 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
     """Everything worth a person's attention before the run."""
     return (
         *drive.warnings,
+        *_ways(scene, drive),
         *_spike_sampling(scene, needed),
         *_noise(scene, needed, drive.streamed),
         *_scope(scene, needed),
         *_field(scene, needed, drive),
         *_magnet(scene),
     )
+
+
+def _ways(scene: Scene, drive: Timeline) -> Iterator[str]:
+    for used in ways_used(drive.steps):
+        if used.part > scene.force_accuracy:
+            yield (
+                f"no way of this bench brings the force nearer than "
+                f"{100 * used.part:.2g} % of its range, {show(used.error, 'N', 2)}; "
+                f"{100 * scene.force_accuracy:.2g} % are wanted. Ask for a slower "
+                "force, or allow more by [coil] accuracy."
+            )
 
 
 def spike_width(scene: Scene) -> float:

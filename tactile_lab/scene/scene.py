@@ -33,7 +33,7 @@ class Scene:
         record: signals kept and sample rate.
         detect: how spikes are found on V_K.
         simulated: physics of a simulated bench.
-        coil: how to treat a force the coil cannot follow.
+        coil: by which way it plays a force, and what if it cannot follow.
         conditions: under which the run is made.
     """
 
@@ -73,6 +73,11 @@ class Scene:
         """Signals that are recorded, and those its protocol looks at."""
         wished = {name for name in self.protocol.wishes() if self.bench.measures(name)}
         return frozenset((*self.record.signals, *self.protocol.needs, *wished))
+
+    @property
+    def force_accuracy(self) -> float:
+        """Largest error of the force that is accurate enough, a part of its range."""
+        return self.coil.accuracy or self.protocol.accuracy
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -230,10 +230,16 @@ class Simulated(SceneTable):
 
 @dataclass(frozen=True, kw_only=True)
 class CoilUse(SceneTable):
-    """``[coil]``: what to do with a force the coil cannot follow.
+    """``[coil]``: how the coil plays a force, and what if it cannot follow.
 
     Attributes:
         strict: refuse a waveform faster than slew or update grid, do not limit it.
+        way: "set-points" sent one by one, a "list" that the source plays by its own
+            clock; "auto" takes the first of them that is accurate enough.
+        accuracy: largest error of the force, as a part of its range, that is accurate
+            enough; what the protocol needs unless given.
     """
 
     strict: bool = False
+    way: Literal["auto", "set-points", "list"] = "auto"
+    accuracy: Annotated[float, Field(gt=0, le=1)] | None = None

@@ -58,6 +58,7 @@ def applied_current(
     measured: ArrayLike,
     shunt: Shunt | None = None,
     coil_lag: float = 0.0,
+    listed: ArrayLike = False,
 ) -> AppliedCurrent:
     """Join what source and shunt tell.
 
@@ -68,6 +69,8 @@ def applied_current(
         shunt: the recorded coil current; None where the run has none.
         coil_lag: L/R of the coil, s: the current passes half of a step ln 2 times
             that after the source stepped.
+        listed: which of them the source took by its own clock: they came when `time`
+            says, as the shunt showed while the run went on.
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
@@ -77,17 +80,18 @@ def applied_current(
     level = np.array(
         [_level(sent[a], read[a:b]) for a, b in zip(first, last, strict=True)]
     )
+    own_clock = np.broadcast_to(np.asarray(listed, dtype=bool), t.shape)[first]
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
     edges, lead = 0, 0.0
     if shunt is not None:
         seen = np.full(begin.size, np.nan)
-        for i in range(1, begin.size):
+        for i in np.flatnonzero(~own_clock[1:]) + 1:
             at = _edge(shunt, begin[i - 1], begin[i], level[i - 1], level[i])
             seen[i] = np.nan if at is None else at - math.log(2) * coil_lag
         edges = int(np.isfinite(seen).sum())
         if edges >= ENOUGH:  # the small ones came as early as those the shunt shows
             lead = float(np.nanmedian(begin - seen))
-        begin[1:] -= lead
+        begin[1:] -= np.where(own_clock[1:], 0.0, lead)
         begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     steps = np.column_stack([begin, level])
     return AppliedCurrent(steps, ends, edges, lead)

@@ -43,7 +43,8 @@ TABLES = {
     "gaps": "sample i8 sample, missing i8 sample, time f8 s",
     "overrange": "sample i8 sample, samples i8 sample, channels u4 bit per row",
     "spikes": "sample f8 sample, time f8 s, amplitude i2 code, width f4 sample",
-    "current": "time f8 s, setpoint f8 A, measured f8 A, resistance_ratio f8 1",
+    "current": "time f8 s, setpoint f8 A, measured f8 A, resistance_ratio f8 1, "
+    "listed u1",
     "field": "time f8 s, field f8 T",
     "trials": "index u4, start f8 s, end f8 s, level f8 N, hold_start f8 s, "
     "hold_end f8 s, spikes u4, skipped u4, pause u1, label S48, rest_V_C1 f8 V, "

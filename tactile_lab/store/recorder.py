@@ -130,9 +130,15 @@ class Recorder:
         setpoint: float,
         measured: float | None,
         ratio: float | None = None,
+        *,
+        listed: bool = False,
     ) -> None:
-        """Store a set-point and its read-back, A, and the resistance over cold."""
-        self._add("current", time, setpoint, _number(measured), _number(ratio))
+        """Store a set-point and its read-back, A, and the resistance over cold.
+
+        `listed`: the source took it by its own clock, so `time` needs no correction.
+        """
+        known = _number(measured), _number(ratio)
+        self._add("current", time, setpoint, *known, listed)
 
     def field(self, time: float, field: float) -> None:
         """Store a teslameter reading, T."""

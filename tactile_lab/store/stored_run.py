@@ -310,6 +310,7 @@ class StoredRun:
             rows["measured"],
             self.shunt,
             self.scene.bench.magnet.coil_lag,
+            rows["listed"] if "listed" in (rows.dtype.names or ()) else False,
         )
 
     @property

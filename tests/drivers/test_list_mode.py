@@ -3,15 +3,38 @@
 import itertools
 import math
 
+import numpy as np
 import pytest
 
 from drivers.coil.source import CoilSource
+from sim_backend.coil.list_mode import ListFault
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.bench import CoilLimits
-from tactile_lab.errors import LimitError, LinkLostError, RefusedError
+from tactile_lab.current_list import CurrentList
+from tactile_lab.errors import (
+    InterlockError,
+    LimitError,
+    LinkLostError,
+    NoReplyError,
+    RefusedError,
+)
 from tactile_lab.instruments.dialects import coil_dialect
 
 SINE = [round(0.3 * math.sin(2 * math.pi * k / 100), 6) for k in range(100)] + [0.0]
+
+
+def listed(currents, dwell):
+    """A list, and with one dwell for all points if only one is given."""
+    dwells = np.broadcast_to(np.asarray(dwell, float), len(currents))
+    return CurrentList(np.array(currents, float), dwells.copy())
+
+
+def play(coil, currents, dwell):
+    """Load and start a list; its length, s."""
+    points = listed(currents, dwell)
+    coil.load_list(points)
+    coil.start_list()
+    return points.duration
 
 
 @pytest.fixture
@@ -23,7 +46,7 @@ def bench(serial_bench):
 
 def test_plays_in_its_own_time(bench):
     before = len(bench.sets)
-    length = bench.coil.play_list(SINE, 0.01)
+    length = play(bench.coil, SINE, 0.01)
     assert length == pytest.approx(1.01)
     start = bench.clock.now()
     bench.clock.sleep_until(start + 0.255)
@@ -38,8 +61,28 @@ def test_plays_in_its_own_time(bench):
     assert bench.source.setpoint == pytest.approx(0.1)
 
 
+def test_every_point_has_its_own_dwell(bench):
+    dwells = [0.0005, 2.5, 0.00051, 0.1]
+    before = len(bench.sets)
+    length = play(bench.coil, [0.001, 0.002, 0.001, 0.0], dwells)
+    bench.clock.sleep_until(bench.clock.now() + length)
+    played = bench.sets[before:]
+    steps = [b.time - a.time for a, b in itertools.pairwise(played)]
+    assert steps == pytest.approx(dwells[:-1], rel=1e-9)
+
+
+def test_a_list_that_is_loaded_plays_again(bench):
+    points = listed([0.002, 0.0], 0.5)
+    bench.coil.load_list(points)
+    for _ in range(2):
+        bench.coil.start_list()
+        bench.clock.sleep_until(bench.clock.now() + points.duration)
+        bench.coil.end_list()
+    assert [change.value for change in bench.sets].count(0.002) == 2
+
+
 def test_safe_off_in_the_middle_ramps_from_what_flows(bench):
-    bench.coil.play_list(SINE, 0.05)
+    play(bench.coil, SINE, 0.05)
     bench.clock.sleep_until(bench.clock.now() + 1.25)
     assert bench.plant.coil_current(0) > 0.25
     before = len(bench.sets)
@@ -55,7 +98,7 @@ def test_safe_off_in_the_middle_ramps_from_what_flows(bench):
 
 
 def test_unplugged_during_a_list_it_still_ends_at_zero(bench):
-    bench.coil.play_list(SINE, 0.01)
+    play(bench.coil, SINE, 0.01)
     bench.end.faults.add(SerialFault(kind="unplug"))
     with pytest.raises(LinkLostError):
         bench.coil.read_current()
@@ -72,25 +115,70 @@ def test_unplugged_during_a_list_it_still_ends_at_zero(bench):
         ([0.1, 0.0], 11.0, "dwell"),
         ([], 0.1, "0 points"),
         ([0.0] * 1003, 0.1, "1003 points"),
-        ([0.2, 0.0], 0.01, "slew"),
+        ([0.2, 0.0], 0.01, "list_slew"),
         ([math.nan, 0.0], 0.1, "nan"),
         ([2.5, 0.0], 1.0, "exceeds the limit"),
         ([2.0] * 9 + [0.0], 1.0, "heat budget"),
+        # hot in the middle, and cooler again at its end
+        ([2.0] * 9 + [0.0] * 400, 1.0, "heat budget"),
     ],
 )
 def test_a_list_that_may_not_be_played(bench, currents, dwell, why):
     before = list(bench.source.changes)
     with pytest.raises(LimitError, match=why):
-        bench.coil.play_list(currents, dwell)
+        play(bench.coil, currents, dwell)
     assert bench.source.changes == before
     assert bench.source.list.points == []
 
 
-def test_a_refused_line_starts_nothing(bench):
-    bench.end.faults.add(SerialFault(kind="refused", line="LIST:DWEL"))
+@pytest.mark.parametrize("line", ["LIST:DWEL", "LIST:COUN", "LIST:CLE"])
+def test_a_refused_line_starts_nothing(bench, line):
+    bench.end.faults.add(SerialFault(kind="refused", line=line))
     with pytest.raises(RefusedError):
-        bench.coil.play_list(SINE, 0.01)
+        play(bench.coil, SINE, 0.01)
     assert not bench.source.list.playing
+    with pytest.raises(LimitError, match="No list is loaded"):
+        bench.coil.start_list()
+
+
+def test_a_memory_that_is_full_says_so(bench):
+    bench.source.list.fault = ListFault(memory=50)
+    with pytest.raises(RefusedError, match="Too much data"):
+        play(bench.coil, SINE, 0.01)
+
+
+@pytest.mark.parametrize("kind", ["deaf", "missing"])
+def test_a_line_that_was_lost_or_doubled_is_noticed(bench, kind):
+    bench.end.faults.add(SerialFault(kind=kind, line="LIST:CURR "))
+    play(bench.coil, SINE, 0.01)
+    assert bench.source.list.points == pytest.approx(SINE, abs=1e-5)
+    bench.clock.sleep_until(bench.clock.now() + 2)
+    bench.coil.end_list()
+    bench.end.faults.add(SerialFault(kind="missing", line="LIST:CURR ", times=None))
+    with pytest.raises((RefusedError, NoReplyError)):
+        play(bench.coil, SINE[1:], 0.01)
+    assert not bench.source.list.playing
+
+
+@pytest.mark.parametrize(
+    "fault", [ListFault(trigger_lost=True), ListFault(cut_after=0.15)]
+)
+def test_a_list_that_does_not_play_trips(bench, fault):
+    bench.source.list.fault = fault
+    play(bench.coil, [0.1] * 40 + [0.0], 0.05)
+    with pytest.raises(InterlockError, match="did not start or was cut short"):
+        for _ in range(8):
+            bench.clock.sleep_until(bench.clock.now() + 0.25)
+            bench.coil.read_current()
+    assert not bench.source.output_on
+
+
+def test_reading_back_a_fast_list_trips_nothing(bench):
+    length = play(bench.coil, [i / 5 for i in SINE * 9], 0.001)
+    until = bench.clock.now() + length
+    while bench.clock.now() < until - 0.1:
+        bench.coil.read_current()
+    assert bench.coil.tripped is None
 
 
 def test_a_source_without_lists(serial_bench):
@@ -100,5 +188,5 @@ def test_a_source_without_lists(serial_bench):
     coil.open()
     coil.energise()
     with pytest.raises(LimitError, match="no list mode"):
-        coil.play_list(SINE, 0.01)
+        play(coil, SINE, 0.01)
     coil.close()

@@ -15,12 +15,14 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drivers.coil.source import CoilSource
 from drivers.serial_line.link import SerialLink
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
+from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.instruments.serial_dialect import CoilDialect
@@ -243,12 +245,14 @@ def test_pulled_cable(coil: CoilSource) -> None:
 @pytest.mark.skipif(coil_dialect(ROW).list is None, reason="the row has no list mode")
 def test_list(coil: CoilSource) -> None:
     coil.energise()
-    currents = [0.002 * min(k, 100 - k) for k in range(101)]
+    currents = np.array([0.002 * min(k, 100 - k) for k in range(101)])
+    points = CurrentList(currents, np.full(101, 0.01))
     begun = time.monotonic()
-    length = coil.play_list(currents, 0.01)
-    fact("upload of 101 points, s", f"{time.monotonic() - begun:.2f}")
-    wait(coil, length / 2)
+    coil.load_list(points)
+    fact("loading 101 points, s", f"{time.monotonic() - begun:.2f}")
+    coil.start_list()
+    wait(coil, points.duration / 2)
     fact("current half-way, A", coil.read_current().value)
-    wait(coil, length)
+    wait(coil, points.duration)
     coil.end_list()
     assert coil.safe_off().verified

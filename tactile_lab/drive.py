@@ -1,0 +1,40 @@
+"""How the coil gives one trial's force: by which way, and how nearly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tactile_lab.current_list import CurrentList
+from tactile_lab.waveform import Waveform
+
+Way = Literal["set-points", "list"]
+"""How a current is played: sent point by point by this computer's clock, or loaded as
+a list that the source plays by its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What the coil plays in one trial.
+
+    Attributes:
+        current: A against s from 0 to the trial's length, as far as it can follow.
+        points: the list that is played instead of set-points, or None.
+        error: largest difference between the force asked for and the one given, N;
+            None where the trial asks for a current.
+        why: why this way.
+        warning: where the coil cannot follow what is asked, or None.
+        load: time to load the list, s.
+    """
+
+    current: Waveform
+    points: CurrentList | None = None
+    error: float | None = None
+    why: str = ""
+    warning: str | None = None
+    load: float = 0.0
+
+    @property
+    def way(self) -> Way:
+        """By which way."""
+        return "set-points" if self.points is None else "list"

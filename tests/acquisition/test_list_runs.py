@@ -1,0 +1,90 @@
+"""Whole runs whose force is played by the source's own list."""
+
+import numpy as np
+import pytest
+
+from sim_backend.coil.list_mode import ListFault
+from tactile_lab.acquisition.events import RunState, TrialStarted
+from tactile_lab.store.applied import held
+
+LIST = (
+    'protocol.levels=["200 mN", "200 mN"]',
+    "protocol.hold=0.5 s",
+    "protocol.rest=0.2 s",
+    "record.sample_rate=50 kS/s",
+    "coil.way=list",
+)
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    from short_runs import Ran
+
+    from tactile_lab.engine.execution import Execution
+    from tactile_lab.scene.load import load
+
+    told = []
+    out = tmp_path_factory.mktemp("runs")
+    done = Execution(load("demo", LIST), out, emit=told.append).run()
+    return Ran(done, told)
+
+
+def test_the_current_follows_the_ramp_without_stairs(ran):
+    assert ran.done.state is RunState.COMPLETE and ran.done.off.verified
+    run = ran.stored()
+    trace = run.signal("coil_current").trace(cells=10_000)
+    for start in run.trials["start"]:
+        wave = np.array([[0, 0], [0.25, 0.997], [0.75, 0.997], [1.0, 0], [1.2, 0]])
+        inside = (trace.time > start + 0.02) & (trace.time < start + 1.15)
+        time, seen = trace.time[inside] - start, trace.mean[inside]
+        asked = np.interp(time, wave[:, 0], wave[:, 1])
+        # 16 mA is one code; a set-point's stair would be 180 mA
+        assert np.abs(seen - asked).max() < 0.06
+
+
+def test_the_list_is_loaded_once_and_its_loading_is_a_planned_pause(ran):
+    run = ran.stored()
+    starts = [e.start for e in ran.told if isinstance(e, TrialStarted)]
+    assert starts[0] > 3.0  # 401 points at 19200 baud
+    assert starts[1] - starts[0] < 1.6  # played again as it is
+    assert ran.done.loss == {"samples": 0, "spikes": 0}
+    assert run.current["listed"].sum() > 800
+
+
+def test_its_points_stand_where_the_samples_show_them(ran):
+    """Not where the host began to tell the source to start: up to 40 ms before."""
+    run = ran.stored()
+    trace = run.signal("coil_current").trace(cells=20_000)
+    applied = held(run.applied.steps, run.duration)
+    for start in run.trials["start"]:
+        inside = (trace.time > start - 0.05) & (trace.time < start + 1.15)
+        time, seen = trace.time[inside] + trace.width / 2, trace.mean[inside]
+        late = [
+            np.abs(applied.at(time - by) - seen).mean()
+            for by in np.arange(-20e-3, 20e-3, 0.5e-3)
+        ]
+        assert abs(np.argmin(late) * 0.5e-3 - 20e-3) <= 2e-3
+
+
+@pytest.mark.parametrize(
+    "fault", [ListFault(trigger_lost=True), ListFault(cut_after=0.1)]
+)
+def test_a_list_that_does_not_play_ends_the_run_with_the_coil_off(run_scene, fault):
+    from sim_backend.bench import open_bench
+    from tactile_lab.planning.needs import needs
+
+    def bench(scene):
+        return open_bench(scene, needs(scene), coil_faults=[fault])
+
+    ended = run_scene(*LIST, bench=bench).done
+    assert ended.state is RunState.FAULTED and ended.off.verified
+    assert "did not start or was cut short" in ended.reason
+
+
+def test_stop_in_the_middle_of_a_list_ramps_down(run_scene):
+    def watch(execution, event):
+        if isinstance(event, TrialStarted):
+            execution.stop("enough")
+
+    ended = run_scene(*LIST, watch=watch).done
+    assert ended.state is RunState.ABORTED and ended.off.verified

@@ -1,0 +1,63 @@
+"""By which way the coil plays a force, why, and how far the force errs."""
+
+import pytest
+
+from tactile_lab.errors import SceneError
+from tactile_lab.planning.plan import plan, text
+from tactile_lab.planning.ways import ways_used
+from tactile_lab.scene.load import load
+
+SHORT = ('protocol.levels=["200 mN"]', "protocol.hold=0.8 s", "protocol.rest=0.3 s")
+
+
+def ways(*overrides, scene="demo"):
+    return ways_used(
+        plan(load(scene, (*SHORT, *overrides)), preview=False).timeline.steps
+    )
+
+
+def test_set_points_where_the_protocol_bears_their_stairs():
+    (used,) = ways()
+    assert used.way == "set-points"
+    # one step of the ramp: 200 mN in 0.25 s, once each 45 ms
+    assert used.error == pytest.approx(36e-3, rel=0.05)
+    assert used.part == pytest.approx(0.18, rel=0.05)
+
+
+def test_a_list_where_the_force_must_be_nearer():
+    (used,) = ways("coil.accuracy=0.02")
+    assert used.way == "list" and used.part < 0.006
+    assert used.load > 1.0
+    assert ways("coil.accuracy=0.3")[0].way == "set-points"
+
+
+def test_the_plan_says_so_and_counts_the_time_to_load():
+    planned = plan(load("demo", (*SHORT, "coil.way=list")), preview=False)
+    told = text(planned)
+    assert "by lists" in told and "the force errs by up to" in told
+    (way,) = planned.to_dict()["ways"]
+    assert (way["way"], way["trials"]) == ("list", 1)
+    assert planned.timeline.loading == pytest.approx(way["load_s"])
+    assert planned.estimate.duration == pytest.approx(1.6 + way["load_s"])
+
+
+def test_a_way_that_cannot_be_gone_is_refused_with_its_reason(tmp_path):
+    with pytest.raises(SceneError, match="begins and ends at 0 A"):
+        plan(load("sine_sweep", ("protocol.bias=0.1 N", "coil.way=list")))
+    scene = tmp_path / "s.toml"
+    scene.write_text(
+        '[bench]\nsimulated = true\n[bench.coil]\ndialect = "scpi-generic"\n'
+        '[bench.magnet]\nr = "6 mm"\n[protocol]\nname = "pulses"\n'
+        '[coil]\nway = "list"\n[record]\nsignals = ["force"]\n'
+    )
+    with pytest.raises(SceneError, match="plays none"):
+        plan(load(str(scene)))
+
+
+def test_where_no_way_is_near_enough_the_nearest_is_taken_and_said():
+    phases = "protocol.highest=200 Hz", "protocol.lowest=200 Hz", "protocol.count=1"
+    scene = load("sine_sweep", (*phases, "coil.accuracy=1e-3", "protocol.cycles=9"))
+    planned = plan(scene, preview=False)
+    (used, *_) = ways_used(planned.timeline.steps)
+    assert used.part > 1e-3
+    assert any("nearer than" in line for line in planned.warnings)
