@@ -20,6 +20,7 @@ KEYS = {
     "peak_current_A",
     "heat_A2s",
     "coil_update",
+    "ways",
     "resolution",
     "preview",
     "assumptions",
