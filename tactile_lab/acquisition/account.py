@@ -198,10 +198,10 @@ class Account:
             del self.edges[CLUSTER:-CLUSTER]
             self.edges.extend(found)
 
-    def note_list(self, played: PlayedList, shunt: Trace | None) -> None:
+    def note_list(self, played: PlayedList, shunt: Trace | None, lag: float) -> None:
         """A list has been played: find it in the binned coil current, where there is.
 
-        Its points are written down as the samples show them.
+        Its points are written down as the samples show them, `lag` s before.
         """
         seen = None
         if self._origin is not None and shunt is not None:
@@ -216,7 +216,7 @@ class Account:
                 "Check the shunt's wiring, and the source's list mode."
             )
         else:
-            self.write_current(seen.edge.sampled - self.axis(played.began))
+            self.write_current(seen.edge.sampled - self.axis(played.began) - lag)
             self.edges.append(seen.edge)
             if abs(seen.longer) > MOST_LONGER:
                 self.warn(

@@ -30,6 +30,7 @@ class Program:
         expected: run time expected, s; None if it depends on outcomes.
         doubts: told the opened instruments' settings, says what a person should know
             before the coil is switched on, or raises to prevent it.
+        coil_lag: by which the current follows the source, s.
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
         asked_field: has a person read the field; None where a meter does, or nobody.
     """
@@ -42,6 +43,7 @@ class Program:
     drive_for: Callable[[Trial, float, float], Drive]
     expected: float | None
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
+    coil_lag: float = 0.0
     drift: Drift | None = None
     ask: Ask | None = None
     asked_field: AskedField | None = None

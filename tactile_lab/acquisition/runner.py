@@ -356,7 +356,7 @@ class Runner:
             self._account.note_edges(shunt)
         coil = self.instruments.coil
         if coil is not None and coil.list is not None:
-            self._account.note_list(coil.list, shunt)
+            self._account.note_list(coil.list, shunt, self._program.coil_lag)
 
 
 def _missing(*failures: BaseException | None) -> str | None:

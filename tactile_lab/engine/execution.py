@@ -204,6 +204,7 @@ class Execution(Task[Executed]):
             drive_for=self._drive_for,
             expected=self.plan.estimate.duration,
             doubts=self._doubts,
+            coil_lag=scene.bench.magnet.coil_lag,
             drift=self._drift(),
             ask=self._ask,
             asked_field=self._asked_field if needed.asked_field else None,
