@@ -15,6 +15,7 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QMenu, QWidget
 
 from gui.dialogs.closing import Closing
+from gui.run_actions import RunActions
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.stop_anywhere import StopAnywhere
@@ -44,6 +45,7 @@ class Actions(QObject):
         window: has the shortcuts, is closed and pictured.
         panels: what they work on.
         screen: opens scenes and runs.
+        runs: what can be done with runs on disk.
         closing: the question in which Esc is not STOP.
     """
 
@@ -51,10 +53,16 @@ class Actions(QObject):
     """Fold a side panel, or unfold it."""
 
     def __init__(
-        self, window: QWidget, panels: Panels, screen: Screen, closing: Closing
+        self,
+        window: QWidget,
+        panels: Panels,
+        screen: Screen,
+        runs: RunActions,
+        closing: Closing,
     ) -> None:
         super().__init__(window)
         self._window, self._panels, self._screen = window, panels, screen
+        self._runs = runs
         self.keys = self._all()
         for key in self.keys:
             for keys in () if key.single else key.keys:
@@ -120,6 +128,8 @@ class Actions(QObject):
             Shortcut(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
             Shortcut(("Ctrl+E",), "Export the view", lambda: self.export_view()),
             Shortcut(("Ctrl+F",), "Search runs", self._search),
+            Shortcut(("Ctrl+I",), "About the run: notes", self._runs.about_shown),
+            Shortcut(("F5",), "Read the runs anew", self._screen.list_runs),
             Shortcut(("Ctrl+1",), "Results", lambda: self._tab(0)),
             Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
             Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),

@@ -23,6 +23,7 @@ from gui.header.header import Header
 from gui.look.theme import Theme
 from gui.parts import column
 from gui.review.panel import ReviewPanel
+from gui.run_actions import RunActions
 from gui.screen.centre import Centre
 from gui.screen.frames import Frames
 from gui.screen.panels import Panels
@@ -72,7 +73,10 @@ class Window(QMainWindow):
         )
         self.screen_ = Screen(self.panels)
         self.frames = Frames(self.panels, self.screen_)
-        self.actions_ = Actions(self, self.panels, self.screen_, self.closing)
+        self.runs = RunActions(self, self.panels, self.screen_)
+        self.actions_ = Actions(
+            self, self.panels, self.screen_, self.runs, self.closing
+        )
         self._leaving = False
         self._connect()
         self.render_state()
@@ -92,6 +96,7 @@ class Window(QMainWindow):
             snapshot.state in (WindowState.DISCONNECTED, WindowState.CONNECTING)
             and self.screen_.run is None
         )
+        self.centre.log.note.setPlaceholderText(self.runs.note_goes_to)
         tools = self.centre.tools
         watching = self.session.monitor.alive
         tools.monitor.setEnabled(watching or snapshot.state is WindowState.READY)
@@ -236,7 +241,6 @@ class Window(QMainWindow):
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
         self.banner.log_asked.connect(self.centre.log.show_safety)
-        self.centre.log.noted.connect(session.note)
         self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
         self.centre.empty.open_asked.connect(self.screen_.ask_scene)
         self.centre.empty.connect_asked.connect(self.actions_.connect_dialog)

@@ -89,6 +89,11 @@ class Source:
         return NONE
 
     @property
+    def notes(self) -> list[tuple[float, str]]:
+        """What people noted, and at which time, s."""
+        return []
+
+    @property
     def members(self) -> Sequence[Member]:
         """The runs it shows in each lane: itself, or those it compares."""
         return (Member("", self),)
@@ -207,12 +212,13 @@ class LiveSource(Source):
 
     running = True
     holds: list[Stretch] = []  # noqa: RUF012
+    notes: list[tuple[float, str]] = []  # noqa: RUF012
 
     def __init__(self, preview: Preview | None, newtons_per_ampere: float) -> None:
         self.preview = preview
         self.aligned = None if preview is None else Aligned(preview)
         self.model = TwinTraces()
-        self.holds = []
+        self.holds, self.notes = [], []
         self._phase = Phase.none()
         self._carried: tuple[object, ...] = ()
         self._twin_spikes = NONE

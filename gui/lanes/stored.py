@@ -12,9 +12,10 @@ from gui.lanes.expected import Stretch, settled
 from gui.lanes.source import Source
 from gui.lanes.twin import MARGIN, Look, TwinTraces
 from tactile_lab.engine.events import ModelPart
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.store.layout import BIN
+from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
 from tactile_lab.trace import FloatArray, Trace
@@ -47,6 +48,7 @@ class RunSource(Source):
     spikes: FloatArray = np.empty(0)
     length = reach = 0.0
     holds: list[Stretch] = []  # noqa: RUF012
+    notes: list[tuple[float, str]] = []  # noqa: RUF012
 
     def __init__(self, path: Path) -> None:
         self._run = run = Run.load(path)
@@ -57,6 +59,7 @@ class RunSource(Source):
         self._pyramids = {name: _pyramid(run.signal(name)) for name in run.signals}
         self.length = self.reach = max(run.duration, 1e-3)
         self.spikes = run.spikes["time"].copy()
+        self.read_notes()
         self.trials = run.trials
         self.holds = [_hold(trial) for trial in self.trials]
         self.simulated = run.simulated
@@ -84,6 +87,14 @@ class RunSource(Source):
         inside = settled(time, self.holds)
         time, field = time[inside], field[inside]
         return np.column_stack([np.interp(time, at, force) / self._gain, field])
+
+    def read_notes(self) -> None:
+        """Read anew what people noted at a time of it."""
+        try:
+            said = read_remarks(self.path).notes
+        except RunFolderError:
+            said = ()  # the card about the run says what is wrong with them
+        self.notes = [(one.time, one.text) for one in said if one.time is not None]
 
     # --- the twin
 

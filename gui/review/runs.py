@@ -1,125 +1,69 @@
-"""The run browser: what lies in the runs folder, newest first."""
+"""The run browser: what lies in the runs folder, found, sorted and tidied."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QShowEvent
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFrame,
-    QLabel,
-    QWidget,
-)
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QMenu, QWidget
 
-from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import (
     STRETCH,
-    Elided,
+    Combo,
+    IconButton,
     Segments,
-    bar,
     column,
     empty,
     label,
     line_edit,
-    lines,
     push,
     row,
     scrolling,
-    set_role,
     stack,
     with_gutter,
 )
-from gui.review.entries import SHOWN, Entry
-from gui.review.thumbnails import Thumbnails, ThumbnailView
-from gui.state import minutes
+from gui.review.run_card import RunCard
+from gui.review.thumbnails import Thumbnails
+from tactile_lab.quantity import count
+from tactile_lab.store.catalogue import RunSummary
 
-PILLS = {
-    "complete": ("ok", "pill-ok"),
-    "running": ("running", "pill"),
-    "aborted": ("aborted", "pill-warn"),
-    "cut short": ("cut short", "pill-bad"),
-    "recovered": ("recovered", "pill-warn"),
-    "faulted": ("fault", "pill-bad"),
+PAGE = 60
+"""Runs listed at once; a button lists as many more."""
+
+FILTERS: dict[str, Callable[[RunSummary], bool]] = {
+    "All": lambda entry: True,
+    "Complete": lambda entry: entry.status == "complete",
+    "Sim": lambda entry: entry.simulated is True,
+    "Faults": lambda entry: entry.status not in ("complete", "running"),
+    "★": lambda entry: entry.starred,
 }
 
-
-class RunCard(QFrame):
-    """One run: name, status, when, how long; a tick to compare."""
-
-    opened = Signal(object)
-    chosen = Signal(object)
-    ticked = Signal()
-
-    def __init__(self, entry: Entry, theme: Theme) -> None:
-        super().__init__()
-        self.entry = entry
-        self.thumbnail = ThumbnailView(theme)
-        self.setProperty("role", "run")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setToolTip(
-            f"{entry.title}\n{entry.folder.name}\nEnter or double click opens it, "
-            "Space ticks it"
-        )
-        self.tick = QCheckBox()
-        self.tick.setAccessibleName(f"Compare {entry.folder.name}")
-        self.tick.setToolTip("Tick two or three runs to compare them")
-        self.tick.toggled.connect(self.ticked)
-        word, role = PILLS.get(entry.status, (entry.status, "pill"))
-        first = row((Elided(entry.title, "strong"), 1))
-        first.addWidget(label(word, role), 0, Qt.AlignmentFlag.AlignVCenter)
-        kind = "sim" if entry.simulated else "bench"
-        when = f"{entry.started} · {minutes(entry.duration)} · {kind}"
-        self._eye = QLabel()
-        self._eye.setToolTip("On screen")
-        theme.changed.connect(self._tint)
-        self._theme = theme
-        self._tint()
-        second = row((Elided(when, "muted"), 1), self._eye, spacing=6)
-        words = lines(first, second, spacing=2)
-        bar(self, (8, 7, 10, 7), 10, self.thumbnail, (words, 1), self.tick)
-
-    def mark(self, *, chosen: bool, shown: bool) -> None:
-        """Show whether it is the chosen one, and whether it is on screen."""
-        set_role(self, "run-chosen" if chosen else "run")
-        self._eye.setVisible(shown)
-        said = f"{self.entry.title}, {self.entry.status}, {self.entry.started}"
-        self.setAccessibleName(f"{said}, on screen" if shown else said)
-
-    def _tint(self) -> None:
-        self._eye.setPixmap(pixmap("eye", self._theme.tokens.muted, 16))
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Choose the run."""
-        self.chosen.emit(self.entry)
-
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """Open the run."""
-        self.opened.emit(self.entry)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Open with Enter, tick with Space."""
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self.opened.emit(self.entry)
-        elif event.key() == Qt.Key.Key_Space:
-            self.tick.toggle()
-        else:
-            super().keyPressEvent(event)
-
-    def focusInEvent(self, event: object) -> None:
-        """Choose the run with the keyboard."""
-        self.chosen.emit(self.entry)
+ORDERS: dict[str, tuple[Callable[[RunSummary], Any], bool]] = {
+    "Newest first": (lambda entry: (entry.started, entry.name), True),
+    "Oldest first": (lambda entry: (entry.started, entry.name), False),
+    "By name": (lambda entry: entry.title.casefold(), False),
+    "Longest first": (lambda entry: entry.duration or 0.0, True),
+    "Most spikes first": (lambda entry: entry.spikes or 0, True),
+}
+"""Key and whether the largest comes first."""
 
 
 class RunsView(QWidget):
-    """Search, filter, cards, and what to do with the chosen one."""
+    """Search, filter, order, cards, and what to do with the chosen one."""
 
     opened = Signal(object)
     again = Signal(object)
     compared = Signal(object)
+    recovered = Signal(object)
+    about_asked = Signal(object)
+    starred = Signal(object)
+    deleted = Signal(object)
+    refresh_asked = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -127,89 +71,146 @@ class RunsView(QWidget):
         self._theme = theme
         self.thumbnails = Thumbnails()
         self.thumbnails.made.connect(self._show_thumbnail)
-        self._entries: list[Entry] = []
-        self._chosen: Entry | None = None
+        self._entries: list[RunSummary] = []
+        self._listed = PAGE
+        self._chosen: RunSummary | None = None
         self._current: Path | None = None
-        self.search = line_edit("Search runs", "Search runs …  (Ctrl+F)")
-        self.filter = Segments(["All", "Complete", "Sim", "Faults"], "Runs shown")
+        self.search = line_edit(
+            "Search runs", "Search names, notes, levels …  (Ctrl+F)"
+        )
+        self.filter = Segments(list(FILTERS), "Runs shown")
         self.filter.choose(0)
+        self.order = Combo()
+        self.order.setAccessibleName("Order of runs")
+        self.order.addItems(list(ORDERS))
         self._count = label("", "muted")
+        self.refresh = IconButton(theme, "undo", "Read the folder anew (F5)")
         inner = QWidget()
         self._rows = column(inner, spacing=6)
         self.open = push("Open run", "primary")
+        self.recover = push("Recover", "primary")
         self.rerun = push("Re-run with these settings")
+        self.about = push("About …", tip="Name, tags, notes, settings, log")
         self.compare = push("Compare")
-        top = row(self.filter, STRETCH, self._count)
+        head = row((self.search, 1), self.refresh, spacing=4)
+        top = row(self.order, STRETCH, self._count)
         page = with_gutter(scrolling(inner), self._rows)
-        parts = (self.search, top, page, self.open, self.rerun, self.compare)
+        first = row((self.open, 3), (self.recover, 3), (self.about, 2), spacing=6)
+        parts = (head, self.filter, top, page, first, self.rerun, self.compare)
         stack(self, parts, page)
-        self.search.textChanged.connect(self._show)
-        self.filter.group.idClicked.connect(self._show)
-        self.open.clicked.connect(
-            lambda: self._chosen and self.opened.emit(self._chosen)
-        )
-        self.rerun.clicked.connect(
-            lambda: self._chosen and self.again.emit(self._chosen)
-        )
+        self.search.textChanged.connect(self._show_first)
+        self.filter.group.idClicked.connect(self._show_first)
+        self.order.currentIndexChanged.connect(self._show_first)
+        self.refresh.clicked.connect(self.refresh_asked)
+        for button, asked in (
+            (self.open, self.opened),
+            (self.rerun, self.again),
+            (self.recover, self.recovered),
+            (self.about, self.about_asked),
+        ):
+            button.clicked.connect(partial(self._emit_chosen, asked))
         self.compare.clicked.connect(lambda: self.compared.emit(self.ticked()))
         self._show()
 
-    def show_entries(self, found: list[Entry]) -> None:
+    def show_entries(self, found: list[RunSummary]) -> None:
         """List these runs."""
         if found != self._entries:
             self._entries = found
+            if self._chosen is not None:  # what is said of it may have changed
+                self._chosen = self._entry(self._chosen.folder)
             self._show()
 
     def show_current(self, folder: Path | None) -> None:
         """Mark the run on screen."""
         self._current = folder
-        self._choose(next((e for e in self._entries if e.folder == folder), None))
+        self._choose(None if folder is None else self._entry(folder))
 
-    def ticked(self) -> list[Entry]:
+    def ticked(self) -> list[RunSummary]:
         """Runs ticked for comparison."""
         return [card.entry for card in self.cards if card.tick.isChecked()]
 
-    def _show(self, *_: object) -> None:
-        words = self.search.text().lower().split()
-        chosen = max(self.filter.chosen, 0)
+    def menu_of(self, entry: RunSummary) -> QMenu:
+        """What can be done with a run."""
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        star = "Take the star away" if entry.starred else "Give it a star"
+        for words, asked, offered in (
+            ("Open", self.opened, True),
+            ("Re-run with these settings", self.again, True),
+            ("About, notes and tags …", self.about_asked, True),
+            (star, self.starred, entry.status != "unreadable"),
+            ("Recover", self.recovered, entry.status == "cut short"),
+            ("Delete …", self.deleted, entry.status != "running"),
+        ):
+            if offered:
+                menu.addAction(words, partial(asked.emit, entry))
+        return menu
+
+    def _entry(self, folder: Path) -> RunSummary | None:
+        return next((one for one in self._entries if one.folder == folder), None)
+
+    def _emit_chosen(self, asked: Any, *_: object) -> None:
+        if self._chosen is not None:
+            asked.emit(self._chosen)
+
+    def _show_menu(self, entry: RunSummary, at: QPoint) -> None:
+        self.menu_of(entry).popup(at)
+
+    def _show_first(self, *_: object) -> None:
+        self._listed = PAGE
+        self._show()
+
+    def _show_more(self) -> None:
+        self._listed += PAGE
+        self._show()
+
+    def _show(self) -> None:
+        chosen = list(FILTERS.values())[max(self.filter.chosen, 0)]
+        key, largest_first = list(ORDERS.values())[max(self.order.currentIndex(), 0)]
         ticked = {card.entry.folder for card in self.cards if card.tick.isChecked()}
         empty(self._rows)
         self.cards = []
-        fitting = [
-            e
-            for e in self._entries
-            if e.shown_under(chosen) and all(w in e.text for w in words)
-        ]
-        for entry in fitting[:SHOWN]:
+        words = self.search.text()
+        fitting = [one for one in self._entries if chosen(one) and one.says(words)]
+        fitting.sort(key=key, reverse=largest_first)
+        listed = fitting[: self._listed]
+        for entry in listed:
             card = RunCard(entry, self._theme)
             card.thumbnail.show_thumbnail(self.thumbnails.of(entry.folder))
             card.tick.setChecked(entry.folder in ticked)
             card.opened.connect(self.opened)
             card.chosen.connect(self._choose)
             card.ticked.connect(self._buttons)
+            card.menu_asked.connect(self._show_menu)
             self.cards.append(card)
             self._rows.addWidget(card)
         self._ask_thumbnails()
         if not fitting:
-            text = (
-                "No run fits search and filter."
-                if self._entries
-                else "No runs yet.\nThey are listed here from their first second on."
-            )
-            none = label(text, "muted", wrap=True)
-            none.setAlignment(Qt.AlignmentFlag.AlignCenter)
-            none.setContentsMargins(0, 40, 0, 0)
-            self._rows.addWidget(none)
+            self._rows.addWidget(self._nothing())
+        elif len(listed) < len(fitting):
+            more = push(f"Show more: {len(fitting) - len(listed)} are not listed")
+            more.clicked.connect(self._show_more)
+            self._rows.addWidget(more)
         self._rows.addStretch(1)
-        many = len(fitting)
-        self._count.setText(f"{many} run{'' if many == 1 else 's'}")
-        listed = fitting[:SHOWN]
+        self._count.setText(count(len(fitting), "run"))
         on_screen = next((e for e in listed if e.folder == self._current), None)
         self._choose(self._chosen if self._chosen in listed else on_screen)
 
+    def _nothing(self) -> QWidget:
+        text = (
+            "No run fits search and filter."
+            if self._entries
+            else "No runs yet.\nThey are listed here from their first second on."
+        )
+        none = label(text, "muted", wrap=True)
+        none.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        none.setContentsMargins(0, 40, 0, 0)
+        return none
+
     def showEvent(self, event: QShowEvent) -> None:
-        """Pictures are made for those who look."""
+        """Pictures are made for those who look, and other programs' runs are seen."""
         super().showEvent(event)
+        self.refresh_asked.emit()
         self._ask_thumbnails()
 
     def _ask_thumbnails(self) -> None:
@@ -222,7 +223,7 @@ class RunsView(QWidget):
             if card.entry.folder == folder:
                 card.thumbnail.show_thumbnail(self.thumbnails.of(folder))
 
-    def _choose(self, entry: Entry | None) -> None:
+    def _choose(self, entry: RunSummary | None) -> None:
         self._chosen = entry
         for card in self.cards:
             shown = card.entry.folder == self._current
@@ -230,15 +231,25 @@ class RunsView(QWidget):
         self._buttons()
 
     def _buttons(self) -> None:
+        entry = self._chosen
         for button, words in (
             (self.open, "Show it in the lanes (Enter)"),
             (self.rerun, "Put its settings into the form, or into the queue"),
+            (self.about, "Name, tags, notes, settings, log"),
         ):
-            button.setEnabled(self._chosen is not None)
-            button.setToolTip(words if self._chosen else "Choose a run first")
+            button.setEnabled(entry is not None)
+            button.setToolTip(words if entry is not None else "Choose a run first")
+        cut = entry is not None and entry.status == "cut short"
+        self.recover.setVisible(cut)
+        self.recover.setToolTip("Make it readable by any program; works on a copy")
+        self.open.setVisible(not cut)
         many = len(self.ticked())
         self.compare.setEnabled(many in (2, 3))
         self.compare.setText(
             f"Compare {many} runs" if many in (2, 3) else "Compare: tick 2 or 3"
         )
         self.compare.setToolTip("Tick two or three runs to compare them")
+        place = 0
+        for card in self.cards:
+            card.show_place(place if card.tick.isChecked() else None)
+            place += card.tick.isChecked()

@@ -11,13 +11,13 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.compare import Comparison
 from gui.lanes.source import Member, Source
-from gui.review.entries import Entry
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.jobs import model_of_run
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
+from tactile_lab.store.catalogue import RunSummary
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
@@ -73,7 +73,7 @@ class Records(QObject):
             shown.close()
         return shown is not None
 
-    def compare(self, chosen: Sequence[Entry]) -> None:
+    def compare(self, chosen: Sequence[RunSummary]) -> None:
         """Read two or three runs, to be compared."""
 
         def work() -> None:

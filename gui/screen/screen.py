@@ -11,14 +11,15 @@ from gui.ask_file import ask_file
 from gui.lanes.compare import Comparison
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.source import LiveSource, PlanSource, Source
-from gui.review.entries import Entry, entries
+from gui.review.run_card import day
 from gui.review.run_results import RunResults
 from gui.screen.panels import Panels
 from gui.screen.records import Records
 from gui.session.log import Severity
 from gui.state import WindowState
 from tactile_lab.engine.threads import start
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import RunFolderError, TactileLabError
+from tactile_lab.store.catalogue import RunSummary, catalogue
 from tactile_lab.store.folder import DATA
 from tactile_lab.trial import Outcome
 
@@ -157,7 +158,7 @@ class Screen(QObject):
     def list_runs(self) -> None:
         """Read the run folder anew, away from this thread."""
         out = self._panels.session.out
-        start(lambda: self.listed.emit(entries(out)), "list runs")
+        start(lambda: self.listed.emit(_runs_in(out)), "list runs")
 
     def close_run(self) -> None:
         """Go back from a run on disk to the session's last run, or to the plan."""
@@ -176,6 +177,11 @@ class Screen(QObject):
             self._panels.centre.compare_bar.show_comparison(None)
             self._panels.session.run.name = ""
         self._panels.centre.say("")
+
+    def forget(self, folder: Path) -> None:
+        """A run is no longer there to be gone back to."""
+        if self._ended == folder:
+            self._ended = None
 
     def say(self, problem: str) -> None:
         """Tell why something could not be opened, above the lanes and in the log."""
@@ -325,7 +331,7 @@ class Screen(QObject):
         if problem:
             self.say(problem)
 
-    def _again(self, entry: Entry) -> None:
+    def _again(self, entry: RunSummary) -> None:
         scene = str(entry.folder / "scene.toml")
         if self._busy:
             self._queue(scene, entry.title)
@@ -333,8 +339,17 @@ class Screen(QObject):
             self.close_run()
             self.open_scene(scene)
 
-    def _list(self, found: list[Entry]) -> None:
+    def _list(self, found: list[RunSummary]) -> None:
         self._panels.review.runs.show_entries(found)
+        newest = found[:-5:-1]
         self._panels.centre.show_recent(
-            [(f"{e.title} · {e.started} · {e.status}", e.folder) for e in found[:4]]
+            [(f"{e.title} · {day(e.started)} · {e.status}", e.folder) for e in newest]
         )
+
+
+def _runs_in(out: Path) -> list[RunSummary]:
+    """The runs in a folder, oldest first; none where it is not made yet."""
+    try:
+        return catalogue(out)
+    except RunFolderError:
+        return []

@@ -55,6 +55,7 @@ class LiveRun(LiveTask):
         elapsed, expected: run time, s.
         agreement: how well the model follows the run on screen; None if nobody knows.
         notes: kept with each run.
+        waiting: notes that were typed before the next run; it will have them.
         reports: whether the report is written at its end.
     """
 
@@ -86,6 +87,7 @@ class LiveRun(LiveTask):
         self.expected: float | None = None
         self.agreement: Agreement | None = None
         self.notes: dict[str, str] = {}
+        self.waiting: list[str] = []
         self.reports = True
 
     def start(
@@ -103,10 +105,18 @@ class LiveRun(LiveTask):
         self.request, self.expectation = request, expectation
         self.title = self.name = title
         self._begin(begin_run, request, self._out, dict(self.notes))
+        waiting, self.waiting = self.waiting, []
+        for text in waiting:
+            self.say(note, text, None)
 
     def note(self, text: str) -> None:
-        """Put a note into the run's log, stamped with its time."""
-        self.say(note, text, self.elapsed)
+        """Keep a note with the run, stamped with its time; or with the next."""
+        if self.alive:
+            self.say(note, text, self.elapsed)
+            if self.source is not None:
+                self.source.notes.append((self.elapsed, text))
+        else:
+            self.waiting.append(text)
 
     def stop(self, reason: str) -> None:
         """Switch the coil off and end; nobody is asked any more."""
@@ -192,10 +202,7 @@ class LiveRun(LiveTask):
         if lost is not None:
             words += f", {lost} samples lost"
         self._log.add(Severity.INFO, "store", words)
-        if self.reports:
-            self._link.ask(
-                lambda reply: self._report(folder, reply), write_report, folder
-            )
+        self.report(folder)
         self.ended.emit(done)
         if not off.verified:
             status.set_fault("The coil's state is unknown after the run.", off.text)
@@ -207,6 +214,13 @@ class LiveRun(LiveTask):
             status.enter(WindowState.READY)
             if done.state is events.RunState.COMPLETE:
                 self.completed.emit()
+
+    def report(self, folder: Path) -> None:
+        """Have the report of a run in `folder` written, where reports are wanted."""
+        if self.reports:
+            self._link.ask(
+                lambda reply: self._report(folder, reply), write_report, folder
+            )
 
     def _has_begun(self, event: Begun) -> None:
         plan, coil = self.expectation, self._status.coil

@@ -168,13 +168,13 @@ class Session(QObject):
         self.monitor.record(self.out, self.run.notes)
 
     def note(self, text: str) -> None:
-        """A note of the user, stamped with wall-clock and run time."""
-        at = (
-            f" (at {self.run.elapsed:.1f} s)"
-            if self.state is WindowState.RUNNING
-            else ""
+        """A note of the user on the run in progress, or on the next one."""
+        at = f" (at {self.run.elapsed:.1f} s)"
+        self.log.add(
+            Severity.NOTE,
+            "note",
+            text + (at if self.run.alive else " (kept for the next run)"),
         )
-        self.log.add(Severity.NOTE, "note", text + at)
         self.run.note(text)
 
     def stop(self, reason: str = "STOP in the window") -> None:

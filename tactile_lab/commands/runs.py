@@ -20,6 +20,10 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @click.option("--sensor", metavar="TEXT", help="Only runs whose noted sensor has this.")
 @click.option("--since", type=DAY, metavar="DATE", help="Not before this day.")
 @click.option("--until", type=DAY, metavar="DATE", help="Not after this day.")
+@click.option(
+    "--search", default="", metavar="WORDS",
+    help="Only runs with these words in names, notes, tags or parameters.",
+)  # fmt: skip
 @json_option
 def command(
     root: Path,
@@ -27,6 +31,7 @@ def command(
     sensor: str | None,
     since: datetime | None,
     until: datetime | None,
+    search: str,
     as_json: bool,
 ) -> None:
     """List the runs in folder ROOT (./runs), oldest first."""
@@ -39,6 +44,7 @@ def command(
             sensor=sensor,
             since=since.date() if since else None,
             until=until.date() if until else None,
+            words=search,
         )
     if as_json:
         print_json({"runs": [entry.to_dict() for entry in entries]})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ def command(run: Path, as_json: bool) -> None:
     else:
         kind = "simulated" if summary["simulated"] else "measured"
         say(f"{summary['run']}: {summary['status']}, {kind}")
-        for name, value in _rows(summary):
+        for name, value in rows(summary):
             if value:
                 say(f"{name:<13}{value}" if name else str(value))
 
@@ -39,6 +40,7 @@ def describe(path: Path) -> dict[str, Any]:
     """
     from tactile_lab.errors import RunFolderError
     from tactile_lab.store.folder import DATA, is_live, read_info
+    from tactile_lab.store.remarks import read_remarks
     from tactile_lab.store.run import Run
 
     info = read_info(path)
@@ -53,6 +55,7 @@ def describe(path: Path) -> dict[str, Any]:
         "bench": info.get("bench"),
         "simulated": info.get("simulated"),
         "notes": info.get("notes") or {},
+        "remarks": asdict(read_remarks(path)),
         "temperature_K": (info.get("temperature") or {}).get("K"),
         "detection": info.get("detection"),
         "instruments": {
@@ -106,7 +109,7 @@ def describe(path: Path) -> dict[str, Any]:
     return summary
 
 
-def _rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
+def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     """Names and what is shown beside them; rows without a value are left out."""
     from tactile_lab.quantity import count, show
     from tactile_lab.scene.tables import ZERO_CELSIUS
@@ -114,6 +117,12 @@ def _rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     for key in ("reason", "started", "protocol", "scene", "bench"):
         yield key, summary[key]
     yield from summary["notes"].items()
+    said = summary["remarks"]
+    yield "title", said["title"]
+    yield "tags", ", ".join(said["tags"])
+    for note in said["notes"]:
+        at = "" if note["time"] is None else f"{note['time']:.1f} s: "
+        yield "note", f"{at}{note['text']}"
     if summary["temperature_K"] is not None:
         yield "temperature", f"{summary['temperature_K'] - ZERO_CELSIUS:.4g} °C"
     yield from summary["instruments"].items()

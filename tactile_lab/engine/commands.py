@@ -68,8 +68,8 @@ def stop(served: ServedTask, reason: str) -> None:
     served.stop(reason)
 
 
-def note(served: ServedTask, text: str, time: float) -> None:
-    """Put a note of the user into a run's log, stamped with its time, s."""
+def note(served: ServedTask, text: str, time: float | None) -> None:
+    """Keep a note of the user with a run, at a time of it, s, or on it as a whole."""
     served.to_task(lambda run: run.note(text, time))
 
 

@@ -37,6 +37,7 @@ from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate
 from tactile_lab.store.folder import RunFolder, Status
 from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.remarks import add_note
 from tactile_lab.trial import Trial
 
 STATUS: dict[events.RunState, Status] = {
@@ -111,9 +112,12 @@ class Execution(Task[Executed]):
         coil = self._runner.instruments.coil if self._runner else None
         return coil is None or (coil.off is not None and coil.off.verified)
 
-    def note(self, text: str, at: float) -> None:
-        """Put a note of the user, at `at` s of run time, into the run's log."""
-        self.folder.log("note", text, time_s=at)
+    def note(self, text: str, at: float | None) -> None:
+        """Keep a note of the user, at `at` s of run time; what prevents it is told."""
+        try:
+            add_note(self.folder.path, text, at)
+        except TactileLabError as error:
+            self._emit(events.Message("error", f"The note was not kept: {error}"))
 
     def run(self) -> Executed:
         """Run to the end; the coil is safe and the folder closed when this returns.

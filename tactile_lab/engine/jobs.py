@@ -20,6 +20,7 @@ from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import RecordingError, RefusedError, TactileLabError
+from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
     from tactile_lab.bench import Bench, OffReport
@@ -127,6 +128,17 @@ def record(engine: Engine, task: int, out: Path, notes: Mapping[str, str]) -> Pa
     if not isinstance(monitor, Monitor):
         raise RecordingError("Nothing has been seen yet.")
     return monitor.record(out, notes)
+
+
+def recover_run(engine: Engine, folder: Path) -> str:
+    """Make a run whole that was cut short; what could be saved, in words."""
+    from tactile_lab.store.recover import recover
+
+    done = recover(folder)
+    return (
+        f"{done.samples} samples per channel and {count(done.spikes, 'spike')} "
+        f"recovered, {done.dropped} samples dropped"
+    )
 
 
 def write_report(engine: Engine, folder: Path) -> None:

@@ -19,6 +19,7 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, RunFolder
 from tactile_lab.store.layout import Layout
+from tactile_lab.table import dumped
 
 PACKAGES = (
     "tactile-lab", "numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb",
@@ -34,6 +35,7 @@ def origin(plan: Plan, bench: Bench, notes: Mapping[str, str]) -> dict[str, Any]
         "scene": scene.name,
         "protocol": scene.protocol.name,
         "title": scene.protocol.title,
+        "parameters": dumped(scene.protocol),
         "bench": scene.bench.name,
         "simulated": bench.simulated,
         "seed": scene.simulated.seed if bench.simulated else None,

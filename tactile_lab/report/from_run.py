@@ -22,6 +22,7 @@ from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.overrange import overrange
 from tactile_lab.store.overrange import told as overrange_told
+from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import Records
 
@@ -82,7 +83,7 @@ def read(folder: Path) -> RunData:
             sensor=_texts(scene, "sensor"),
             settings=settings,
             calibration=_calibration(scene),
-            conditions=_conditions(info),
+            conditions=_conditions(info) | _said(run.path),
             environment=info.get("environment") or {},
         )
 
@@ -102,6 +103,14 @@ def _conditions(info: Mapping[str, Any]) -> dict[str, str]:
     for name, digest in (info.get("files") or {}).items():
         found[name] = f"SHA-256 {digest[:16]}…"
     return found
+
+
+def _said(path: Path) -> dict[str, str]:
+    """What people noted of the run, by what it is."""
+    said = read_remarks(path)
+    found = {f"note {k}": str(note) for k, note in enumerate(said.notes, 1)}
+    named = {"title": said.title, "tags": ", ".join(said.tags)}
+    return {name: text for name, text in named.items() if text} | found
 
 
 def stimulus_onset(scene: Scene) -> float:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
 from datetime import date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.folder import INFO, is_live, read_info, write_json
+from tactile_lab.store.remarks import REMARKS, read_remarks
 
 if TYPE_CHECKING:
     from tactile_lab.store.run import Run
 
 INDEX = ".index.json"
-VERSION = 2
+VERSION = 3
 """Of the index; another one is thrown away and rebuilt."""
 
 SENSOR_KEYS = ("sensor", "sample")
@@ -33,7 +35,11 @@ class RunSummary:
         name: of the folder.
         started: ISO time with zone.
         status: as in `run.json`; "cut short" where a running run has no writer.
-        protocol, scene, sensor, bench: names; empty where not known.
+        title: that somebody gave it, else that of its protocol.
+        protocol, scene, sensor, operator, bench: names; empty where not known.
+        tags, notes: what people said of it.
+        starred: it matters to somebody.
+        parameters: of the protocol, as a file holds them; empty for older runs.
         simulated: whether physics was computed.
         duration: of the experiment, s; None if not known.
         spikes: found on line; None if not known.
@@ -45,10 +51,16 @@ class RunSummary:
     name: str
     started: str = ""
     status: str = "unreadable"
+    title: str = ""
     protocol: str = ""
     scene: str = ""
     sensor: str = ""
+    operator: str = ""
     bench: str = ""
+    tags: Sequence[str] = ()
+    notes: Sequence[str] = ()
+    starred: bool = False
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     simulated: bool | None = None
     duration: float | None = None
     spikes: int | None = None
@@ -65,6 +77,16 @@ class RunSummary:
 
         return Run.load(self.folder)
 
+    def says(self, words: str) -> bool:
+        """Whether each of `words`, in any case, stands in a name, note or parameter."""
+        texts = (
+            *(self.name, self.status, self.title, self.protocol, self.scene),
+            *(self.sensor, self.operator, self.bench, *self.tags, *self.notes),
+            *(f"{key}={value}" for key, value in self.parameters.items()),
+        )
+        text = " ".join(texts).casefold()
+        return all(word in text for word in words.casefold().split())
+
     def to_dict(self) -> dict[str, Any]:
         """All but the folder, for the index and for JSON."""
         names = (field.name for field in fields(self))
@@ -78,6 +100,7 @@ def catalogue(
     sensor: str | None = None,
     since: date | None = None,
     until: date | None = None,
+    words: str = "",
 ) -> list[RunSummary]:
     """Runs in folder `root` that match, oldest first.
 
@@ -87,6 +110,7 @@ def catalogue(
         sensor: part of the noted sensor, any case.
         since: first day on which the run started.
         until: last day.
+        words: each stands somewhere in its names, notes or parameters.
 
     Raises:
         RunFolderError: `root` is no folder.
@@ -101,6 +125,8 @@ def catalogue(
         if since is not None and (day is None or day < since):
             continue
         if until is not None and (day is None or day > until):
+            continue
+        if not entry.says(words):
             continue
         chosen.append(entry)
     return sorted(chosen, key=lambda entry: (entry.started, entry.name))
@@ -131,7 +157,7 @@ def _all(root: Path) -> list[RunSummary]:
 
 
 def _folders(root: Path) -> Iterator[tuple[Path, list[int]]]:
-    """Run folders and what tells whether their `run.json` has changed."""
+    """Run folders and what tells whether what is said of them has changed."""
     try:
         with os.scandir(root) as found:
             names = [item.name for item in found if item.is_dir()]
@@ -145,7 +171,11 @@ def _folders(root: Path) -> Iterator[tuple[Path, list[int]]]:
             state = (root / name / INFO).stat()
         except OSError:
             continue  # some other folder
-        yield root / name, [state.st_mtime_ns, state.st_size]
+        stamp = [state.st_mtime_ns, state.st_size]
+        with suppress(OSError):  # few runs have remarks
+            state = (root / name / REMARKS).stat()
+            stamp += [state.st_mtime_ns, state.st_size]
+        yield root / name, stamp
 
 
 def _read_index(root: Path) -> dict[str, Any]:
@@ -164,7 +194,7 @@ def _read_index(root: Path) -> dict[str, Any]:
 
 def _entry(path: Path) -> RunSummary:
     try:
-        info = read_info(path)
+        info, remarks = read_info(path), read_remarks(path)
     except RunFolderError as error:
         return RunSummary(folder=path, name=path.name, trouble=str(error))
     notes = info.get("notes") or {}
@@ -174,12 +204,24 @@ def _entry(path: Path) -> RunSummary:
         name=path.name,
         started=str(info.get("started") or ""),
         status=str(info["status"]),
+        title=remarks.title or str(info.get("title") or info.get("protocol") or ""),
         protocol=str(info.get("protocol") or ""),
         scene=str(info.get("scene") or ""),
         sensor=", ".join(sensors),
+        operator=str(notes.get("operator") or ""),
         bench=str(info.get("bench") or ""),
+        tags=list(remarks.tags),
+        notes=[*_free(notes), *map(str, remarks.notes)],
+        starred=remarks.starred,
+        parameters=info.get("parameters") or {},
         simulated=info.get("simulated"),
         duration=info.get("duration_s"),
         spikes=info.get("spikes_online"),
         loss=str((info.get("loss") or {}).get("text") or ""),
     )
+
+
+def _free(notes: Mapping[str, Any]) -> list[str]:
+    """Notes given with the run that have no place of their own."""
+    known = (*SENSOR_KEYS, "operator")
+    return [f"{key}: {text}" for key, text in notes.items() if key not in known]

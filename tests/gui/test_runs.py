@@ -5,18 +5,30 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 
+from gui.lanes.compare import MARKS
 from gui.look.theme import Theme
-from gui.review.entries import Entry, entries
-from gui.review.runs import RunsView
+from gui.review.runs import PAGE, RunsView
+from tactile_lab.store.catalogue import RunSummary, catalogue
 from tactile_lab.store.folder import RunFolder
 
+
+def summary(name: str, title: str, status: str, **more: object) -> RunSummary:
+    return RunSummary(
+        folder=Path(name), name=name, title=title, status=status,
+        started=f"2026-11-20T10:00:0{ord(name[-1]) % 10}+00:00", **more,
+    )  # fmt: skip
+
+
 ENTRIES = [
-    Entry(Path("a"), "Pulses", "demo", "complete", "today 10:00", 18.0, True),
-    Entry(Path("b"), "Staircase", "stairs", "aborted", "today 09:00", 9.0, True),
-    Entry(Path("c"), "Pulses", "demo", "faulted", "today 08:00", 3.0, False),
-]
+    summary("a", "Pulses", "complete", duration=3.0, simulated=True),
+    summary(
+        "b", "Staircase", "aborted", duration=9.0, operator="Curie", spikes=7,
+        notes=["2.0 s: moved the magnet"], parameters={"levels": ["80 mN"]},
+    ),
+    summary("c", "Pulses", "faulted", duration=18.0, starred=True, tags=["paper"]),
+]  # fmt: skip
 
 
 @pytest.fixture
@@ -33,8 +45,9 @@ def texts(view: RunsView) -> str:
 def test_nothing_can_be_done_before_a_run_is_chosen(runs: RunsView) -> None:
     assert not runs.open.isEnabled() and not runs.rerun.isEnabled()
     assert runs.open.toolTip() == "Choose a run first"
-    opened: list[Entry] = []
+    opened: list[RunSummary] = []
     runs.opened.connect(opened.append)
+    runs.order.setCurrentText("Oldest first")
     QTest.mouseClick(runs.cards[1], Qt.MouseButton.LeftButton)
     runs.open.click()
     assert opened == [ENTRIES[1]]
@@ -43,9 +56,9 @@ def test_nothing_can_be_done_before_a_run_is_chosen(runs: RunsView) -> None:
 def test_run_on_screen_is_marked_and_chosen(runs: RunsView) -> None:
     runs.show_current(Path("c"))
     assert [c.accessibleName().endswith("on screen") for c in runs.cards] == [
-        False, False, True,
+        True, False, False,
     ]  # fmt: skip
-    asked: list[Entry] = []
+    asked: list[RunSummary] = []
     runs.again.connect(asked.append)
     runs.rerun.click()
     assert asked == [ENTRIES[2]]
@@ -67,18 +80,60 @@ def test_two_or_three_are_compared(runs: RunsView) -> None:
     for count, card in enumerate(runs.cards, start=1):
         QTest.keyClick(card, Qt.Key.Key_Space)
         assert runs.compare.isEnabled() is (count >= 2)
-    assert runs.ticked() == ENTRIES
+    assert sorted(runs.ticked(), key=lambda e: e.name) == ENTRIES
+    marks = [card._mark.text() for card in runs.cards]
+    assert marks == list(MARKS), "each bears the mark it will be compared under"
 
 
 def test_a_run_whose_program_died_is_listed_as_cut_short(
     app: QApplication, tmp_path: Path
 ) -> None:
     run = RunFolder.create(tmp_path, "pulses", {"title": "Pulses"})
-    assert [entry.status for entry in entries(tmp_path)] == ["running"]
+    assert [entry.status for entry in catalogue(tmp_path)] == ["running"]
     run._log.close()  # what the kernel does when the process dies
-    found = entries(tmp_path)
+    found = catalogue(tmp_path)
     assert [entry.status for entry in found] == ["cut short"]
     view = RunsView(Theme("light"))
     view.show_entries(found)
     view.filter.group.button(3).click()
     assert "cut short" in texts(view) and len(view.cards) == 1, "among the faults"
+
+
+def listed(view: RunsView) -> list[str]:
+    return [card.entry.name for card in view.cards]
+
+
+@pytest.mark.parametrize(
+    "words", ["curie", "magnet moved", "80 mn", "7 staircase aborted"]
+)
+def test_notes_operator_and_levels_are_found(runs: RunsView, words: str) -> None:
+    runs.search.setText(words.removeprefix("7 "))
+    assert listed(runs) == ["b"]
+
+
+def test_runs_are_sorted_and_starred_ones_filtered(runs: RunsView) -> None:
+    assert listed(runs) == ["c", "b", "a"], "the newest first"
+    runs.order.setCurrentText("Most spikes first")
+    assert listed(runs)[0] == "b"
+    runs.filter.group.button(4).click()
+    assert listed(runs) == ["c"]
+
+
+def test_older_runs_are_listed_when_asked_for(runs: RunsView) -> None:
+    many = [summary(f"{k:03d}", "Pulses", "complete") for k in range(PAGE + 5)]
+    runs.show_entries(many)
+    assert len(runs.cards) == PAGE
+    (more,) = (b for b in runs.findChildren(QPushButton) if "more" in b.text())
+    more.click()
+    assert len(runs.cards) == PAGE + 5
+
+
+def test_only_a_run_that_was_cut_short_is_recovered(runs: RunsView) -> None:
+    runs.show_entries([*ENTRIES, summary("d", "Pulses", "cut short")])
+    (cut,) = (card for card in runs.cards if card.entry.name == "d")
+    QTest.mouseClick(cut, Qt.MouseButton.LeftButton)
+    assert not runs.recover.isHidden() and runs.open.isHidden()
+    menu = [one.text() for one in runs.menu_of(cut.entry).actions()]
+    assert "Recover" in menu and "Delete …" in menu
+    QTest.mouseClick(runs.cards[0], Qt.MouseButton.LeftButton)
+    assert runs.recover.isHidden() and not runs.open.isHidden()

@@ -45,6 +45,7 @@ def red_share(button: QAbstractButton) -> float:
 
 def test_ready_offers_run_and_shows_the_plan(lab) -> None:
     window = lab.window
+    window.screen_.leave_run()
     lab.session.source = None  # a run that another test left on screen
     window.setup.plan_now()
     lab.until(lambda: isinstance(window.centre.stack.source, PlanSource))
@@ -306,17 +307,6 @@ def test_letters_are_shortcuts_only_outside_text_fields(lab) -> None:
     QTest.keyClick(window, Qt.Key.Key_M)
     assert window.centre.tools.twin.isChecked() is not before
     QTest.keyClick(window, Qt.Key.Key_M)
-
-
-def test_notes_are_stamped_and_filtered(lab) -> None:
-    window = lab.window
-    window.centre.log.note.setText("moved the magnet")
-    QTest.keyClick(window.centre.log.note, Qt.Key.Key_Return)
-    window.centre.log.choices.group.button(3).click()
-    shown = window.centre.log.filter
-    last = shown.index(shown.rowCount() - 1, 3).data()
-    assert last == "moved the magnet"
-    window.centre.log.choices.group.button(0).click()
 
 
 def test_cursors_are_readable_as_text(lab) -> None:

@@ -1,0 +1,270 @@
+"""One run: name, tags and notes to be edited; facts, settings and log to be read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStackedWidget,
+    QTableWidget,
+    QTableWidgetItem,
+    QTextBrowser,
+    QWidget,
+)
+
+from gui.dialogs.overlay import Overlay
+from gui.look.theme import Theme
+from gui.parts import (
+    STRETCH,
+    Elided,
+    IconButton,
+    Segments,
+    column,
+    label,
+    line_edit,
+    push,
+    row,
+    say,
+)
+from tactile_lab.commands.show import describe, rows
+from tactile_lab.engine.threads import start
+from tactile_lab.errors import QuantityError, TactileLabError
+from tactile_lab.notebook import facts
+from tactile_lab.quantity import exact, parse
+from tactile_lab.scene.load import load
+from tactile_lab.store.folder import LOG, is_live, read_info
+from tactile_lab.store.remarks import Note, read_remarks, write_remarks
+from tactile_lab.table import fields_of
+
+PAGES = ("Notes", "Facts", "Settings", "Log")
+
+
+class AboutRun(Overlay):
+    """A card for one run after the other."""
+
+    saved = Signal(object)
+    """The folder whose remarks were changed."""
+    _read = Signal(object, str, str)
+
+    def __init__(self, window: QWidget, theme: Theme) -> None:
+        super().__init__(window, 760)
+        self._folder = Path()
+        self.heading = Elided("", "muted")
+        self.title = line_edit("Name of the run", "its protocol's name")
+        self.star = IconButton(theme, "star", "It matters", checkable=True)
+        self.star.toggled.connect(
+            lambda on: self.star.set_icon("starred" if on else "star")
+        )
+        self.tags = line_edit("Tags", "separated by commas")
+        self.choice = Segments(list(PAGES), "Page")
+        self.pages = QStackedWidget()
+        self.pages.setMinimumHeight(330)
+        self.notes = QTableWidget(0, 2)
+        self._set_up_notes()
+        self.add = push("Add a note")
+        self.remove = push("Take it out", tip="The chosen note")
+        buttons = row(self.add, self.remove, STRETCH)
+        notes = QWidget()
+        column(notes, (self.notes, 1), buttons, spacing=8)
+        self.pages.addWidget(notes)
+        self.texts = {name: QTextBrowser() for name in PAGES[1:]}
+        for name, text in self.texts.items():
+            text.setAccessibleName(name)
+            text.setOpenLinks(False)
+            self.pages.addWidget(text)
+        self.problem = label("", "error", wrap=True)
+        self.save = push("Save", "primary")
+        self.close_button = push("Close")
+        self._lay_out()
+        self.choice.group.idClicked.connect(self.show_page)
+        self.add.clicked.connect(lambda: self._add_row(Note(text="", at="")))
+        self.remove.clicked.connect(
+            lambda: self.notes.removeRow(self.notes.currentRow())
+        )
+        self.save.clicked.connect(self._save)
+        self.close_button.clicked.connect(self.hide)
+        self._read.connect(self._show_read)
+
+    def show_run(self, folder: Path) -> None:
+        """Open the card for a run."""
+        self._folder = folder
+        self.heading.set_whole(str(folder))
+        say(self.problem, "")
+        self.notes.setRowCount(0)
+        for text in self.texts.values():
+            text.setPlainText("reading …")
+        try:
+            said = read_remarks(folder)
+            live = is_live(folder)
+        except (TactileLabError, OSError) as error:
+            say(self.problem, str(error))
+            self.save.setEnabled(False)
+        else:
+            self.title.setText(said.title)
+            self.tags.setText(", ".join(said.tags))
+            self.star.setChecked(said.starred)
+            for note in said.notes:
+                self._add_row(note)
+            self.save.setEnabled(not live)
+            self.save.setToolTip("Once the run has ended" if live else "")
+        self.show_page(0)
+        self.open()
+        start(lambda: self._look(folder), "about run")
+
+    def show_page(self, number: int) -> None:
+        """0 Notes, 1 Facts, 2 Settings, 3 Log."""
+        self.choice.choose(number)
+        self.pages.setCurrentIndex(number)
+
+    def _look(self, folder: Path) -> None:
+        """Read what takes a moment, away from the window's thread."""
+        for name, make in (
+            ("Facts", facts_of),
+            ("Settings", settings_of),
+            ("Log", log_of),
+        ):
+            try:
+                text = make(folder)
+            except (TactileLabError, OSError) as error:
+                text = escape(str(error))
+            self._read.emit(folder, name, text)
+
+    def _show_read(self, folder: Path, name: str, text: str) -> None:
+        if folder == self._folder:
+            self.texts[name].setHtml(text)
+
+    def _save(self) -> None:
+        try:
+            notes = tuple(self._noted())
+            said = replace(
+                read_remarks(self._folder),
+                title=self.title.text().strip(),
+                tags=[t.strip() for t in self.tags.text().split(",") if t.strip()],
+                starred=self.star.isChecked(),
+                notes=notes,
+            )
+            write_remarks(self._folder, said)
+        except TactileLabError as error:
+            say(self.problem, str(error))
+            self.open()
+            return
+        self.hide()
+        self.saved.emit(self._folder)
+
+    def _noted(self) -> list[Note]:
+        found = []
+        for at in range(self.notes.rowCount()):
+            when, what = self.notes.item(at, 0), self.notes.item(at, 1)
+            text = "" if what is None else what.text().strip()
+            typed = "" if when is None else when.text().strip()
+            if not text:
+                continue
+            if typed and typed[-1].isdigit():
+                typed += " s"
+            try:
+                time = parse(typed, "s") if typed else None
+            except QuantityError as error:
+                raise QuantityError(
+                    f"The time of the note {text!r}: {error}"
+                ) from error
+            kept = None if what is None else what.data(Qt.ItemDataRole.UserRole)
+            found.append(Note(text=text, time=time, **({"at": kept} if kept else {})))
+        return found
+
+    def _add_row(self, note: Note) -> None:
+        at = self.notes.rowCount()
+        self.notes.insertRow(at)
+        time = "" if note.time is None else exact(round(note.time, 3), "s")
+        for where, text in enumerate((time, note.text)):
+            item = QTableWidgetItem(text)
+            item.setData(Qt.ItemDataRole.UserRole, note.at)
+            self.notes.setItem(at, where, item)
+        if not note.text:
+            self.notes.setCurrentCell(at, 1)
+            self.notes.edit(self.notes.currentIndex())
+
+    def _set_up_notes(self) -> None:
+        self.notes.setAccessibleName("Notes")
+        self.notes.setHorizontalHeaderLabels(["Time", "Note"])
+        self.notes.verticalHeader().hide()
+        self.notes.setShowGrid(False)
+        self.notes.setTabKeyNavigation(False)
+        one = QAbstractItemView.SelectionMode.SingleSelection
+        self.notes.setSelectionMode(one)
+        self.notes.setColumnWidth(0, 90)
+        header = self.notes.horizontalHeader()
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft)
+
+    def _lay_out(self) -> None:
+        head = row(label("About this run", "big"), STRETCH, self.choice)
+        named = row(label("Name"), (self.title, 2), label("Tags"), (self.tags, 2))
+        named.addWidget(self.star)
+        foot = row((self.problem, 1), STRETCH, self.close_button, self.save)
+        parts = (head, self.heading, named, (self.pages, 1), foot)
+        column(self.card, *parts, margin=22, spacing=12)
+
+
+def facts_of(folder: Path) -> str:
+    """What `tactile-lab show` says of a run, and on which versions it was made."""
+    summary = describe(folder)
+    found = [(name, value) for name, value in rows(summary) if value]
+    info = read_info(folder)
+    versions = (info.get("environment") or {}).items()
+    said = [(name, _brief(value)) for name, value in versions]
+    state = (
+        f"{summary['status']}, {'simulated' if summary['simulated'] else 'measured'}"
+    )
+    return facts(state, found) + facts("Made with", said)
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {one}" for name, one in value.items())
+    return str(value)
+
+
+def settings_of(folder: Path) -> str:
+    """The scene as it was run, table by table; what is no default is bold."""
+    scene = load(folder / "scene.toml")
+    tables = {"protocol": scene.protocol, "record": scene.record}
+    tables |= {"detect": scene.detect, "simulated": scene.simulated}
+    written, pages = scene.to_dict(), []
+    for name, table in tables.items():
+        usual = {
+            key: info.get_default(call_default_factory=True)
+            for key, info in fields_of(type(table)).items()
+            if not info.is_required()
+        }
+        found = []
+        for key, text in written[name].items():
+            own = getattr(table, key, None)
+            changed = key in usual and usual[key] != own
+            found.append(f"{'<b>' if changed else ''}{key} = {escape(str(text))}</b>")
+        pages.append(f"<p><b>[{name}]</b><br>{'<br>'.join(found)}</p>")
+    bench = "<br>".join(
+        f"{escape(str(key))} = {escape(str(value))}"
+        for key, value in written["bench"].items()
+    )
+    return "".join((*pages, f"<p><b>[bench]</b><br>{bench}</p>"))
+
+
+def log_of(folder: Path) -> str:
+    """The run's own log, line by line."""
+    found = []
+    for line in (folder / LOG).read_text(encoding="utf-8").splitlines():
+        try:
+            said = json.loads(line)
+            clock = str(said["at"])[11:23]
+            found.append((clock, f"{said['kind']}: {said['text']}"))
+        except (ValueError, KeyError, TypeError):
+            continue  # the last line of a run that was cut short
+    return facts("Log", found)

@@ -1,0 +1,152 @@
+"""One run in the list: name, status, when, how long; a tick to compare."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QContextMenuEvent, QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import QCheckBox, QFrame, QLabel
+
+from gui.lanes.compare import MARKS
+from gui.look.icons import pixmap
+from gui.look.theme import Theme
+from gui.parts import Elided, bar, label, lines, row, set_role
+from gui.review.thumbnails import ThumbnailView
+from gui.state import minutes
+from tactile_lab.store.catalogue import RunSummary
+
+PILLS = {
+    "complete": ("ok", "pill-ok"),
+    "running": ("running", "pill"),
+    "aborted": ("aborted", "pill-warn"),
+    "cut short": ("cut short", "pill-bad"),
+    "recovered": ("recovered", "pill-warn"),
+    "faulted": ("fault", "pill-bad"),
+    "unreadable": ("unreadable", "pill-bad"),
+}
+
+
+class RunCard(QFrame):
+    """What is known of a run without opening it."""
+
+    opened = Signal(object)
+    chosen = Signal(object)
+    ticked = Signal()
+    menu_asked = Signal(object, object)
+
+    def __init__(self, entry: RunSummary, theme: Theme) -> None:
+        super().__init__()
+        self.entry = entry
+        self.thumbnail = ThumbnailView(theme)
+        self.setProperty("role", "run")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setToolTip(
+            "\n".join(
+                (
+                    *(entry.title, entry.name, *told(entry)),
+                    "Enter or double click opens it, Space ticks it, a right click "
+                    "offers more",
+                )
+            )
+        )
+        self.tick = QCheckBox()
+        self.tick.setAccessibleName(f"Compare {entry.name}")
+        self.tick.setToolTip("Tick two or three runs to compare them")
+        self.tick.toggled.connect(self.ticked)
+        self._mark = label("")
+        self._mark.setFixedWidth(14)
+        word, role = PILLS.get(entry.status, (entry.status, "pill"))
+        star = "★ " if entry.starred else ""
+        first = row((Elided(star + (entry.title or entry.name), "strong"), 1))
+        first.addWidget(label(word, role), 0, Qt.AlignmentFlag.AlignVCenter)
+        kind = {True: "sim", False: "bench", None: "?"}[entry.simulated]
+        length = "—" if entry.duration is None else minutes(entry.duration)
+        when = f"{day(entry.started)} · {length} · {kind}"
+        self._signs = [QLabel(), QLabel()]
+        self._signs[0].setToolTip("On screen")
+        self._signs[1].setToolTip("\n".join(entry.notes))
+        self._signs[1].setVisible(bool(entry.notes))
+        theme.changed.connect(self._tint)
+        self._theme = theme
+        self._tint()
+        second = row((Elided(when, "muted"), 1), *self._signs, spacing=6)
+        words = lines(first, second, spacing=2)
+        if entry.tags:
+            words.addWidget(
+                Elided(" · ".join(f"#{tag}" for tag in entry.tags), "small")
+            )
+        ticks = lines(self.tick, self._mark, spacing=0)
+        bar(self, (8, 7, 10, 7), 10, self.thumbnail, (words, 1), ticks)
+
+    def mark(self, *, chosen: bool, shown: bool) -> None:
+        """Show whether it is the chosen one, and whether it is on screen."""
+        set_role(self, "run-chosen" if chosen else "run")
+        self._signs[0].setVisible(shown)
+        said = f"{self.entry.title}, {self.entry.status}, {day(self.entry.started)}"
+        self.setAccessibleName(f"{said}, on screen" if shown else said)
+
+    def show_place(self, number: int | None) -> None:
+        """Show marker and colour it would have in a comparison; None: it is not in."""
+        runs = self._theme.tokens.runs
+        if number is None or number >= len(runs):
+            self._mark.setText("")
+            return
+        self._mark.setText(MARKS[number])
+        self._mark.setStyleSheet(f"color: {runs[number]};")
+
+    def _tint(self) -> None:
+        for sign, name in zip(self._signs, ("eye", "note"), strict=True):
+            sign.setPixmap(pixmap(name, self._theme.tokens.muted, 16))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Choose the run."""
+        self.chosen.emit(self.entry)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Open the run."""
+        self.opened.emit(self.entry)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Offer what can be done with it."""
+        self.chosen.emit(self.entry)
+        self.menu_asked.emit(self.entry, event.globalPos())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Open with Enter, tick with Space."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.opened.emit(self.entry)
+        elif event.key() == Qt.Key.Key_Space:
+            self.tick.toggle()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: object) -> None:
+        """Choose the run with the keyboard."""
+        self.chosen.emit(self.entry)
+
+
+def told(entry: RunSummary) -> list[str]:
+    """What a catalogue has of a run besides its name, one line each."""
+    values = {
+        "scene": entry.scene,
+        "bench": entry.bench,
+        "sensor": entry.sensor,
+        "operator": entry.operator,
+        "spikes": "" if entry.spikes is None else str(entry.spikes),
+        "": entry.trouble,
+    }
+    found = [f"{name} {value}".strip() for name, value in values.items() if value]
+    return [*found, *entry.notes]
+
+
+def day(started: str) -> str:
+    """When a run began, from its ISO time: "today 14:03"."""
+    try:
+        at = datetime.fromisoformat(started)
+    except ValueError:
+        return ""
+    days = (datetime.now(at.tzinfo).date() - at.date()).days
+    date = {0: "today", 1: "yesterday"}.get(days, f"{at:%d %b %Y}")
+    return f"{date} {at:%H:%M}"

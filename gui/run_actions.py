@@ -1,0 +1,159 @@
+"""What can be done with runs on disk besides showing them: notes, recovery, tidying."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QFile, QObject
+from PySide6.QtWidgets import QWidget
+
+from gui.dialogs.about_run import AboutRun
+from gui.dialogs.confirm import Confirm
+from gui.lanes.compare import Comparison
+from gui.lanes.stored import RunSource
+from gui.screen.panels import Panels
+from gui.screen.screen import Screen
+from gui.session.log import Severity
+from gui.state import WindowState
+from tactile_lab.engine.engine import Reply
+from tactile_lab.engine.jobs import recover_run
+from tactile_lab.errors import TactileLabError
+from tactile_lab.store.catalogue import RunSummary
+from tactile_lab.store.folder import is_live
+from tactile_lab.store.remarks import add_note, read_remarks, write_remarks
+
+
+class RunActions(QObject):
+    """Notes, recovery, stars, deletion, and the card with all about a run.
+
+    Args:
+        window: its cards cover.
+        panels: with the list of runs and the field for notes.
+        screen: shows what has changed.
+    """
+
+    def __init__(self, window: QWidget, panels: Panels, screen: Screen) -> None:
+        super().__init__(window)
+        self._panels, self._screen = panels, screen
+        self.card = AboutRun(window, panels.theme)
+        self.confirm = Confirm(window, panels.theme)
+        self.card.saved.connect(self._said)
+        runs = panels.review.runs
+        runs.about_asked.connect(lambda entry: self.card.show_run(entry.folder))
+        runs.recovered.connect(self.recover)
+        runs.starred.connect(self.star)
+        runs.deleted.connect(self.delete)
+        runs.refresh_asked.connect(screen.list_runs)
+        panels.centre.log.noted.connect(self.note)
+
+    @property
+    def noted_run(self) -> RunSource | None:
+        """The run on disk that is on screen, if there is exactly one."""
+        run = self._screen.run
+        single = isinstance(run, RunSource) and not isinstance(run, Comparison)
+        return run if single and isinstance(run, RunSource) else None
+
+    @property
+    def note_goes_to(self) -> str:
+        """Where a note that is typed now is kept, for the field's hint."""
+        run, session = self.noted_run, self._panels.session
+        if session.state.in_run:
+            return "Note on the run in progress …  (N)"
+        if run is not None and session.state is not WindowState.CONNECTING:
+            return f"Note on {run.path.name} …  (N)"
+        return "Note for the next run …  (N)"
+
+    def note(self, text: str) -> None:
+        """Keep a note: with the run in progress, the one on screen, or the next."""
+        session, run = self._panels.session, self.noted_run
+        if session.state.in_run or run is None:
+            session.note(text)
+            return
+        cursors = self._panels.centre.view.cursors
+        at = None if cursors is None else cursors[0]
+        try:
+            add_note(run.path, text, at)
+        except TactileLabError as error:
+            self._screen.say(f"The note was not kept: {error}")
+            return
+        where = "" if at is None else f" at cursor A, {at:.3f} s"
+        session.log.add(Severity.NOTE, "note", f"{text} ({run.path.name}{where})")
+        self._said(run.path)
+
+    def about_shown(self) -> None:
+        """Open the card for the run on screen, or for the last one."""
+        run = self.noted_run
+        folder = self._panels.session.run.folder if run is None else run.path
+        if folder is None:
+            self._screen.say("No run is on screen; choose one in Runs.")
+        else:
+            self.card.show_run(folder)
+
+    def recover(self, entry: RunSummary) -> None:
+        """Make a run whole that was cut short, then report and show it."""
+        session = self._panels.session
+        session.log.add(Severity.INFO, "store", f"Recovering {entry.name} …")
+        session.desk.ask(
+            lambda reply: self._recovered(entry.folder, reply),
+            recover_run,
+            entry.folder,
+        )
+
+    def star(self, entry: RunSummary) -> None:
+        """Give a run a star, or take it away."""
+        try:
+            said = read_remarks(entry.folder)
+            write_remarks(entry.folder, replace(said, starred=not said.starred))
+        except TactileLabError as error:
+            self._screen.say(str(error))
+        self._screen.list_runs()
+
+    def delete(self, entry: RunSummary) -> None:
+        """Ask, and put a run's folder into the desktop's waste basket."""
+        self.confirm.ask(
+            f"Delete {entry.title or entry.name}?",
+            f"The folder <b>{entry.name}</b> goes into the desktop's waste basket, "
+            "with its samples, report and notes.",
+            "Delete",
+            lambda: self._delete(entry.folder),
+        )
+
+    def _delete(self, folder: Path) -> None:
+        run = self._screen.run
+        if run is not None and any(
+            isinstance(one.source, RunSource) and one.source.path == folder
+            for one in run.members
+        ):
+            self._screen.leave_run()
+            self._screen.forget(folder)
+        if is_live(folder):
+            self._screen.say(f"{folder.name} is still being recorded.")
+        elif QFile.moveToTrash(str(folder)):
+            said = f"{folder.name} is in the waste basket"
+            self._panels.session.log.add(Severity.INFO, "store", said)
+        else:
+            self._screen.say(
+                f"{folder} was not deleted: the desktop offers no waste basket for it. "
+                "Remove the folder by hand."
+            )
+        self._screen.list_runs()
+
+    def _recovered(self, folder: Path, reply: Reply[str]) -> None:
+        session = self._panels.session
+        if reply.value is None:
+            self._screen.say(f"{folder.name} was not recovered: {reply.problem}")
+            return
+        session.log.add(Severity.GOOD, "store", f"{folder.name}: {reply.value}")
+        session.run.report(folder)
+        self._screen.list_runs()
+        if not session.state.in_run:
+            self._screen.open_run(folder)
+
+    def _said(self, folder: Path) -> None:
+        """Somebody said something of a run: list and lanes show it."""
+        self._screen.list_runs()
+        run = self.noted_run
+        if run is not None and run.path == folder:
+            run.read_notes()
+            self._panels.centre.stack.refresh()

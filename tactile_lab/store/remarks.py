@@ -1,0 +1,120 @@
+"""What people say of a run: its name, tags, star and notes; not what was measured.
+
+They stand in a file of their own beside the record, and can be changed at any time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.folder import LOG, write_json
+
+REMARKS = "remarks.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Note:
+    """One note.
+
+    Attributes:
+        text: as typed.
+        time: on the run's axis, s; None where it is about the run as a whole.
+        at: when it was written, ISO time with zone.
+    """
+
+    text: str
+    time: float | None = None
+    at: str = field(
+        default_factory=lambda: (
+            datetime.now().astimezone().isoformat(timespec="milliseconds")
+        )
+    )
+
+    def __str__(self) -> str:
+        """The note after its time."""
+        return self.text if self.time is None else f"{self.time:.1f} s: {self.text}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remarks:
+    """All that people say of one run.
+
+    Attributes:
+        title: instead of the protocol's; "" for none.
+        tags: for finding it again.
+        starred: it matters.
+        notes: those with a time come in its order, after those without.
+    """
+
+    title: str = ""
+    tags: Sequence[str] = ()
+    starred: bool = False
+    notes: Sequence[Note] = ()
+
+    @property
+    def words(self) -> str:
+        """All texts, for a search."""
+        return " ".join((self.title, *self.tags, *(note.text for note in self.notes)))
+
+
+def read_remarks(path: Path) -> Remarks:
+    """Remarks on the run in folder `path`; notes of older runs stand in their log.
+
+    Raises:
+        RunFolderError: the file is damaged.
+    """
+    file = path / REMARKS
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        notes = tuple(Note(**note) for note in found.pop("notes"))
+        return Remarks(**found, notes=notes)
+    except FileNotFoundError:
+        return Remarks(notes=tuple(_logged(path / LOG)))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RunFolderError(
+            f"{file} cannot be read ({type(error).__name__}: {error}). Mend it, or "
+            "delete it: it holds only name, tags and notes of the run."
+        ) from error
+
+
+def write_remarks(path: Path, remarks: Remarks) -> None:
+    """Replace the remarks on the run in folder `path`.
+
+    Raises:
+        RecordingError: the folder cannot be written.
+    """
+    ordered = sorted(remarks.notes, key=lambda note: (note.time or -1.0, note.at))
+    write_json(path / REMARKS, asdict(replace(remarks, notes=ordered)))
+
+
+def add_note(path: Path, text: str, time: float | None = None) -> None:
+    """Add a note, at `time` s on the run's axis, to the run in folder `path`.
+
+    Raises:
+        RunFolderError: the remarks so far are damaged.
+        RecordingError: the folder cannot be written.
+    """
+    before = read_remarks(path)
+    notes = (*before.notes, Note(text=text, time=time))
+    write_remarks(path, replace(before, notes=notes))
+
+
+def _logged(log: Path) -> Iterator[Note]:
+    """Notes in the log of a run that has no file of remarks."""
+    try:
+        lines = log.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return
+    for line in lines:
+        try:
+            found = json.loads(line)
+            if found["kind"] == "note":
+                text, time = str(found["text"]), found.get("time_s")
+                yield Note(text=text, time=time, at=str(found["at"]))
+        except (ValueError, KeyError, TypeError):
+            continue  # the last line of a run that was cut short

@@ -1,0 +1,140 @@
+"""Notes: where they go, where they are seen, and how they are changed."""
+
+import shutil
+
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from gui.state import WindowState
+from tactile_lab.store.remarks import read_remarks
+from tactile_lab.store.run import Run
+
+
+def type_note(lab, text: str) -> None:
+    field = lab.window.centre.log.note
+    field.setText(text)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+
+
+def last_line(lab) -> str:
+    return lab.session.log.lines[-1].text
+
+
+def test_notes_are_stamped_and_filtered(lab) -> None:
+    window = lab.window
+    lab.run()
+    lab.until(lambda: lab.session.run.elapsed > 0)
+    type_note(lab, "moved the magnet")
+    window.centre.log.choices.group.button(3).click()
+    shown = window.centre.log.filter
+    last = shown.index(shown.rowCount() - 1, 3).data()
+    assert last.startswith("moved the magnet (at ")
+    window.centre.log.choices.group.button(0).click()
+    (flag,) = lab.session.source.notes
+    assert flag[0] > 0 and flag[1] == "moved the magnet"
+    folder = lab.session.run.folder
+    lab.session.stop("enough")
+    lab.until(lambda: lab.session.state is WindowState.READY)
+    (note,) = read_remarks(folder).notes
+    assert note.text == "moved the magnet" and note.time == flag[0]
+
+
+def test_a_note_before_a_run_goes_to_that_run(lab) -> None:
+    lab.window.screen_.leave_run()
+    lab.window.render_state()
+    assert "next run" in lab.window.centre.log.note.placeholderText()
+    type_note(lab, "another specimen")
+    assert "kept for the next run" in last_line(lab)
+    folder = lab.complete_run()
+    assert [n.text for n in read_remarks(folder).notes] == ["another specimen"]
+    assert lab.session.run.waiting == []
+
+
+def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
+    window, folder = lab.window, lab.runs(1)[0]
+    window.screen_.open_run(folder)
+    lab.until(lambda: lab.session.run.name == f"Looking at {folder.name}")
+    assert folder.name in window.centre.log.note.placeholderText()
+    window.centre.view.place_cursors(0.25, 0.5)
+    type_note(lab, "odd spike")
+    assert "odd spike" in [n.text for n in read_remarks(folder).notes]
+    assert (0.25, "odd spike") in window.screen_.run.notes, "a flag at cursor A"
+    window.centre.view.clear_cursors()
+    entries = window.review.runs
+
+    def found() -> bool:
+        entries.search.setText("odd spike")
+        return [card.entry.folder for card in entries.cards] == [folder]
+
+    lab.until(found)
+    entries.search.clear()
+
+
+def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
+    window, folder = lab.window, lab.runs(1)[0]
+    card = window.runs.card
+    card.show_run(folder)
+    lab.until(lambda: "complete" in card.texts["Log"].toPlainText())
+    assert "KEPCO" in card.texts["Facts"].toPlainText()
+    assert "levels" in card.texts["Settings"].toPlainText()
+    card.title.setText("The good one")
+    card.tags.setText("paper, fig 4")
+    card.notes.setRowCount(0)
+    card.add.click()
+    card.notes.item(0, 0).setText("0.5")
+    card.notes.item(0, 1).setText("here")
+    card.save.click()
+    said = read_remarks(folder)
+    assert said.title == "The good one" and list(said.tags) == ["paper", "fig 4"]
+    assert [(n.time, n.text) for n in said.notes] == [(0.5, "here")]
+    runs = window.review.runs
+    lab.until(lambda: "The good one" in [c.entry.title for c in runs.cards])
+
+
+def test_a_time_that_is_none_is_refused_on_the_card(lab) -> None:
+    card, folder = lab.window.runs.card, lab.runs(1)[0]
+    card.show_run(folder)
+    card.notes.setRowCount(0)
+    card.add.click()
+    card.notes.item(0, 0).setText("soon")
+    card.notes.item(0, 1).setText("here")
+    card.save.click()
+    assert card.isVisible() and "soon" in card.problem.text()
+    card.hide()
+
+
+def test_a_run_that_was_cut_short_is_recovered_in_the_window(lab) -> None:
+    window, runs = lab.window, lab.window.review.runs
+    lab.run()
+    lab.until(lambda: lab.session.source.reach > 1.0)
+    folder = lab.session.run.folder
+    cut = folder.with_name(folder.name + "_killed")
+    shutil.copytree(folder, cut)  # nobody writes it any more
+    lab.session.stop("enough")
+    lab.until(lambda: lab.session.state is WindowState.READY)
+    window.screen_.list_runs()
+    lab.until(lambda: cut in [card.entry.folder for card in runs.cards])
+    card = next(card for card in runs.cards if card.entry.folder == cut)
+    assert card.entry.status == "cut short"
+    QTest.mouseClick(card, Qt.MouseButton.LeftButton)
+    runs.recover.click()
+    lab.until(lambda: lab.session.run.name == f"Looking at {cut.name}")
+    with Run.load(cut) as run:
+        assert run.status == "recovered" and run.duration > 0.5
+
+
+def test_a_deleted_run_is_gone_from_the_list(lab, monkeypatch) -> None:
+    window = lab.window
+    source = lab.runs(1)[0]
+    copy = source.with_name(source.name + "_copy")
+    shutil.copytree(source, copy)
+    monkeypatch.setenv("XDG_DATA_HOME", str(lab.folder))
+    window.screen_.list_runs()
+    runs = window.review.runs
+    lab.until(lambda: copy in [card.entry.folder for card in runs.cards])
+    entry = next(card.entry for card in runs.cards if card.entry.folder == copy)
+    window.runs.delete(entry)
+    assert window.runs.confirm.isVisible() and copy.exists(), "asked first"
+    window.runs.confirm.do.click()
+    lab.until(lambda: copy not in [card.entry.folder for card in runs.cards])
+    assert not copy.exists()

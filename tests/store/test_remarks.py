@@ -1,0 +1,71 @@
+"""Name, tags and notes of a run, and how they are found again."""
+
+import json
+
+import pytest
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.catalogue import catalogue
+from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.remarks import (
+    REMARKS,
+    Note,
+    Remarks,
+    add_note,
+    read_remarks,
+    write_remarks,
+)
+
+
+@pytest.fixture
+def run(tmp_path):
+    folder = RunFolder.create(tmp_path, "pulses", {"title": "Pulses", "notes": {}})
+    folder.finish("complete")
+    return folder.path
+
+
+def test_notes_stand_in_order_of_their_time(run):
+    add_note(run, "late", 9.0)
+    add_note(run, "early", 2.0)
+    add_note(run, "on the whole")
+    said = read_remarks(run).notes
+    assert [note.text for note in said] == ["on the whole", "early", "late"]
+    assert str(said[1]) == "2.0 s: early"
+
+
+def test_remarks_are_changed_and_read_back_the_same(run):
+    said = Remarks(title="best", tags=["a", "b"], starred=True, notes=[Note(text="x")])
+    write_remarks(run, said)
+    assert read_remarks(run).notes[0] == said.notes[0]
+    assert read_remarks(run).title == "best" and read_remarks(run).starred
+
+
+def test_the_catalogue_follows_remarks_and_searches_them(run):
+    assert catalogue(run.parent, words="moved magnet") == []
+    add_note(run, "moved the MAGNET", 1.5)
+    (found,) = catalogue(run.parent, words="moved magnet")
+    assert found.notes == ["1.5 s: moved the MAGNET"]
+    write_remarks(run, Remarks(title="best", tags=["paper"]))
+    (found,) = catalogue(run.parent, words="paper")
+    assert found.title == "best" and found.tags == ["paper"]
+
+
+def test_notes_of_older_runs_are_read_from_their_log(run):
+    line = {
+        "at": "2026-11-01T10:00:00+00:00",
+        "kind": "note",
+        "text": "old",
+        "time_s": 3,
+    }
+    with (run / "log.jsonl").open("a") as log:
+        log.write(json.dumps(line) + "\n" + '{"cut sho')
+    assert [str(note) for note in read_remarks(run).notes] == ["3.0 s: old"]
+
+
+@pytest.mark.parametrize("rubbish", ["{", "[]", '{"notes": [{"txt": 1}]}', '{"a": 1}'])
+def test_damaged_remarks_are_refused_with_what_to_do(run, rubbish):
+    (run / REMARKS).write_text(rubbish)
+    with pytest.raises(RunFolderError, match="delete it"):
+        read_remarks(run)
+    (entry,) = catalogue(run.parent)
+    assert "remarks" in entry.trouble
