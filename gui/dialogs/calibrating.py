@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 from gui.dialogs.bench_text import BenchChoice
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, line, line_edit, push, row
+from gui.plots.small_plot import SmallPlot
 from gui.review.conclusion import Concluded
 from gui.review.live_plots import loop_plot
-from gui.review.plot_view import PlotView
 from tactile_lab.trace import FloatArray
 
 MAGNET = (
@@ -42,7 +42,7 @@ class Calibrating(QWidget):
         self.named = label("", "muted", wrap=True)
         self.field = push("Calibrate the field", "primary")
         self.progress = label("", "muted", wrap=True)
-        self.loop = PlotView(theme)
+        self.loop = SmallPlot(theme)
         self.loop.setFixedHeight(TALL)
         self.loop.hide()
         self.findings = label("", "", wrap=True)

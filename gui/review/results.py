@@ -32,9 +32,9 @@ from gui.parts import (
     stack,
     with_gutter,
 )
+from gui.plots.small_plot import SmallPlot
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.live_plots import loop_plot, rate_plot
-from gui.review.plot_view import PlotView
 from gui.review.wording import unbroken
 from gui.session.fit import Fit
 from gui.session.steps import cells
@@ -65,10 +65,10 @@ class ResultsView(QWidget):
         self.mark.hide()
         self.mark.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._theme = theme
-        self.plot = PlotView(theme)
-        self.loop = PlotView(theme)
+        self.plot = SmallPlot(theme)
+        self.loop = SmallPlot(theme)
         self.loop.hide()
-        self.answers: list[PlotView] = []
+        self.answers: list[SmallPlot] = []
         """Of the report: the protocol's own plots."""
         self._steps: Sequence[MeasuredTrial] = ()
         self._model: tuple[tuple[float, float], ...] = ()
@@ -147,7 +147,7 @@ class ResultsView(QWidget):
         say(self.statements, unbroken("\n".join(statements)))
         say(self.tables, "".join(_html(table) for table in tables))
         empty(self._drawn)
-        self.answers = [PlotView(self._theme) for _ in plots]
+        self.answers = [SmallPlot(self._theme) for _ in plots]
         for view, plot in zip(self.answers, plots, strict=True):
             view.show_plot(plot)
             self._drawn.addWidget(view)

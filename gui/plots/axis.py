@@ -1,0 +1,104 @@
+"""An axis with round numbers in the window's typeface, on pyqtgraph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import QRectF, Qt, QTimer
+from PySide6.QtGui import QColor, QPen
+
+from gui.lanes.axis import decimals, number, step_of, ticks
+from gui.look.fonts import sized
+from gui.look.tokens import Tokens
+
+# at exit it would look through every object there is; the window closes its own
+pg.setConfigOption("exitCleanup", False)
+
+AIR = 15
+"""Pixels by which a number may stand out at an end of an axis."""
+
+Paint = Callable[..., None]
+
+
+def guarded(paint: Paint) -> Paint:
+    """Let an item's `paint` fail alone: two exceptions in a picture end the process.
+
+    The exception is told once the picture is done, as one from any slot.
+    """
+
+    def safely(*given: Any) -> None:
+        try:
+            paint(*given)
+        except Exception as error:
+            told = error
+
+            def tell() -> None:
+                raise told
+
+            QTimer.singleShot(0, tell)
+
+    return safely
+
+
+def stroke(
+    colour: str, ratio: float = 1.0, style: Qt.PenStyle = Qt.PenStyle.SolidLine
+) -> QPen:
+    """A pen of a shown pixel on a screen with `ratio` device pixels in it."""
+    pen = QPen(QColor(colour), max(1, round(ratio)), style)
+    pen.setCosmetic(True)
+    return pen
+
+
+class RoundAxis(pg.AxisItem):  # type: ignore[misc]
+    """Numbers at 1-2-5 steps, so many that they can be read; a grid if asked for.
+
+    Args:
+        orientation: "left" or "bottom".
+        apart: least distance between two numbers, px.
+        whole: whether only whole numbers mean anything.
+    """
+
+    def __init__(self, orientation: str, apart: float, *, whole: bool = False) -> None:
+        self._apart, self._least = apart, 1.0 if whole else 0.0
+        super().__init__(orientation, maxTickLength=0)
+        self.enableAutoSIPrefix(False)
+        self.setStyle(tickFont=sized(11), tickAlpha=255)
+
+    def tint(self, tokens: Tokens) -> None:
+        """Take on a theme's colours."""
+        self.setTextPen(tokens.muted)
+        self.setPen(tokens.border_strong)
+        self.setTickPen(tokens.grid)
+
+    def tickValues(self, low: float, high: float, size: float) -> Any:
+        """The step, and the round values in [low, high]; powers where logarithmic."""
+        if self.logMode:
+            return [
+                (1.0, list(range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)))
+            ]
+        at_most = max(2, int(size / self._apart))
+        found = ticks(low, high, at_most)
+        if len(found) < 2:  # one number alone says nothing of the scale
+            found = ticks(low, high, at_most := 5)
+        step = step_of(high - low, at_most)
+        if step < self._least:
+            step, found = 1.0, [*range(math.ceil(low), math.floor(high) + 1)]
+        # one at the very end would be left out for an error of rounding
+        air = 1e-9 * (high - low)
+        return [(step, [min(max(value, low + air), high - air) for value in found])]
+
+    def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:
+        """The numbers, with a true minus."""
+        if self.logMode:
+            return [f"1e{value:.0f}".replace("-", "−") for value in values]
+        return [number(value, decimals(spacing)) for value in values]
+
+    def boundingRect(self) -> QRectF:
+        """With room for a number that stands at an end."""
+        inner: QRectF = super().boundingRect()
+        return inner.adjusted(-AIR, -AIR, AIR, AIR)
+
+    paint = guarded(pg.AxisItem.paint)

@@ -1,0 +1,420 @@
+"""Shows the plots that `tactile_lab.plot` describes, live ones and protocols' own."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+import shiboken6
+from numpy.typing import ArrayLike
+from PySide6.QtCore import QSizeF, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QWheelEvent
+from PySide6.QtWidgets import QMenu
+
+from gui.lanes.axis import nice_range
+from gui.look.fonts import sized
+from gui.look.theme import Theme
+from gui.look.tokens import Tokens
+from gui.plots.axis import RoundAxis, stroke
+from tactile_lab.plot import FloatArray, Guide, Panel, Plot, Series, y_scale
+
+PANEL, SMALL = 200, 130
+"""Height of a panel, and of one that is low in the report, px."""
+LEFT, FOOT, LOW, HEAD = 48, 36, 20, 22
+"""Width of an axis; heights of one with its name, without it, and of a heading, px."""
+NEAR = 0.04
+"""Share of the width within which a text at an edge stands inside of it."""
+WIDEST = 1e4
+"""Width of a heading where nothing limits it, px."""
+SIZE = 7.6
+"""Size of a point, px."""
+
+POINTS = {
+    "points": "o",
+    "dots": "o",
+    "open": "o",
+    "joined": "o",
+    "up": "t1",
+    "down": "t",
+}
+STYLES = {"dashed": Qt.PenStyle.DashLine, "dotted": Qt.PenStyle.DotLine}
+GLYPHS = {
+    "points": "●", "dots": "•", "open": "○", "joined": "●", "up": "▲", "down": "▼",
+    "dashed": "╌", "dotted": "┈", "filled": "▬", "range": "▬", "band": "▬",
+}  # fmt: skip
+"""What stands for a mark in the legend; a dash where none does."""
+
+
+class Box(pg.ViewBox):  # type: ignore[misc]
+    """Drags pan, Ctrl and the wheel zoom, a double click shows all again.
+
+    Attributes:
+        whole: (x range, y range) in which all is in view.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(enableMenu=False)
+        self.whole: list[list[float]] = [[0.0, 1.0], [0.0, 1.0]]
+
+    @property
+    def moved(self) -> bool:
+        """Whether the user looks at a part."""
+        return not np.allclose(self.viewRange(), self.whole)
+
+    def show_all(self) -> None:
+        """Back to where all is in view."""
+        self.setRange(xRange=self.whole[0], yRange=self.whole[1], padding=0)
+
+    def mouseClickEvent(self, event: Any) -> None:
+        """A double click shows all, the right button a menu."""
+        if event.double():
+            self.show_all()
+        elif event.button() is Qt.MouseButton.RightButton:
+            view = self.getViewWidget()
+            menu = QMenu(view)
+            menu.addAction("Show all", self.show_all)
+            copy = QGuiApplication.clipboard().setPixmap
+            menu.addAction("Copy picture", lambda: copy(view.grab()))
+            menu.popup(event.screenPos().toPoint())
+        event.accept()
+
+
+class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """One plot; its panels stand above one another.
+
+    Args:
+        theme: of the window.
+        nothing: what stands where there is no plot.
+        height: px; then the axes have no names. None for what the panels need.
+
+    Attributes:
+        plot: shown now, or None.
+        panels: of it.
+    """
+
+    def __init__(
+        self, theme: Theme, nothing: str = "", height: int | None = None
+    ) -> None:
+        super().__init__()
+        self._theme, self.nothing, self._fixed = theme, nothing, height
+        self.plot: Plot | None = None
+        self.panels: list[PanelItem] = []
+        self.setFixedHeight(height) if height else self.setMinimumHeight(PANEL)
+        self.setBackground(None)
+        self.setAntialiasing(True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.ci.setContentsMargins(0, 0, 8, 0)
+        self.ci.setSpacing(0)
+        theme.changed.connect(self.draw)
+        self.draw()
+
+    def show_plot(self, plot: Plot | None) -> None:
+        """Show a plot, or nothing; where the user zoomed in the same plot stays."""
+        same = (
+            plot is not None and self.plot is not None and self.plot.name == plot.name
+        )
+        looked = [one.box.viewRange() if one.box.moved else None for one in self.panels]
+        self.plot = plot
+        if plot is not None and self._fixed is None:
+            shown = plot.title or ", ".join(panel.label for panel in plot.panels)
+            self.setAccessibleName(f"{shown} against {plot.x_label}")
+            self.setToolTip(plot.caption)
+            self.setMinimumHeight(sum(_heights(plot)))
+        self.draw()
+        for panel, part in zip(self.panels, looked, strict=False):
+            if same and part is not None:
+                panel.box.setRange(xRange=part[0], yRange=part[1], padding=0)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom with Ctrl; else the page below scrolls."""
+        if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+    def draw(self) -> None:
+        """All panels, or why there are none."""
+        self.clear()
+        for panel in self.panels:
+            # at once: a collector that takes it apart piece by piece meets Qt in it
+            shiboken6.delete(panel)
+        self.panels, plot, tokens = [], self.plot, self._theme.tokens
+        if plot is None:
+            words = self.nothing.replace("\n", "<br>")
+            self.addLabel(words, color=tokens.muted, size="11px")
+            return
+        for row, height in enumerate(_heights(plot)):
+            last = plot.beside or row == len(plot.panels) - 1
+            foot = (FOOT if plot.x_label else LOW) if last else 8
+            ratio = self.devicePixelRatio()
+            item = PanelItem(plot, plot.panels[row], tokens, ratio, foot)
+            self.addItem(item, row, 0)
+            self.ci.layout.setRowStretchFactor(row, height)
+            if self.panels and not plot.beside:
+                item.box.setXLink(self.panels[0].box)
+            self.panels.append(item)
+
+
+class _Heading(pg.LabelItem):  # type: ignore[misc]
+    """Text above a panel, in as many lines as it needs."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text, size="11px", justify="left")
+
+    def resizeEvent(self, event: Any) -> None:
+        """Break the text where the width ends."""
+        self.item.setTextWidth(max(self.width(), 50))
+        self.setFixedHeight(self.item.boundingRect().height())
+        super().resizeEvent(event)
+
+    def updateMin(self) -> None:
+        """Nothing: the layout asks for its size."""
+
+    def sizeHint(self, which: Qt.SizeHint, constraint: QSizeF) -> QSizeF:
+        """It takes what width there is."""
+        most = which is Qt.SizeHint.MaximumSize
+        return QSizeF(WIDEST if most else 0, WIDEST if most else HEAD)
+
+
+class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
+    """One panel; values on its axes are those shown, or their logarithms."""
+
+    def __init__(
+        self, plot: Plot, panel: Panel, tokens: Tokens, ratio: float, foot: int
+    ) -> None:
+        super().__init__()
+        self._plot, self._panel = plot, panel
+        self._tokens, self._ratio = tokens, ratio
+        self._x_by, x_text = plot.x_scale()
+        self._y_by, y_text = y_scale(panel)
+        self.setContentsMargins(0, 0, 0, 0)
+        self.setSpacing(0)
+        self.box = Box()
+        left, bottom = RoundAxis("left", 26), RoundAxis("bottom", 60, whole=plot.whole)
+        if panel.label:
+            self.addItem(_Heading(self._heading(y_text)), 0, 0, 1, 2)
+        self.addItem(left, 1, 0)
+        self.addItem(self.box, 1, 1)
+        self.addItem(bottom, 2, 1)
+        left.logMode, bottom.logMode = panel.log, plot.x_log
+        for axis in (left, bottom):
+            axis.tint(tokens)
+            axis.setGrid(255)
+            axis.setZValue(-200)  # below the box of the data
+            axis.linkToView(self.box)
+        left.setWidth(LEFT)
+        bottom.setStyle(showValues=foot >= LOW)
+        bottom.setHeight(foot)
+        if foot >= FOOT:
+            bottom.setLabel(_rich(x_text), color=tokens.muted, **{"font-size": "11px"})
+        named = [(float(self._x(x)), f"{x * self._x_by:.3g}") for x in plot.x_ticks]
+        if named:
+            bottom.setTicks([named])
+        self.box.whole = [self._x_range(), self._y_range()]
+        self.box.show_all()
+        for guide in panel.guides:
+            self._guide(guide)
+        for series in panel.series:
+            self._series(series)
+        if panel.text:
+            words = pg.LabelItem(_rich(panel.text), color=tokens.text, size="11px")
+            words.setParentItem(self.box)
+            at = (1, 0) if panel.corner == "upper" else (1, 1)
+            words.anchor(itemPos=at, parentPos=at)
+
+    def _x(self, values: ArrayLike) -> FloatArray:
+        shown = np.asarray(values, dtype=np.float64) * self._x_by
+        return np.log10(shown) if self._plot.x_log else shown
+
+    def _y(self, values: ArrayLike) -> FloatArray:
+        shown = np.asarray(values, dtype=np.float64) * self._y_by
+        if not self._panel.log:
+            return shown
+        return np.log10(np.where(shown > 0, shown, np.nan))
+
+    def _x_range(self) -> list[float]:
+        plot = self._plot
+        if plot.x_limits is not None:
+            return [float(self._x(limit)) for limit in plot.x_limits]
+        panels = (self._panel,) if plot.beside else plot.panels
+        across = [self._x(s.x) for p in panels for s in p.series]
+        upright = (g for p in panels for g in p.guides if g.along == "y")
+        return _range(
+            [*across, *(self._x(e) for g in upright for e in _ends(g))], plot.whole
+        )
+
+    def _y_range(self) -> list[float]:
+        panel = self._panel
+        shown = [
+            self._y(v)
+            for s in panel.series
+            for v in (s.y, s.low, s.high)
+            if v is not None and s.mark != "ticks"
+        ]
+        across = (g for g in panel.guides if g.along == "x")
+        low, high = _range(
+            [*shown, *(self._y(e) for g in across for e in _ends(g))], False
+        )
+        least, most = panel.limits
+        return [
+            low if least is None else float(self._y(least)),
+            high if most is None else float(self._y(most)),
+        ]
+
+    def _heading(self, text: str) -> str:
+        """What is along y, then mark and name of each series."""
+        parts = [_rich(text, self._tokens.muted)]
+        for s in self._panel.series:
+            if s.name:
+                mark = _rich(GLYPHS.get(s.mark, "—"), self._colour(s.colour))
+                parts.append(f"{mark}&nbsp;{_rich(s.name, self._tokens.text)}")
+        return " &nbsp; ".join(parts)
+
+    def _guide(self, guide: Guide) -> None:
+        across = guide.along == "x"
+        ends = [float((self._y if across else self._x)(e)) for e in _ends(guide)]
+        if guide.to is not None:
+            self.box.addItem(pg.LinearRegionItem(
+                ends, "horizontal" if across else "vertical", movable=False,
+                brush=QColor(self._tokens.band), pen=QColor(0, 0, 0, 0),
+            ))  # fmt: skip
+            return
+        colour = self._colour(guide.colour)
+        style = Qt.PenStyle.DashLine if guide.dashed else Qt.PenStyle.SolidLine
+        pen = stroke(colour, self._ratio, style)
+        self.box.addItem(pg.InfiniteLine(ends[0], 0 if across else 90, pen))
+        if guide.text:
+            (left, right), (_, top) = self.box.whole
+            far = not across and ends[0] > left + 0.6 * (right - left)
+            at = (left, ends[0]) if across else (ends[0], top)
+            self._write(at, guide.text, colour, (float(far), 0.0))
+
+    def _write(
+        self, at: Sequence[float], text: str, colour: str, anchor: tuple[float, float]
+    ) -> None:
+        """A text at a place; `anchor` is the part of it, from 0 to 1, that is there."""
+        words = pg.TextItem(html=_rich(text), color=colour, anchor=anchor)
+        words.setFont(sized(11))
+        self.box.addItem(words, ignoreBounds=True)
+        words.setPos(*at)
+
+    def _series(self, s: Series) -> None:
+        colour, x = self._colour(s.colour), self._x(s.x)
+        if s.mark == "ticks":
+            low, high = self.box.whole[1]
+            ends = high - 0.14 * (high - low), high - 0.03 * (high - low)
+            y = np.tile(ends, x.size)
+            self._line(np.repeat(x, 2), y, colour, connect="pairs")
+            return
+        pale = QColor(colour)
+        if s.low is not None and s.high is not None:
+            pale.setAlphaF(1.0 if s.mark == "range" else 0.22)
+            self._fill(x, self._y(s.low), self._y(s.high), pale)
+        if s.mark in ("range", "band"):
+            return
+        y = self._y(s.y)
+        ink = colour if s.mark == "text" else self._tokens.muted
+        for place, text in zip(np.c_[x, y].tolist(), s.texts, strict=False):
+            share = np.interp(place[0], self.box.whole[0], (0, 1))
+            side = 0.5 + 0.5 * (float(share > 1 - NEAR) - float(share < NEAR))
+            self._write(place, text, ink, (side, 1.0))
+        if s.mark == "text":
+            return
+        if s.mark == "filled":
+            pale.setAlphaF(0.14)
+            self._fill(x, np.full(x.size, self._y(0.0)), y, pale)
+        self._errors(s, colour)
+        if s.mark == "steps":
+            x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
+        points: dict[str, Any] = {}
+        if s.mark in POINTS:
+            bare = s.mark == "open"
+            points = {
+                "symbol": POINTS[s.mark],
+                "symbolSize": 0.5 * SIZE if s.mark == "dots" else SIZE,
+                "symbolBrush": None if bare else QColor(colour),
+                "symbolPen": stroke(colour) if bare else None,
+            }
+            if s.mark != "joined":
+                points["pen"] = None
+        self._line(x, y, colour, **{"connect": "finite", **points}, mark=s.mark)
+
+    def _line(
+        self, x: FloatArray, y: FloatArray, colour: str, mark: str = "line", **how: Any
+    ) -> None:
+        style = STYLES.get(mark, Qt.PenStyle.SolidLine)
+        how = {"pen": stroke(colour, self._ratio, style), **how}
+        self.box.addItem(pg.PlotDataItem(x, y, **how))
+
+    def _fill(
+        self, x: FloatArray, low: FloatArray, high: FloatArray, colour: QColor
+    ) -> None:
+        for part in _pieces(x, low + high):
+            edges = [pg.PlotCurveItem(x[part], edge[part]) for edge in (low, high)]
+            self.box.addItem(pg.FillBetweenItem(*edges, brush=colour))
+
+    def _errors(self, s: Series, colour: str) -> None:
+        """Bars of the 95 % intervals."""
+        sides: dict[str, FloatArray] = {}
+        x, y = self._x(s.x), self._y(s.y)
+        if s.x_error is not None:
+            value, half = np.asarray(s.x), np.asarray(s.x_error)
+            sides |= {
+                "left": x - self._x(value - half),
+                "right": self._x(value + half) - x,
+            }
+        if s.y_error is not None:
+            value, half = np.asarray(s.y), np.asarray(s.y_error)
+            sides |= {
+                "bottom": y - self._y(value - half),
+                "top": self._y(value + half) - y,
+            }
+        if sides:
+            bars = pg.ErrorBarItem(x=x, y=y, pen=stroke(colour, self._ratio), **sides)
+            self.box.addItem(bars)
+
+    def _colour(self, name: str) -> str:
+        tokens = self._tokens
+        known = {"model": tokens.twin, "ink": tokens.text, "quiet": tokens.muted}
+        return known.get(name) or tokens.trace(name)
+
+
+def _heights(plot: Plot) -> list[int]:
+    """Of the panels, px; those with numbers along x are higher."""
+    high = [PANEL if panel.height > 1.7 else SMALL for panel in plot.panels]
+    last = len(high) - 1
+    return [h + FOOT * (plot.beside or i == last) for i, h in enumerate(high)]
+
+
+def _ends(guide: Guide) -> tuple[float, ...]:
+    return (guide.at,) if guide.to is None else (guide.at, guide.to)
+
+
+def _range(values: list[FloatArray], whole: bool) -> list[float]:
+    """A range with air around all finite values."""
+    found = np.concatenate([np.atleast_1d(v) for v in values] or [np.empty(0)])
+    found = found[np.isfinite(found)]
+    if not found.size:
+        return [0.0, 1.0]
+    low, high = float(found.min()), float(found.max())
+    if whole:
+        return [low - 0.5, high + 0.5]
+    return [*nice_range(low, high, max(1e-9, 1e-6 * abs(high)))]
+
+
+def _pieces(x: FloatArray, y: FloatArray) -> Iterator[slice]:
+    """Stretches of finite points."""
+    known = np.isfinite(x) & np.isfinite(y)
+    edges = np.flatnonzero(np.diff(np.r_[False, known, False]))
+    return (slice(a, b) for a, b in edges.reshape(-1, 2).tolist())
+
+
+def _rich(text: str, colour: str = "") -> str:
+    """Text with V_C1 as a symbol with its subscript, as HTML."""
+    named = re.sub(r"\b([A-Z])_([A-Z0-9]+)\b", r"\1<sub>\2</sub>", html.escape(text))
+    named = named.replace("\n", "<br>")
+    return f'<span style="color:{colour}">{named}</span>' if colour else named

@@ -1,0 +1,123 @@
+"""The plots in the window, as painted."""
+
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+import pyqtgraph as pg
+import pytest
+from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
+from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from gui.look.theme import Theme
+from gui.plots.axis import RoundAxis, guarded
+from gui.plots.small_plot import SmallPlot
+from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
+
+
+def painted(app, names: list[str], part: QRect) -> QImage:
+    series = [Series(x=[0, 1], y=[i, 1 + i]) for i in range(len(names))]
+    named = tuple(replace(s, name=name) for s, name in zip(series, names, strict=True))
+    panel = Panel(label="Highest rate", unit="Hz", series=named)
+    plot = Plot(name="one", caption="", x_label="Force", x_unit="N", panels=(panel,))
+    view = SmallPlot(Theme("light"))
+    view.resize(340, 260)
+    view.show_plot(plot)
+    return view.grab(part).toImage()
+
+
+@pytest.mark.parametrize("names", [["Eq. (15)", "simulated bench", "silent"], ["one"]])
+def test_a_legend_is_not_painted_over_the_heading(app, names):
+    label, legend = QRect(0, 0, 100, 20), QRect(100, 0, 240, 40)
+    bare = [""] * len(names)
+    assert painted(app, names, label) == painted(app, bare, label)
+    assert painted(app, names, legend) != painted(app, bare, legend)
+
+
+def rates(top: float) -> Plot:
+    series = (Series(x=[0.0, 0.1], y=[0.0, top]),)
+    panel = Panel(label="rate", unit="Hz", series=series)
+    return Plot(name="rates", caption="", x_label="force", x_unit="N", panels=(panel,))
+
+
+def shown(app) -> SmallPlot:
+    view = SmallPlot(Theme("light"))
+    view.resize(340, 260)
+    view.show_plot(rates(10.0))
+    view.show()
+    app.processEvents()
+    return view
+
+
+def test_a_zoom_stays_when_the_next_step_comes_and_a_double_click_ends_it(app):
+    view = shown(app)
+    view.panels[0].box.setRange(xRange=(20, 50), yRange=(1, 2), padding=0)
+    view.show_plot(rates(30.0))
+    app.processEvents()
+    box = view.panels[0].box
+    assert np.allclose(box.viewRange(), [[20, 50], [1, 2]])
+    at = box.mapToScene(box.rect().center()).toPoint()
+    QTest.mouseDClick(view.viewport(), Qt.MouseButton.LeftButton, pos=at)
+    QTest.mouseRelease(view.viewport(), Qt.MouseButton.LeftButton, pos=at)
+    (left, right), (low, high) = view.panels[0].box.viewRange()
+    assert left <= 0 and right >= 100 and low <= 0 and high >= 30
+
+
+@pytest.mark.parametrize("key", ["NoModifier", "ControlModifier"])
+def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(app, key):
+    view = shown(app)
+    before = view.panels[0].box.viewRange()
+    held = Qt.KeyboardModifier[key]
+    at = QPointF(200, 100)
+    event = QWheelEvent(
+        at, view.mapToGlobal(at), QPoint(), QPoint(0, 120),
+        Qt.MouseButton.NoButton, held, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(view.viewport(), event)
+    zoomed = not np.allclose(view.panels[0].box.viewRange(), before)
+    assert zoomed is event.isAccepted() is (key == "ControlModifier")
+
+
+def test_the_first_and_the_last_number_stand_on_an_axis(app):
+    axis = RoundAxis("bottom", 60)
+    _, values = axis.tickValues(0.0, 10.0, 300)[0]
+    words = axis.tickStrings(values, 1.0, 2.0)
+    assert min(values) > 0.0 and max(values) < 10.0
+    assert words == ["0", "2", "4", "6", "8", "10"]
+
+
+def test_a_paint_that_fails_leaves_the_picture_and_is_told(app, qtbot):
+    class Broken(pg.GraphicsObject):
+        def boundingRect(self):  # noqa: N802
+            return QRectF(0, 0, 10, 10)
+
+        @guarded
+        def paint(self, *given):
+            raise ValueError("cannot be painted")
+
+    view = shown(app)
+    for _ in range(3):
+        view.panels[0].box.addItem(Broken(), ignoreBounds=True)
+    with qtbot.captureExceptions() as told:
+        view.grab()
+        view.close()
+        app.processEvents()
+    assert {str(one[1]) for one in told} == {"cannot be painted"} and len(told) >= 3
+
+
+def test_every_mark_is_drawn(app):
+    x = np.linspace(0.1, 0.2, 5)
+    for mark in get_args(Mark):
+        texts = tuple("abcde") if mark == "text" else ()
+        series = Series(
+            x=x, y=x, low=x - 0.01, high=x + 0.01, mark=mark, texts=texts, y_error=x / 9
+        )
+        view = shown(app)
+        panel = Panel(label="a", series=(series,), guides=(Guide(at=0.1, text="b"),))
+        view.show_plot(
+            Plot(name="one", caption="", x_label="x", panels=(panel, panel), x_log=True)
+        )
+        image = view.grab().toImage()
+        assert view.panels[1].box.addedItems and not image.isNull(), mark
