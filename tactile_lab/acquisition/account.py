@@ -19,7 +19,7 @@ from tactile_lab.acquisition.alignment import (
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.journal import Journal
-from tactile_lab.bench import Stream
+from tactile_lab.bench import Reading, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import show
@@ -85,6 +85,7 @@ class Account:
         self._current: list[Applied] = []
         self._unwritten: list[Applied] = []
         self._written = float("-inf")
+        self._fields: list[Reading] = []
 
     @property
     def now(self) -> float:
@@ -186,6 +187,7 @@ class Account:
 
     def field(self, time: float, tesla: float) -> None:
         """The field was read at run time `time` s."""
+        self._fields.append(Reading(time, tesla))
         if self.journal is not None:
             self.journal.field(time, tesla)
         self.emit(events.FieldRead(time, tesla))
@@ -233,6 +235,11 @@ class Account:
                 offset=told.offset, drift=told.drift, uncertainty=told.uncertainty
             )
         self.edges = []
+
+    def fields_since(self, start: float) -> list[Reading]:
+        """Readings of the field since run time `start` s, with times after it."""
+        fields, self._fields = self._fields, []
+        return [Reading(one.time - start, one.value) for one in fields]
 
     def applied_since(self, begin: float) -> NDArray[np.float64]:
         """Current applied since clock time `begin`: shape (n, 2), s after it and A."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
+from tactile_lab.acquisition.drive_check import DriveCheck
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Channel
@@ -32,6 +33,8 @@ class Program:
             before the coil is switched on, or raises to prevent it.
         coil_lag: by which the current follows the source, s.
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
+        drive_check: compares current, shunt and field at each hold; None where no
+            force is asked for.
         asked_field: has a person read the field; None where a meter does, or nobody.
     """
 
@@ -45,5 +48,6 @@ class Program:
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
     coil_lag: float = 0.0
     drift: Drift | None = None
+    drive_check: DriveCheck | None = None
     ask: Ask | None = None
     asked_field: AskedField | None = None

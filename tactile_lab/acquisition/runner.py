@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
@@ -189,6 +190,8 @@ class Runner:
             self._ask_field(asked, trial, start)
         if coil is not None:  # its last point is 0 A and may outlast the trial
             self._pump.until(lambda: not coil.plays_list)
+        current = self._account.applied_since(begin)
+        self._compare(trial, start, current)
         self._note_edges(start)
         spikes = self.intake.spikes_between(start, start + trial.length)
         return Outcome(
@@ -196,13 +199,28 @@ class Runner:
             index=index,
             start=start,
             spike_times=spikes - start,
-            current=self._account.applied_since(begin),
+            current=current,
             rest=rest,
             traces=self._live.traces(start, start + trial.length),
             skipped=0 if coil is None else coil.skipped - skipped,
             codes=self._codes(),
             drift=drift,
         )
+
+    def _compare(
+        self, trial: Trial, start: float, current: NDArray[np.float64]
+    ) -> None:
+        """Warn where current, shunt and field of the trial do not fit together."""
+        readings = self._account.fields_since(start)
+        check = self._program.drive_check
+        if check is None:
+            return
+
+        def shunt(begin: float, end: float) -> float | None:
+            return self._live.levels(start + begin, start + end).get("coil_current")
+
+        for text in check.doubts(trial, current, shunt, readings):
+            self._account.warn(text)
 
     @property
     def _record(self) -> float:

@@ -18,6 +18,7 @@ from pathlib import Path
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
+from tactile_lab.acquisition.drive_check import DriveCheck
 from tactile_lab.acquisition.ending import CoilState, Ending, Executed
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.program import Program
@@ -210,6 +211,7 @@ class Execution(Task[Executed]):
             doubts=self._doubts,
             coil_lag=scene.bench.magnet.coil_lag,
             drift=self._drift(),
+            drive_check=self._drive_check(),
             ask=self._ask,
             asked_field=self._asked_field if needed.asked_field else None,
         )
@@ -235,6 +237,19 @@ class Execution(Task[Executed]):
             return None
         force_for = partial(scene.bench.magnet.force_for, beyond="hold")
         return Drift(scene.circuit, force_for, scene.protocol.drift_limit)
+
+    def _drive_check(self) -> DriveCheck | None:
+        if not self.plan.timeline.asks_force or self.needs.asked_field:
+            return None  # what a person types is doubted as it is typed
+        magnet = self.scene.bench.magnet
+        used = magnet.calibration
+
+        def field(current: float) -> float:
+            if used is not None:  # read back a little beyond its last point
+                current = min(max(current, used.least), used.most)
+            return float(magnet.field(current))
+
+        return DriveCheck(field, calibrated=used is not None and used.unit == "T")
 
     def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
         if not self.plan.timeline.asks_force:

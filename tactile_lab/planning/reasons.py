@@ -10,7 +10,7 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
 from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
 
-NOT_RECORDED = "field is not recorded"
+NOT_RECORDED = "field is not recorded, so it is not compared with the current"
 
 Reasons = tuple[tuple[str, str], ...]
 

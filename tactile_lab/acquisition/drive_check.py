@@ -1,0 +1,105 @@
+"""Do source, shunt and teslameter tell of one current? Asked at the end of each hold.
+
+The source's own read-back cannot know what its current does: a magnet that has moved,
+an unplugged winding of two, a probe that has slipped or a dead shunt change the force,
+or what is recorded of it, and nothing else. What is not measured is not compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.acquisition.asked_field import FACTOR, NOTABLE
+from tactile_lab.bench import Reading
+from tactile_lab.quantity import show
+from tactile_lab.trial import Trial
+
+SETTLING = 0.3
+"""Time after the start of a hold from which field and current must agree, s."""
+
+STEADY = 0.02
+"""Change of the current during a hold, as a part of it, up to which it is steady."""
+
+CALIBRATED = 0.1
+"""Part of a calibrated field by which a reading may differ."""
+
+SHUNT = 0.05
+"""Part of the current by which the shunt may differ from the source's read-back."""
+
+SHUNT_NOTABLE = 0.02
+"""The least difference of them that is remarked on, A."""
+
+
+class DriveCheck:
+    """Compares them, and says once of each what does not fit.
+
+    Args:
+        expected: field, T, at a current, A.
+        calibrated: it was measured; else it is what the bench file supposes, which may
+            be wrong by a third.
+    """
+
+    def __init__(self, expected: Callable[[float], float], *, calibrated: bool) -> None:
+        self._expected = expected
+        self._calibrated = calibrated
+        self._told: set[str] = set()
+
+    def doubts(
+        self,
+        trial: Trial,
+        current: NDArray[np.float64],
+        shunt: Callable[[float, float], float | None],
+        readings: Iterable[Reading],
+    ) -> list[str]:
+        """What does not fit in a trial that has ended; [] also where nothing is known.
+
+        Args:
+            trial: that was played.
+            current: as read back, shape (n, 2), s from its start and A.
+            shunt: mean current, A, of the scope's channel between two times of the
+                trial, s; None where it has none.
+            readings: of the field, times from the trial's start.
+        """
+        if trial.hold is None or trial.current is not None:
+            return []  # what calibrates the field is not compared with it
+        begin, end = trial.hold[0] + SETTLING, trial.hold[1]
+        held = current[(current[:, 0] >= begin) & (current[:, 0] <= end), 1]
+        if held.size == 0 or np.ptp(held) > STEADY * np.abs(held).max():
+            return []
+        amperes = float(held.mean())
+        found = []
+        fields = [one.value for one in readings if begin <= one.time <= end]
+        if fields:
+            found.append(("field", self._field(amperes, float(np.mean(fields)))))
+        seen = shunt(begin, end)
+        if seen is not None:
+            found.append(("shunt", _shunt(amperes, seen)))
+        new = [(what, text) for what, text in found if text and what not in self._told]
+        self._told.update(what for what, _ in new)
+        return [f"{trial.label}: {text}" for _, text in new]
+
+    def _field(self, amperes: float, tesla: float) -> str:
+        expected = self._expected(amperes)
+        part = CALIBRATED if self._calibrated else FACTOR - 1
+        if abs(tesla - expected) <= part * abs(expected) + NOTABLE:
+            return ""
+        by = "calibration" if self._calibrated else "bench file's [magnet]"
+        return (
+            f"the teslameter reads {show(tesla, 'T')} at {show(amperes, 'A')}, where "
+            f"the {by} has {show(expected, 'T')}: the forces of this run are not what "
+            "they are called. Check probe, sign and range of the teslameter, coil and "
+            "calibration."
+        )
+
+
+def _shunt(amperes: float, seen: float) -> str:
+    if abs(seen - amperes) <= SHUNT * abs(amperes) + SHUNT_NOTABLE:
+        return ""
+    return (
+        f"the shunt shows {show(seen, 'A')} where the source reads back "
+        f"{show(amperes, 'A')}: the recorded coil current is not what flowed. Check "
+        "the shunt's wiring, its resistance in the bench file and its channel."
+    )

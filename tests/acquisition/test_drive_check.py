@@ -1,0 +1,75 @@
+"""A field or a shunt that does not fit the current is told, once, whatever it is."""
+
+import re
+
+import pytest
+from short_runs import SHORT
+
+from sim_backend.bench import open_bench
+from tactile_lab.acquisition.events import Message, RunState
+from tactile_lab.bench import Reading
+from tactile_lab.planning.needs import needs
+
+MEASURED = 'record.signals=["V_C1", "coil_current", "field"]'
+
+
+def warnings(ran):
+    assert ran.done.state is RunState.COMPLETE, ran.done.reason
+    return [one.text for one in ran.told if isinstance(one, Message)]
+
+
+def with_field(factor):
+    """A bench whose teslameter reads `factor` times the field."""
+
+    def bench(scene):
+        made = open_bench(scene, needs(scene))
+        read = made.field_meter.read
+
+        def other():
+            reading = read()
+            return Reading(reading.time, factor * reading.value)
+
+        made.field_meter.read = other
+        return made
+
+    return bench
+
+
+def test_what_fits_is_not_remarked_on(run_scene):
+    assert warnings(run_scene(*SHORT, MEASURED)) == []
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.0, -1.0, 2.0])
+def test_a_field_that_does_not_fit_the_current_is_told(run_scene, factor):
+    (told,) = warnings(run_scene(*SHORT, MEASURED, bench=with_field(factor)))
+    assert "200 mN: the teslameter reads" in told
+    assert "has 10.97 mT" in told and "forces of this run are not what" in told
+
+
+def test_a_dead_shunt_is_told(run_scene):
+    dead = 'simulated.open_probes=["coil_current"]'
+    (told,) = warnings(run_scene(*SHORT, MEASURED, dead))
+    assert "the shunt shows" in told and "the source reads back 99" in told
+
+
+def test_each_is_told_once(run_scene):
+    twice = 'protocol.levels=["100 mN", "200 mN"]'
+    ran = run_scene(*SHORT, twice, MEASURED, bench=with_field(0.5))
+    assert len(warnings(ran)) == 1
+
+
+def test_coil_leads_exchanged_are_told(run_scene):
+    ran = run_scene(*SHORT, MEASURED, "simulated.inverted_coil=true")
+    (told,) = warnings(ran)
+    assert re.search("the teslameter reads [-\u2212]10.97 mT", told)
+
+
+def test_a_calibrated_field_is_held_to_a_tenth(run_scene, tmp_path):
+    file = tmp_path / "field.csv"
+    file.write_text("current_A,field_T\n-1,-0.011\n0,0\n1,0.011\n")
+
+    calibrated = f'bench.magnet.calibration="{file}"'
+    told = warnings(run_scene(*SHORT, MEASURED, calibrated, bench=with_field(0.75)))
+    assert any("where the calibration has 10.97 mT" in text for text in told)
+    told = warnings(run_scene(*SHORT, MEASURED, calibrated, bench=with_field(0.95)))
+    assert not any("teslameter reads" in text for text in told)
