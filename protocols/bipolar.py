@@ -51,13 +51,26 @@ class Bipolar(Levels):
         """What each force does to the drain current, and tau of the film."""
         if run.trace("I_DS") is None:
             return Conclusion(missing=("No drain current: V_C1 was not recorded.",))
-        held = [t for t in run.results if t.held is not None and t.level]
+        pushed = [t for t in run.results if t.held is not None and t.level]
+        held = [
+            t
+            for t in pushed
+            if t.held is not None
+            and not run.left_range("I_DS", t.start - BEFORE, t.held[1])
+        ]  # fmt: skip
+        cut = tuple(
+            f"No drain current at {t.label}: V_C1 left its channel's range."
+            for t in pushed
+            if t not in held
+        )
         if not held:
-            return Conclusion(missing=("No drain current: no force was completed.",))
+            why = "No drain current: no force was completed."
+            return Conclusion(missing=cut or (why,))
         try:
             tau, changes = _changes(run, held)
         except NotIdentifiableError as reason:
-            return Conclusion((), {"tau_s": None}, (f"No drain current: {reason}.",))
+            why = f"No drain current: {reason}."
+            return Conclusion((), {"tau_s": None}, (why, *cut))
         found = [
             _change(run, trial, change)
             for trial, change in zip(held, changes, strict=True)
@@ -77,7 +90,7 @@ class Bipolar(Levels):
             "I_DS_changes": found,
             "tau_s": tau,
         }
-        return Conclusion(tuple(said), values)
+        return Conclusion(tuple(said), values, cut)
 
 
 def _changes(

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.response import Gain, gain
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.errors import NotIdentifiableError, QuantityError
-from tactile_lab.measurement import Measurement
+from tactile_lab.measurement import FloatArray, MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Force, Pause, Unit, parse, printed
+from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed
 from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.stimulus.recovery import TABLE_1_TAU
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -24,15 +26,20 @@ PushForce = Annotated[float, Unit("N", above=0.0)]
 
 POINTS = 24
 """Straight pieces a cycle is drawn with: within 0.9 % of a sine."""
-LARGE = 1000
-"""Degrees of freedom of a gain: hundreds of bins a cycle."""
+RAMP = 0.25
+"""Time from one frequency's last force to the next one's first, s."""
+WITHIN = 16
+"""Points in a bin at which the force is averaged, as the scope averages V_C1."""
 
 
 class SineSweep(ForceProtocol):
     """A sine force at each of some frequencies, with whole cycles of each.
 
-    A source that is set over a serial line follows about 1/20 of its update rate; the
-    plan warns where a frequency is beyond that.
+    The film's leak makes V_P a high-pass of force with its corner at 1/(2 pi tau), 18
+    mHz: the adaptation itself. Each sine begins at the phase at which the film is
+    already settled, so that no cycle is wasted on a transient. A source that is set
+    over a serial line follows about 1/20 of its update rate; the plan warns where a
+    frequency is beyond that.
     """
 
     name: ClassVar[str] = "sine_sweep"
@@ -41,11 +48,16 @@ class SineSweep(ForceProtocol):
 
     amplitude: PushForce = Field(default=0.05, description="Of the sine")
     bias: Force = Field(default=0.0, description="Force the sine swings around")
-    lowest: Frequency = Field(default=0.1, description="First frequency")
+    lowest: Frequency = Field(default=0.01, description="First frequency")
     highest: Frequency = Field(default=0.8, description="Last frequency")
     count: int = Field(default=5, ge=1, le=1000, description="Frequencies")
-    cycles: int = Field(default=3, ge=1, le=10_000, description="Cycles of each")
-    settle: Pause = Field(default=2.0, description="Time at the bias before each")
+    cycles: int = Field(default=2, ge=1, le=10_000, description="Cycles of each")
+    settle: Pause | None = Field(
+        default=None, description="Time at the bias first; six tau of the film if empty"
+    )
+    tau: Duration | None = Field(
+        default=None, description="Leakage time of the film; the sensor's if empty"
+    )
 
     @model_validator(mode="after")
     def _rising(self) -> SineSweep:
@@ -60,33 +72,48 @@ class SineSweep(ForceProtocol):
         """The frequencies, evenly spaced on a logarithmic scale, Hz."""
         return [float(f) for f in np.geomspace(self.lowest, self.highest, self.count)]
 
+    def on_sensor(self, tau: float, volts_per_newton: float) -> Self:
+        """With what the scene does not say taken from the sensor."""
+        return self if self.tau else self.model_copy(update={"tau": tau})
+
     def presentations(self) -> Trials:
         """One trial per frequency."""
-        last = 0.0
+        last, lead = 0.0, self._settling
         for frequency in self.frequencies():
+            force = self._sine(frequency, last, lead)
             yield Trial(
-                force=self._sine(frequency, last),
+                force=force,
                 label=f"{frequency:.3g} Hz",
-                hold=(self._lead, self._lead + self.cycles / frequency),
+                hold=(lead + RAMP, force.end),
             )
-            last = self.bias
+            last, lead = float(force.value[-1]), 0.0
         yield Trial(
-            force=Waveform.through([(0.0, last), (0.25, 0.0), (0.5, 0.0)]),
+            force=Waveform.through([(0.0, last), (RAMP, 0.0), (2 * RAMP, 0.0)]),
             label="back to rest",
         )
 
     @property
-    def _lead(self) -> float:
-        return 0.25 + self.settle
+    def _settling(self) -> float:
+        """Time before the first sine, s: what a bias leaves of V_P dies away."""
+        if self.settle is not None:
+            return RAMP + self.settle
+        return RAMP + 6 * self._leak if self.bias else 0.0
 
-    def _sine(self, frequency: float, last: float) -> Waveform:
-        points = [(0.0, last), (0.25, self.bias)]
-        if self.settle > 0:
-            points.append((self._lead, self.bias))
-        phase = np.arange(1, POINTS * self.cycles + 1) / POINTS
-        values = self.bias + self.amplitude * np.sin(2 * np.pi * phase)
-        values[-1] = self.bias  # exactly: the next trial starts there
-        times = self._lead + phase / frequency
+    @property
+    def _leak(self) -> float:
+        return self.tau or TABLE_1_TAU
+
+    def _sine(self, frequency: float, last: float, lead: float) -> Waveform:
+        points = [(0.0, last)]
+        if lead > 0:
+            points += [(RAMP, self.bias), (lead, self.bias)]
+        # V_P = k_F F right after a quick change from rest, and in the settled answer
+        # k_F F i w tau/(1 + i w tau), where F is at this phase
+        first = math.atan(2 * math.pi * frequency * self._leak) / (2 * math.pi)
+        phase = np.arange(POINTS * self.cycles + 1) / POINTS
+        values = self.bias + self.amplitude * np.sin(2 * np.pi * (first + phase))
+        values[-1] = values[0]
+        times = lead + RAMP + phase / frequency
         points += zip(times.tolist(), values.tolist(), strict=True)
         return Waveform.through(points)
 
@@ -94,27 +121,36 @@ class SineSweep(ForceProtocol):
         """Gain and phase of V_C1 per frequency, and how far the model's gain is off."""
         if run.trace("V_C1") is None:
             return Conclusion(missing=("No gain: V_C1 was not recorded.",))
+        cut = tuple(
+            f"No gain at {t.label}: V_C1 left its channel's range."
+            for t in run.results
+            if t.held is not None and run.left_range("V_C1", *t.held)
+        )
         found, expected = _gains(run), _gains(run, model=True)
         if not found:
-            return Conclusion(missing=("No gain: no frequency was completed.",))
-        known = [(g, _known(run, g)) for g in found]
+            return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
         told = "; ".join(
-            f"{g.frequency:.3g} Hz {u.value:.3g} ± {u.half:.2g} V/N at "
-            f"{_degrees(g.phase):.0f}°"
-            for g, u in known
+            f"{g.frequency:.3g} Hz {g.gain.value:.3g} ± {g.gain.half:.2g} V/N at "
+            f"{_degrees(g.phase.value):.1f} ± {math.degrees(g.phase.half):.2g}°"
+            for g in found
         )
         said = [printed(f"V_C1 answers force with {told} (95 %).")]
         if run.force_uncertainty is None:
             said.append(NOT_STATED)
-        if len(expected) == len(found):
-            pairs = zip(found, expected, strict=True)
-            off = max(abs(g.gain / e.gain - 1) for g, e in pairs)
+        beside = {e.frequency: e for e in expected}
+        pairs = [(g, beside[g.frequency]) for g in found if g.frequency in beside]
+        if pairs:
+            off = max(abs(g.gain.value / e.gain.value - 1) for g, e in pairs)
             said.append(f"The model's gain differs by {100 * off:.2g} % at most.")
         values = [
-            {"frequency_Hz": g.frequency, "gain_V_per_N": u, "phase_rad": g.phase}
-            for g, u in known
+            {
+                "frequency_Hz": g.frequency,
+                "gain_V_per_N": g.gain,
+                "phase_rad": g.phase,
+            }
+            for g in found
         ]
-        return Conclusion(tuple(said), {"V_C1_over_force": values})
+        return Conclusion(tuple(said), {"V_C1_over_force": values}, cut)
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Gain and phase against frequency."""
@@ -122,7 +158,6 @@ class SineSweep(ForceProtocol):
         if len(found) < 2:
             return
         at = tuple(g.frequency for g in found)
-        known = [_known(run, g) for g in found]
         measured: Any = {"x": at, "mark": "points", "colour": "V_C1"}
         model: Any = {
             "x": [g.frequency for g in expected], "mark": "dashed", "colour": "model",
@@ -130,8 +165,8 @@ class SineSweep(ForceProtocol):
         yield Plot(
             name="summary",
             title="gain and phase",
-            caption="V_C1 against force at each frequency: gain with its 95 % "
-            "interval, and phase. Dashed: the model under the same force.",
+            caption="V_C1 against force at each frequency: gain and phase with their "
+            "95 % intervals. Dashed: the model under the same force.",
             x_label="Frequency",
             x_unit="Hz",
             x_prefix="",
@@ -143,10 +178,13 @@ class SineSweep(ForceProtocol):
                     unit="V/N",
                     series=(
                         Series(
-                            y=[g.value for g in known], y_error=[g.half for g in known],
+                            y=[g.gain.value for g in found],
+                            y_error=[g.gain.half for g in found],
                             name=run.origin, **measured,
                         ),
-                        Series(y=[g.gain for g in expected], name="model", **model),
+                        Series(
+                            y=[g.gain.value for g in expected], name="model", **model
+                        ),
                     ),
                     limits=(0, None),
                     height=1.8,
@@ -155,8 +193,14 @@ class SineSweep(ForceProtocol):
                     label="Phase",
                     unit="°",
                     series=(
-                        Series(y=[_degrees(g.phase) for g in found], **measured),
-                        Series(y=[_degrees(g.phase) for g in expected], **model),
+                        Series(
+                            y=[_degrees(g.phase.value) for g in found],
+                            y_error=[math.degrees(g.phase.half) for g in found],
+                            **measured,
+                        ),
+                        Series(
+                            y=[_degrees(g.phase.value) for g in expected], **model
+                        ),
                     ),
                     height=1.55,
                 ),
@@ -167,17 +211,28 @@ class SineSweep(ForceProtocol):
 def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
     """Gain of V_C1 over the force, V/N, for each trial named by a frequency."""
     trace, found = run.trace("V_C1", model=model), []
+    steps = 0.0 if model else run.step_bias("V_C1")
     for trial in run.results:
-        if trace is None or trial.held is None:
+        if trace is None or trial.held is None or run.left_range("V_C1", *trial.held):
             continue
         inside = (trace.time >= trial.held[0]) & (trace.time <= trial.held[1])
         time = trace.time[inside]
+        force = run.force.at(time) if model else _averaged(run.force, time)
         try:
             frequency = parse(trial.label, "Hz")
-            found.append(gain(time, run.force.at(time), trace.mean[inside], frequency))
+            answer = gain(time, force, trace.mean[inside], frequency, steps)
         except (QuantityError, NotIdentifiableError):
             continue  # another trial, or one that was cut short
+        found.append(answer if model else _known(run, trial, answer))
     return found
+
+
+def _averaged(force: Waveform, time: FloatArray) -> FloatArray:
+    """Mean force in bins around `time`: steps of the source are no longer than they."""
+    width = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    within = ((np.arange(WITHIN) + 0.5) / WITHIN - 0.5) * width
+    mean: FloatArray = force.at(time[:, None] + within).mean(axis=1)
+    return mean
 
 
 def _degrees(phase: float) -> float:
@@ -185,10 +240,12 @@ def _degrees(phase: float) -> float:
     return float(np.degrees(phase)) - (360.0 if phase > 0 else 0.0)
 
 
-def _known(run: Measurement, found: Gain) -> Estimate:
-    """The gain with its noise and the force's uncertainty."""
-    estimate = Estimate.of(found.gain, found.error, LARGE)
-    if run.force_uncertainty is None:
-        return estimate
-    part = float(run.force_uncertainty.of(found.amplitude)) / found.amplitude
-    return estimate.widened(found.gain * part)
+def _known(run: Measurement, trial: MeasuredTrial, found: Gain) -> Gain:
+    """The gain with the force's uncertainty, the phase with the clocks'."""
+    size, phase = found.gain, found.phase
+    if run.force_uncertainty is not None:
+        part = float(run.force_uncertainty.of(found.amplitude)) / found.amplitude
+        size = size.widened(size.value * part)
+    if trial.clock_uncertainty is not None:
+        phase = phase.widened(2 * math.pi * found.frequency * trial.clock_uncertainty)
+    return replace(found, gain=size, phase=phase)

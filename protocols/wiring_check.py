@@ -149,7 +149,9 @@ def _calibrated(
     for trace in run.traces:
         if trace.signal not in NODES:
             continue
-        low, high = (run.mean(trace.signal, *windows[w]) for w in ("0 V", "V_S"))
+        low, high = (
+            run.mean(trace.signal, *windows[w], cut_off=True) for w in ("0 V", "V_S")
+        )
         try:
             found[trace.signal] = calibrate_channel(
                 low, high, circuit.V_S, trace.code or CODE
@@ -165,7 +167,9 @@ def _found(
     """Mean of each signal in the window, corrected where its channel is calibrated."""
     found = {}
     for trace in run.traces:
-        value, known = run.mean(trace.signal, *window), calibrations.get(trace.signal)
+        # a voltage past the range's end is a finding here
+        value = run.mean(trace.signal, *window, cut_off=True)
+        known = calibrations.get(trace.signal)
         found[trace.signal] = value if known is None else known.corrected(value)
     field = run.field_between(*window)
     if field.size:

@@ -53,6 +53,15 @@ class RecordedSignal:
     overrange: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
     samples: float = 1.0
 
+    @cached_property
+    def within_range(self) -> NDArray[np.bool_]:
+        """Which bins, shape (n,), hold nothing that was cut off at the range's end."""
+        half = float(np.median(np.diff(self.time))) / 2 if self.time.size > 1 else 0.0
+        inside = np.ones(self.time.size, np.bool_)
+        for start, end in self.overrange:
+            inside &= (self.time + half <= start) | (self.time - half >= end)
+        return inside
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredTrial:
@@ -200,13 +209,27 @@ class Measurement:
             None,
         )
 
-    def mean(self, signal: str, start: float, end: float) -> float:
-        """Mean of a signal in [start, end] s, SI; not a number where it has none."""
+    def mean(
+        self, signal: str, start: float, end: float, *, cut_off: bool = False
+    ) -> float:
+        """Mean of a signal in [start, end] s, SI.
+
+        Not a number where it has none there, or left its channel's range; with
+        `cut_off` the mean of what was shown all the same.
+        """
         trace = self.trace(signal)
-        if trace is None:
+        if trace is None or (not cut_off and self.left_range(signal, start, end)):
             return float("nan")
         inside = (trace.time >= start) & (trace.time <= end)
         return float(trace.mean[inside].mean()) if inside.any() else float("nan")
+
+    def left_range(self, signal: str, start: float, end: float) -> bool:
+        """Whether a signal left its channel's range within [start, end] s."""
+        trace = self.trace(signal)
+        if trace is None:
+            return False
+        begins, ends = trace.overrange.T
+        return bool(np.any((begins <= end) & (ends >= start)))
 
     def step_bias(self, signal: str) -> float:
         """How far means of a signal may be off by its converter's steps, SI."""
@@ -216,16 +239,21 @@ class Measurement:
         return step_bias(trace.mean, trace.code, trace.samples)
 
     def applied_edge(self, trial: MeasuredTrial) -> float | None:
-        """When the force had become that of the trial's hold, s of run time, or None.
+        """When the force came within 1 % of that of the hold, s of run time, or None.
 
         A coil that is set over a serial line gets there after the hold's nominal start.
         """
         if trial.held is None:
             return None
         force, (start, end) = self.force, trial.held
-        changes = force.time[1:][np.diff(force.value) != 0]
-        before = changes[(changes >= trial.start) & (changes <= (start + end) / 2)]
-        return max(start, float(before[-1])) if before.size else start
+        inside = (force.time >= trial.start) & (force.time <= (start + end) / 2)
+        held = float(force.at((start + end) / 2))
+        apart = np.abs(force.value[inside] - held) > 0.01 * abs(held)
+        away = np.flatnonzero(apart)
+        if not away.size:
+            return start
+        later = force.time[inside][away[-1] + 1 : away[-1] + 2]
+        return max(start, float(later[0]) if later.size else start)
 
     def field_between(self, start: float, end: float) -> FloatArray:
         """Field read in [start, end] s of run time, T; empty where none was."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.analysis.estimate import Estimate, student_95
+from tactile_lab.analysis.estimate import Estimate, correlated, student_95
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 
 FloatArray = NDArray[np.float64]
@@ -179,7 +179,7 @@ def _fit(points: _Points, length: float) -> FloatArray:
 
 def _decay(theta: FloatArray, points: _Points) -> Decay:
     jacobian, residual = points.slopes(theta), points.residual(theta)
-    alike = _alike(residual, points.hold)
+    alike = correlated(residual, points.hold)
     # so many points tell something of their own
     freedom = max(1, int(points.t.size / alike) - theta.size)
     scatter = float(np.sqrt(np.sum(residual**2) / (points.t.size - theta.size)))
@@ -207,17 +207,3 @@ def _decay(theta: FloatArray, points: _Points) -> Decay:
         points=int(points.t.size),
         correlated=alike,
     )
-
-
-def _alike(residual: FloatArray, hold: FloatArray) -> float:
-    """How many neighbouring points err alike: 1 + 2 times the sum of correlations."""
-    power, together = float(np.sum(residual**2)), 1.0
-    if power == 0:
-        return together
-    for lag in range(1, residual.size // 4):
-        same = np.sum(hold[lag:] * hold[:-lag], axis=1)
-        correlation = float(np.sum(same * residual[lag:] * residual[:-lag])) / power
-        if correlation < 2 / np.sqrt(residual.size):
-            break
-        together += 2 * correlation
-    return together

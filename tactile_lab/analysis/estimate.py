@@ -107,6 +107,32 @@ def _plain(value: float) -> str:
     return printed(f"{value:.3g}")
 
 
+def correlated(residual: FloatArray, group: FloatArray | None = None) -> float:
+    """How many neighbouring points err alike, at least 1.
+
+    That is 1 + 2 times the sum of the residual's correlations, to the first that noise
+    alone could make. The variance of a fit by independent points is so much too small.
+
+    Args:
+        residual: shape (n,), in order.
+        group: shape (n, k), 1 in the column of a point's group: only points of one
+            group are neighbours.
+    """
+    import numpy as np
+
+    power, together = float(np.sum(residual**2)), 1.0
+    member = np.ones((residual.size, 1)) if group is None else group
+    if power == 0:
+        return together
+    for lag in range(1, residual.size // 4):
+        same = np.sum(member[lag:] * member[:-lag], axis=1)
+        correlation = float(np.sum(same * residual[lag:] * residual[:-lag])) / power
+        if correlation < 2 / math.sqrt(residual.size):
+            break
+        together += 2 * correlation
+    return together
+
+
 def student_95(freedom: int) -> float:
     """Two-sided 95 % quantile of Student's t; at least one degree of freedom."""
     from scipy.special import stdtrit  # scipy.stats takes a second to import

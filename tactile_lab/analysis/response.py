@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tactile_lab.analysis.estimate import Estimate, correlated
 from tactile_lab.errors import NotIdentifiableError
+
+HARMONICS = 3
+"""So many harmonics of the answer are told apart from noise."""
 
 
 @dataclass(frozen=True)
@@ -18,27 +23,35 @@ class Gain:
         frequency: Hz.
         gain: amplitude of the answer over that of the cause, in their units.
         phase: of the answer against the cause, rad, -pi to pi.
-        error: standard error of the gain.
         amplitude: of the cause, in its unit.
     """
 
     frequency: float
-    gain: float
-    phase: float
-    error: float
+    gain: Estimate
+    phase: Estimate
     amplitude: float
 
 
 def gain(
-    time: ArrayLike, cause: ArrayLike, answer: ArrayLike, frequency: float
+    time: ArrayLike,
+    cause: ArrayLike,
+    answer: ArrayLike,
+    frequency: float,
+    step_bias: float = 0.0,
 ) -> Gain:
-    """Gain and phase at `frequency`, a slow drift of the answer allowed for.
+    """Gain and phase at `frequency`, the answer's harmonics and slow drift allowed for.
 
     Args:
         time: s, at least one cycle.
         cause: such as the force, N.
         answer: such as V_C1, V.
         frequency: Hz.
+        step_bias: how far means of the answer may be off by a converter's steps, in its
+            unit (`tactile_lab.analysis.converter`). They move a sine's amplitude A by
+            2/pi b sqrt(step/A), b = step/pi where no noise smooths them (the first of a
+            sum of Bessel functions), and its phase not at all.
+
+    Intervals hold the scatter of the answer, correlated as it is, and the steps.
 
     Raises:
         NotIdentifiableError: less than a cycle, too few points, or no cause.
@@ -50,16 +63,26 @@ def gain(
         )
     phase = 2 * np.pi * frequency * t
     slow = (t - t.mean()) / (t[-1] - t[0])
-    design = np.column_stack(
-        [np.sin(phase), np.cos(phase), np.ones_like(t), slow, slow**2]
-    )
+    waves = [f(n * phase) for n in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
+    design = np.column_stack([*waves, np.ones_like(t), slow, slow**2])
     inverse = np.linalg.pinv(design)
     into, out = inverse @ np.asarray(cause), inverse @ np.asarray(answer)
     given, got = complex(into[0], into[1]), complex(out[0], out[1])
     if abs(given) < 1e-12:
         raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
     left = np.asarray(answer) - design @ out
-    scatter = np.sqrt(np.sum(left**2) / (t.size - design.shape[1]))
-    error = scatter * np.sqrt(2 / t.size) / abs(given)
+    freedom = t.size - design.shape[1]
+    alike = correlated(left)
+    scatter = math.sqrt(float(np.sum(left**2)) / max(freedom, 1))
+    error = scatter * math.sqrt(alike * float(np.sum(inverse[0] ** 2)))
+    free = max(1, int(freedom / alike))
+    size = max(abs(got), 1e-300)
+    first = 2 / math.pi * step_bias
+    steps = 2 / math.pi * first * min(1.0, math.sqrt(math.pi * first / size))
     ratio = got / given
-    return Gain(frequency, abs(ratio), float(np.angle(ratio)), float(error), abs(given))
+    return Gain(
+        frequency,
+        Estimate.of(abs(ratio), error / abs(given), free).widened(steps / abs(given)),
+        Estimate.of(float(np.angle(ratio)), error / size, free),
+        abs(given),
+    )

@@ -126,6 +126,7 @@ def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:
         time=np.concatenate([p.time for p in pieces]),
         mean=np.concatenate([p.current for p in pieces]),
         source="derived",
+        overrange=measured.overrange,
     )
     bandwidth = min(p.bandwidth for p in pieces)
     averaged = max(p.averaged for p in pieces)

@@ -35,7 +35,7 @@ def identify_run(run: Measurement, names: Sequence[str]) -> Identified:
     seen = None
     if trace is not None:
         inside = (trace.time >= 0) & (trace.time <= run.duration)
-        inside &= settled(run.force, trace.time)
+        inside &= settled(run.force, trace.time) & trace.within_range
         code = trace.code or 0.0
         seen = Measured("V_C1", trace.time[inside], trace.mean[inside], code)
     return identify(

@@ -51,6 +51,11 @@ def results(findings: Findings) -> dict[str, Any]:
             "covered_s": loss.covered,
             "streamed_s": loss.streamed,
         },
+        "overrange_s": {
+            t.signal: t.overrange.tolist()
+            for t in run.traces
+            if t.source == "measured" and t.overrange.size
+        },
         "conclusion": findings.conclusion.plain,
         "statements": list(findings.conclusion.sentences),
         "tables": [asdict(table) for table in findings.conclusion.tables],

@@ -27,9 +27,9 @@ def with_twin(run: RunData) -> tuple[RunData, Twin | None]:
         SolverError: the model cannot follow this force.
     """
     voltages = tuple(
-        Measured(name, trace.time, trace.mean, trace.code or 0.0)
+        Measured(name, trace.time[inside], trace.mean[inside], trace.code or 0.0)
         for name in ("V_C1", "V_C2")
-        if (trace := run.trace(name)) and trace.time.size
+        if (trace := run.trace(name)) and (inside := trace.within_range).any()
     )
     if run.circuit is None or run.current is None or not len(run.current):
         return run, None

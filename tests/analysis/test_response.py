@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tactile_lab.analysis.converter import step_bias
 from tactile_lab.analysis.response import gain
 from tactile_lab.errors import NotIdentifiableError
 
@@ -13,9 +14,29 @@ def test_it_finds_gain_and_phase_on_a_drift():
     rng = np.random.default_rng(0)
     answer = 4.3 + 0.01 * TIME + 0.12 * np.sin(wave + 0.3 - 0.7)
     found = gain(TIME, cause, answer + rng.normal(0, 0.005, TIME.size), 0.5)
-    assert found.gain == pytest.approx(2.4, abs=4 * found.error)
-    assert found.phase == pytest.approx(-0.7, abs=0.01)
-    assert 0 < found.error < 0.01
+    assert found.gain.low < 2.4 < found.gain.high
+    assert found.phase.low < -0.7 < found.phase.high
+    assert 0 < found.gain.error < 0.01
+    assert found.phase.half < 0.01
+
+
+def test_its_intervals_hold_under_harmonics_noise_and_converter_steps():
+    held = np.zeros(2)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        time, code = np.arange(0, 20, 0.02), 0.04
+        wave = 2 * np.pi * 0.1 * time
+        answer = 0.12 * np.sin(wave - 0.7) + 0.02 * np.sin(2 * wave) + rng.uniform()
+        samples = answer[:, None] + rng.normal(0, 5e-3, (time.size, 50))
+        seen = (code * np.rint(samples / code)).mean(axis=1)
+        bias = step_bias(seen, code, 50)
+        found = gain(time, 0.05 * np.sin(wave), seen, 0.1, bias)
+        held += (
+            found.gain.low < 2.4 < found.gain.high,
+            found.phase.low < -0.7 < found.phase.high,
+        )
+    assert np.all(held >= 36), "8 bits without enough noise shift gain and phase"
+    assert found.gain.half < 0.12
 
 
 def test_too_little_is_refused():

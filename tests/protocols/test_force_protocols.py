@@ -183,8 +183,27 @@ def test_sine_sweep_is_a_sine_at_each_frequency():
         start, end = trial.hold
         assert end - start == pytest.approx(sweep.cycles / frequency)
         time = np.linspace(start, end, 997)
-        sine = 0.05 + 0.04 * np.sin(2 * np.pi * frequency * (time - start))
+        first = np.arctan(2 * np.pi * frequency * 8.69)
+        sine = 0.05 + 0.04 * np.sin(2 * np.pi * frequency * (time - start) + first)
         assert trial.force.at(time) == pytest.approx(sine, abs=0.04 * 0.01)
+
+
+@pytest.mark.parametrize("tau", [8.69, 3.0])
+def test_each_sine_begins_with_the_film_settled(tau):
+    force = None
+    sweep = SineSweep(lowest=0.012, highest=0.3, count=3, cycles=3, tau=tau)
+    circuit, spans = Circuit(tau=tau), []
+    for trial in drive(sweep, quiet):
+        start = 0.0 if force is None else force.end
+        spans.append([start + edge for edge in trial.hold or ()])
+        force = trial.force if force is None else force.then(trial.force)
+    made = simulate(circuit, force, keep=("V_P",))
+    for (start, end), frequency in zip(spans, sweep.frequencies(), strict=False):
+        cycle = np.linspace(start, start + 1 / frequency, 200)
+        first, last = (
+            made.sample("V_P", at) for at in (cycle, cycle + end - cycle[-1])
+        )
+        assert first == pytest.approx(last, abs=0.04 * np.ptp(last))
 
 
 @pytest.mark.parametrize("critical", [0.071, 0.0926, 0.1333])

@@ -20,6 +20,7 @@ from tactile_lab.report.canvas import draw
 from tactile_lab.report.findings import find
 from tactile_lab.report.identified import identify_run, settled
 from tactile_lab.report.overview import overview
+from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.report.write import write
@@ -204,6 +205,24 @@ def _changed_by_eq_8(run, level):
     return 24.69e-9 * (after - before)
 
 
+def test_numbers_from_samples_beyond_the_range_are_refused():
+    run = pushed_and_pulled(0)
+    push, pull = run.trials
+    late = np.array([[pull.start + 0.5, pull.start + 1.0]])
+    cut = replace(run.traces[0], overrange=late)
+    found = find(replace(run, traces=(cut,)))
+    (change,) = found.conclusion.values["I_DS_changes"]
+    assert change["level_N"] == 0.08
+    assert "-80 mN: V_C1 left its channel's range" in found.conclusion.missing[0]
+    assert found.conclusion.values["tau_s"].low < 8.69
+    whole = np.array([[push.start, run.duration]])
+    lost = find(replace(run, traces=(replace(cut, overrange=whole),)))
+    assert not lost.conclusion.values
+    assert len(lost.missing) == 2
+    told = json.loads(as_json(lost))
+    assert told["overrange_s"] == {"V_C1": whole.tolist()}
+
+
 def test_bipolar_without_a_rest_before_it_says_so():
     run = pushed_and_pulled(0)
     late = tuple(replace(t, start=t.start - 0.5) for t in run.trials)
@@ -317,7 +336,7 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
     assert found["gain_V_per_N"]["value"] == pytest.approx(
         circuit.k_F * steep * resistance, rel=0.02
     )
-    assert abs(found["phase_rad"]) == pytest.approx(np.pi, abs=0.2)
+    assert abs(found["phase_rad"]["value"]) == pytest.approx(np.pi, abs=0.2)
 
 
 def test_the_force_s_uncertainty_reaches_the_critical_force(rate_force):
