@@ -190,9 +190,9 @@ class Runner:
             self._ask_field(asked, trial, start)
         if coil is not None:  # its last point is 0 A and may outlast the trial
             self._pump.until(lambda: not coil.plays_list)
+        self._note_edges(start)
         current = self._account.applied_since(begin)
         self._compare(trial, start, current)
-        self._note_edges(start)
         spikes = self.intake.spikes_between(start, start + trial.length)
         return Outcome(
             trial=trial,
