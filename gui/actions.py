@@ -104,6 +104,9 @@ class Actions(QObject):
                 ("Ctrl+Return",), "Queue; save a queued run", panels.setup.enqueue
             ),
             Shortcut(
+                ("Ctrl+Shift+Return",), "Start the queue", panels.session.queue.resume
+            ),
+            Shortcut(
                 ("Space",), "Freeze the display", tools.freeze.toggle, single=True
             ),
             Shortcut(("F",), "Follow", tools.follow.click, single=True),

@@ -15,7 +15,6 @@ from gui.lanes.stored import RunSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.session.log import Severity
-from gui.state import WindowState
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import recover_run
 from tactile_lab.errors import TactileLabError
@@ -55,40 +54,46 @@ class RunActions(QObject):
         return run if single and isinstance(run, RunSource) else None
 
     @property
+    def _folder(self) -> Path | None:
+        """Of the run on screen, also while its record is still being opened."""
+        run, session = self.noted_run, self._panels.session
+        if run is not None:
+            return run.path
+        ended = session.source is not None and session.source is session.run.source
+        return session.run.folder if ended and self._screen.run is None else None
+
+    @property
     def note_goes_to(self) -> str:
         """Where a note that is typed now is kept, for the field's hint."""
-        run, session = self.noted_run, self._panels.session
-        if session.state.in_run:
+        if self._panels.session.state.in_run:
             return "Note on the run in progress …  (N)"
-        if run is not None and session.state is not WindowState.CONNECTING:
-            return f"Note on {run.path.name} …  (N)"
+        if self._folder is not None:
+            return f"Note on {self._folder.name} …  (N)"
         return "Note for the next run …  (N)"
 
     def note(self, text: str) -> None:
         """Keep a note: with the run in progress, the one on screen, or the next."""
-        session, run = self._panels.session, self.noted_run
-        if session.state.in_run or run is None:
+        session, folder = self._panels.session, self._folder
+        if session.state.in_run or folder is None:
             session.note(text)
             return
         cursors = self._panels.centre.view.cursors
         at = None if cursors is None else cursors[0]
         try:
-            add_note(run.path, text, at)
+            add_note(folder, text, at)
         except TactileLabError as error:
             self._screen.say(f"The note was not kept: {error}")
             return
         where = "" if at is None else f" at cursor A, {at:.3f} s"
-        session.log.add(Severity.NOTE, "note", f"{text} ({run.path.name}{where})")
-        self._said(run.path)
+        session.log.add(Severity.NOTE, "note", f"{text} ({folder.name}{where})")
+        self._said(folder)
 
     def about_shown(self) -> None:
         """Open the card for the run on screen, or for the last one."""
-        run = self.noted_run
-        folder = self._panels.session.run.folder if run is None else run.path
-        if folder is None:
+        if self._folder is None:
             self._screen.say("No run is on screen; choose one in Runs.")
         else:
-            self.card.show_run(folder)
+            self.card.show_run(self._folder)
 
     def recover(self, entry: RunSummary) -> None:
         """Make a run whole that was cut short, then report and show it."""

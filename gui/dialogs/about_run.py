@@ -34,6 +34,7 @@ from gui.parts import (
     row,
     say,
 )
+from gui.setup.parameter import parameter, text_of
 from tactile_lab.commands.show import describe, rows
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import QuantityError, TactileLabError
@@ -42,7 +43,7 @@ from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
 from tactile_lab.store.folder import LOG, is_live, read_info
 from tactile_lab.store.remarks import Note, read_remarks, write_remarks
-from tactile_lab.table import fields_of
+from tactile_lab.table import dumped, fields_of
 
 PAGES = ("Notes", "Facts", "Settings", "Log")
 
@@ -235,24 +236,20 @@ def _brief(value: Any) -> str:
 def settings_of(folder: Path) -> str:
     """The scene as it was run, table by table; what is no default is bold."""
     scene = load(folder / "scene.toml")
-    tables = {"protocol": scene.protocol, "record": scene.record}
+    tables: dict[str, Any] = {"protocol": scene.protocol, "record": scene.record}
     tables |= {"detect": scene.detect, "simulated": scene.simulated}
-    written, pages = scene.to_dict(), []
+    pages = []
     for name, table in tables.items():
-        usual = {
-            key: info.get_default(call_default_factory=True)
-            for key, info in fields_of(type(table)).items()
-            if not info.is_required()
-        }
         found = []
-        for key, text in written[name].items():
-            own = getattr(table, key, None)
-            changed = key in usual and usual[key] != own
-            found.append(f"{'<b>' if changed else ''}{key} = {escape(str(text))}</b>")
+        for key, info in fields_of(type(table)).items():
+            field, own = parameter(key, info), getattr(table, key)
+            words = escape(f"{key} = {text_of(field, own) or '—'}")
+            usual = own == field.default and not field.required
+            found.append(words if usual else f"<b>{words}</b>")
         pages.append(f"<p><b>[{name}]</b><br>{'<br>'.join(found)}</p>")
     bench = "<br>".join(
         f"{escape(str(key))} = {escape(str(value))}"
-        for key, value in written["bench"].items()
+        for key, value in dumped(scene.bench).items()
     )
     return "".join((*pages, f"<p><b>[bench]</b><br>{bench}</p>"))
 

@@ -23,14 +23,16 @@ PANELS = (
         "Choose a protocol; its form is made from its typed parameters. A blue mark "
         "is a value changed from its default, red says why a value cannot be used. The "
         "star keeps the parameters under a name, as a scene in the folder presets. The "
-        "form is locked while running, and a line above it says what it shows. The "
+        "form is yours during a run, too: change it and queue the next one; a line "
+        "above it says what it shows. The "
         "preview is the force as the coil will really play it; below the form stands "
         "what the run costs.",
     ),
     (
         "Queue",
-        "Queue has a run follow; so does a scene or a run dropped while one is in "
-        "progress. Waiting runs show their cost and can be moved and taken out. A "
+        "Queue has a run wait for its turn; so does a scene or a run dropped while one "
+        "is in progress. Where nothing is, <b>Start the queue</b> begins. Waiting "
+        "runs show their cost and can be moved and taken out. A "
         "click, or Enter, puts one's parameters into the form, also during a run; "
         "<b>Save to queue</b> replaces them at its place. After a STOP or a fault the "
         "queue is held until you resume it.",

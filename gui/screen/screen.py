@@ -96,7 +96,7 @@ class Screen(QObject):
         ask_file(
             self._panels.centre.window(),
             "Open a scene",
-            self.open_path,
+            lambda path: self.open_scene(str(path)),
             kinds="Scenes and protocols (*.toml *.py)",
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
 
 
 class FormPlan(QObject):
-    """Has the engine plan what the form asks for.
+    """Has what the form asks for planned.
+
+    Args:
+        planner: who plans just now.
 
     Attributes:
         request: that was planned last.
@@ -26,9 +30,9 @@ class FormPlan(QObject):
     arrived = Signal()
     """The newest request was planned, or cannot be."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, planner: Callable[[], Link]) -> None:
         super().__init__()
-        self._link = link
+        self._planner = planner
         self._newest: Request | None = None
         self.request: Request | None = None
         self.expectation: Expectation | None = None
@@ -39,7 +43,8 @@ class FormPlan(QObject):
         from gui.session.expectation import plan_request
 
         self._newest = request
-        self._link.ask(lambda reply: self._take(request, reply), plan_request, request)
+        link = self._planner()
+        link.ask(lambda reply: self._take(request, reply), plan_request, request)
 
     def _take(self, request: Request, reply: Reply[Expectation]) -> None:
         if request is self._newest:

@@ -35,47 +35,53 @@ class Queued:
 
 
 class Queue(QObject):
-    """Starts the first run as soon as the bench is free.
+    """Starts the first run as soon as the bench is free and nobody holds it.
 
     Args:
-        link: has runs planned.
+        planner: who plans just now.
         log: says why one was taken out.
         free: whether the bench is free.
+        running: whether a run is in progress, which the first one follows.
         start: starts a run.
 
     Attributes:
         items: the next one first.
-        held: whether it waits to be resumed, as it does after a STOP.
+        held: whether it waits to be started, as it does after a STOP and where the
+            first run was put in while nothing was in progress.
     """
 
     changed = Signal()
 
     def __init__(
         self,
-        link: Link,
+        planner: Callable[[], Link],
         log: Log,
         free: Callable[[], bool],
+        running: Callable[[], bool],
         start: Callable[[Queued], None],
     ) -> None:
         super().__init__()
-        self._link, self._log, self._free, self._start = link, log, free, start
+        self._planner, self._log, self._running = planner, log, running
+        self._free, self._start = free, start
         self.items: list[Queued] = []
         self.held = False
 
     def add(self, item: Queued) -> None:
-        """Have a run follow those before it; it starts at once if none is running."""
+        """Have a run follow those before it; nothing starts by it."""
         from gui.session.expectation import plan_request
 
+        if not self.items:
+            self.held = not self._running()
         self.items.append(item)
         if item.expectation is None:
             asked = item.request
-            self._link.ask(
+            self._planner().ask(
                 lambda reply: self._planned(item, asked, reply), plan_request, asked
             )
-        self.resume()
+        self.changed.emit()
 
     def resume(self) -> None:
-        """Go on after a STOP or a fault."""
+        """Start, or go on after a STOP or a fault."""
         self.held = False
         self.changed.emit()
         self.next()

@@ -67,14 +67,15 @@ class Session(QObject):
         self.bench = ConnectedBench(
             *parts, lambda: self._free and not self.monitor.alive
         )
-        self.plan = FormPlan(self.link)
+        self.plan = FormPlan(lambda: self._planner)
         self.run = LiveRun(*parts, out, self.bench.note_field)
         self.monitor = LiveMonitor(*parts)
         self.manual = LiveManual(*parts)
         self.queue = Queue(
-            self.link,
+            lambda: self._planner,
             self.log,
             lambda: self._free,
+            lambda: self.run.alive or self.state.in_run,
             lambda item: self.start(item.request, item.title, item.expectation),
         )
         self._chips = Chips(self.status, self.bench, self.run, self.monitor)
@@ -275,6 +276,11 @@ class Session(QObject):
     def _idle(self) -> bool:
         """Whether nothing uses the bench."""
         return self._free and not self.monitor.alive
+
+    @property
+    def _planner(self) -> Link:
+        """Who plans: the engine, which is then warm, or the desk beside a run."""
+        return self.desk if self.busy else self.link
 
     def _show_live(self, source: LiveSource) -> None:
         self.source = source

@@ -43,9 +43,7 @@ class Buttons(QWidget):
         self.run.setToolTip(problem or "Run what the form says (Ctrl+R)")
         self.run.setText(WORDS.get(state, "Run"))
         self.queue.setEnabled(not cannot_wait)
-        self.queue.setToolTip(
-            cannot_wait or "Have it follow the runs before it (Ctrl+Return)"
-        )
+        self.queue.setToolTip(cannot_wait or "Have it wait for its turn (Ctrl+Return)")
 
     def show_edit(self, problem: str) -> None:
         """Offer to save the edited run; `problem` is why that cannot be done."""

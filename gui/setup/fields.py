@@ -6,8 +6,14 @@ from collections.abc import Sequence
 from decimal import Decimal
 from pathlib import Path
 
-from PySide6.QtCore import QRect, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QEvent, QRect, Qt, Signal
+from PySide6.QtGui import (
+    QFocusEvent,
+    QKeyEvent,
+    QKeySequence,
+    QPainter,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import (
     QCheckBox,
     QFrame,
@@ -34,7 +40,8 @@ INSIDE = 2
 class QuantityEdit(QLineEdit):
     """A line edit; arrow keys change the number by one in its leading digit's place.
 
-    While nobody edits it, text longer than the field is shortened.
+    While nobody edits it, text longer than the field is shortened. Undo is the form's:
+    what was typed during one `stay` of the keyboard is one edit.
     """
 
     edited = Signal()
@@ -42,7 +49,28 @@ class QuantityEdit(QLineEdit):
     def __init__(self, parameter: FormField) -> None:
         super().__init__()
         self._parameter = parameter
+        self.stay: object | None = None
         self.textEdited.connect(self.edited)
+
+    def event(self, event: QEvent) -> bool:
+        """Leave undo and redo to the form."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(
+            event, QKeyEvent
+        ):
+            keys = QKeySequence.StandardKey
+            if event.matches(keys.Undo) or event.matches(keys.Redo):
+                return False
+        return super().event(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """A stay begins."""
+        self.stay = object()
+        super().focusInEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """A stay ends."""
+        self.stay = None
+        super().focusOutEvent(event)
 
     @property
     def shown(self) -> str:
@@ -236,9 +264,10 @@ class Field(QFrame):
             self._editor.style().unpolish(self._editor)
             self._editor.style().polish(self._editor)
 
-    def lock(self, locked: bool) -> None:
-        """Forbid or allow editing."""
-        self._editor.setEnabled(not locked)
+    @property
+    def stay(self) -> object:
+        """What stands for the keyboard's stay in the field; None where it is not."""
+        return self._editor.stay if isinstance(self._editor, QuantityEdit) else None
 
     def _browse(self) -> QToolButton:
         button = QToolButton()
@@ -251,9 +280,8 @@ class Field(QFrame):
         ask_file(self, self.parameter.title, self._take_file)
 
     def _take_file(self, path: Path) -> None:
-        if self._editor.isEnabled():  # it may have been locked meanwhile
-            self.set_text(str(path))
-            self.changed.emit()
+        self.set_text(str(path))
+        self.changed.emit()
 
     def _edited(self) -> None:
         self.check()

@@ -26,7 +26,6 @@ class Form(QWidget):
         self.undo = QUndoStack(self)
         self.protocol: type[Protocol] | None = None
         self._shown: dict[str, str] = {}
-        self._locked = False
         self._table = "protocol"
         self._rows = column(self, spacing=6)
 
@@ -51,7 +50,6 @@ class Form(QWidget):
         for key, info in keys.items():
             wanted = parameter(key, info)
             field = Field(wanted, values.get(key, wanted.default))
-            field.lock(self._locked)
             field.changed.connect(self._edited)
             self.fields.append(field)
             self._rows.addWidget(field)
@@ -87,14 +85,12 @@ class Form(QWidget):
         self.propose({field.parameter.key: field.default for field in self.fields})
 
     def undo_edit(self) -> None:
-        """Take the last edit back, unless the form is locked."""
-        if not self._locked:
-            self.undo.undo()
+        """Take the last edit back."""
+        self.undo.undo()
 
     def redo_edit(self) -> None:
-        """Make the edit again that was taken back, unless the form is locked."""
-        if not self._locked:
-            self.undo.redo()
+        """Make the edit again that was taken back."""
+        self.undo.redo()
 
     @property
     def problem(self) -> str:
@@ -117,29 +113,43 @@ class Form(QWidget):
                 made.append(f"{self._table}.{field.parameter.key}={entry}")
         return made
 
-    def lock(self, locked: bool) -> None:
-        """Forbid or allow editing."""
-        self._locked = locked
-        for field in self.fields:
-            field.lock(locked)
-
     def _edited(self) -> None:
         now = self.texts()
         if now != self._shown:
-            self.undo.push(_Edit(self, self._shown, now))
+            self.undo.push(_Edit(self, self._shown, now, self._typed_in()))
             self._shown = now
         self.changed.emit()
+
+    def _typed_in(self) -> object:
+        """The stay of the keyboard in a field; None while it is in none."""
+        for field in self.fields:
+            if (stay := field.stay) is not None:
+                return stay
+        return None
 
 
 class _Edit(QUndoCommand):
     """One change of the form."""
 
     def __init__(
-        self, form: Form, before: dict[str, str], after: dict[str, str]
+        self, form: Form, before: dict[str, str], after: dict[str, str], stay: object
     ) -> None:
         super().__init__("edit")
-        self._form, self._before, self._after = form, before, after
+        self.stay = stay
+        self._form, self._before, self.after = form, before, after
         self._done = True
+
+    def id(self) -> int:
+        """Of all edits, so that Qt offers each to the one before it."""
+        return 1
+
+    def mergeWith(self, later: QUndoCommand) -> bool:
+        """Take in what was typed during the same stay in a field."""
+        assert isinstance(later, _Edit)
+        if self.stay is None or later.stay is not self.stay:
+            return False
+        self.after = later.after
+        return True
 
     def undo(self) -> None:
         """Put the former texts back."""
@@ -149,5 +159,5 @@ class _Edit(QUndoCommand):
     def redo(self) -> None:
         """Put the later texts back; the first time they stand there already."""
         if not self._done:
-            self._form.set_texts(self._after)
+            self._form.set_texts(self.after)
         self._done = True

@@ -41,6 +41,9 @@ from tactile_lab.errors import TactileLabError
 LOW = 660
 """Height of the panel, px, below which the queue shows one row instead of three."""
 
+NAMED = 4
+"""Changed parameters in the name of a run."""
+
 SETTLE = 250
 """Milliseconds without a keystroke before the plan is computed anew."""
 
@@ -193,21 +196,21 @@ class SetupPanel(QFrame):
 
     @property
     def title(self) -> str:
-        """Name of the run to be."""
+        """Name of the run to be: its protocol, and what is changed of that."""
         kind = self.form.protocol
-        return "Run" if kind is None else kind.title
+        if kind is None:
+            return "Run"
+        own = [field.text for field in self.form.fields if field.is_changed]
+        return " · ".join((kind.title, *own[:NAMED]))
 
     def render_snapshot(self, snapshot: Snapshot) -> None:
-        """Lock the form, say what it shows, and why a button is off."""
+        """Say what the form shows, and why a button is off."""
         self._snapshot = snapshot
         busy = snapshot.state.in_run
         self._in_progress = busy and self._shows_run_in_progress()
         editing = self.subject.edited is not None
-        self.form.lock(busy and not editing)
-        self._reset.setEnabled(not busy or editing)
-        self.star.setEnabled(not busy or editing)
-        self.picker.setEnabled(not busy and not editing)
-        told = self.subject.words(locked=busy, shown=self._in_progress)
+        self.picker.setEnabled(not editing)
+        told = self.subject.words(busy=busy, shown=self._in_progress)
         self._show_strip(told, warning=bool(told) and told == self.subject.lost)
         if editing:
             self.buttons.show_edit(self._unusable)
@@ -336,11 +339,11 @@ class SetupPanel(QFrame):
             self.picker,
             self.strip,
             page,
+            self.queue,
             self.problem,
             line(),
             self.estimate,
             self.buttons,
-            self.queue,
             label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small"),
         )
         whole = stack(self, parts, page)

@@ -108,8 +108,8 @@ class QueueView(QWidget):
         self._most = 1
         self._sum = label("", "small")
         head = row(label("QUEUE", "section"), STRETCH, self._sum)
-        tip = "It is held since the last STOP or fault"
-        self.resume = push("Resume the queue", tip=tip)
+        tip = "Run one after the other (Ctrl+Shift+Return)"
+        self.resume = push("Start the queue", tip=tip)
         self.resume.clicked.connect(self.resumed)
         inner = QWidget()
         self._rows = column(inner, spacing=5)

@@ -77,23 +77,22 @@ class Subject(QObject):
         """Whether the edited run's parameters were changed in the form."""
         return self.edited is not None and self._form.texts() != self._taken_up
 
-    def words(self, *, locked: bool, shown: bool) -> str:
+    def words(self, *, busy: bool, shown: bool) -> str:
         """What the form is about; "" where it simply holds the next run's parameters.
 
         Args:
-            locked: whether a run is in progress.
+            busy: whether a run is in progress.
             shown: whether that run is the one in the form.
         """
         item, queue = self.edited, self._session.queue.items
         if item is not None:
             place = f"{queue.index(item) + 1} of {len(queue)} in the queue"
             return f"Editing {item.title}, {place}"
-        if self.lost or not locked:
+        if self.lost or not busy:
             return self.lost
         if shown:
-            return "The run in progress · locked"
-        name = self._session.run.title
-        return f"Your next run · locked while {name} is in progress"
+            return "As the run in progress · change it for the next"
+        return f"Your next run · {self._session.run.title} is in progress"
 
     def edit(self, item: Queued) -> str:
         """Take up a waiting run's parameters; why not, "" if they stand in the form."""

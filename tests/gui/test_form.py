@@ -101,14 +101,6 @@ def test_arrow_keys_step(app: QApplication) -> None:
     assert form.field("hold").text == "2 s"
 
 
-def test_form_is_locked(app: QApplication) -> None:
-    form = Form()
-    form.show_protocol(protocol_class("pulses"), {})
-    form.lock(True)
-    edits = form.findChildren(QLineEdit)
-    assert edits and not any(edit.isEnabled() for edit in edits)
-
-
 @given(st.floats(1e-15, 1e9))
 def test_shown_quantity_reads_back_exactly(value: float) -> None:
     assert parse(exact(value, "N"), "N") == value

@@ -41,6 +41,7 @@ def test_notes_are_stamped_and_filtered(lab) -> None:
 
 def test_a_note_before_a_run_goes_to_that_run(lab) -> None:
     lab.window.screen_.leave_run()
+    lab.session.source = None
     lab.window.render_state()
     assert "next run" in lab.window.centre.log.note.placeholderText()
     type_note(lab, "another specimen")

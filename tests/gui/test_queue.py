@@ -130,7 +130,6 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
         "two holds, 5 s longer each"
     )
     assert setup.form.texts() == before, "the form shows the next run again"
-    assert not any(e.isEnabled() for e in setup.form.findChildren(QLineEdit))
     assert session.state is WindowState.RUNNING and not setup.run.isEnabled()
     idle_after_run(lab)
 
@@ -254,13 +253,53 @@ def test_scene_opened_during_an_edit_leaves_the_queued_run_alone(lab) -> None:
     idle(lab)
 
 
-def test_undo_is_locked_with_the_form(lab) -> None:
+def test_the_next_runs_are_prepared_during_one(lab) -> None:
+    """Edit, queue, edit, queue, while a run is in progress."""
+    session, setup = lab.session, lab.window.setup
+    lab.run()
+    running = session.run.request
+    lab.window.screen_.open_scene(str(lab.folder / "short.toml"))
+    for hold in ("250 ms", "350 ms"):
+        type_into(setup.form.field("hold"), hold)
+        setup.buttons.queue.click()
+        lab.until(lambda h=hold: h in " ".join(i.title for i in waiting(lab)))
+    assert [i.request.load().protocol.hold for i in waiting(lab)] == [0.25, 0.35]
+    assert session.state is WindowState.RUNNING and session.run.request == running
+    assert "Your next run" in setup.strip.text()
+    idle_after_run(lab)
+
+
+def waiting(lab) -> list[Queued]:
+    return lab.session.queue.items
+
+
+def test_queue_only_queues_where_nothing_is_in_progress(lab) -> None:
+    session, setup = lab.session, lab.window.setup
+    lab.until(setup.buttons.queue.isEnabled)
+    setup.buttons.queue.click()
+    lab.until(lambda: waiting(lab) and waiting(lab)[0].expectation is not None)
+    assert session.state is WindowState.READY and session.queue.held
+    assert setup.queue.resume.isVisible()
+    place = setup.run.mapTo(lab.window, setup.run.rect().topLeft())
+    setup.buttons.queue.click()
+    lab.until(lambda: len(waiting(lab)) == 2)
+    assert setup.run.mapTo(lab.window, setup.run.rect().topLeft()) == place
+    setup.queue.resume.click()
+    assert session.state is WindowState.RUNNING and len(waiting(lab)) == 1
+    idle_after_run(lab)
+
+
+def test_one_undo_takes_back_what_was_typed_in_one_stay(lab) -> None:
     setup = lab.window.setup
-    setup.form.propose({"hold": "600 ms"})
-    busy(lab)
+    edit = setup.form.field("hold").findChild(QLineEdit)
+    before = edit.text()
     lab.window.activateWindow()
-    QTest.keyClick(lab.window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert setup.form.field("hold").text == "600 ms"
-    idle(lab)
-    QTest.keyClick(lab.window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    lab.until(lambda: setup.form.field("hold").text != "600 ms")
+    edit.setFocus()
+    lab.until(edit.hasFocus)
+    type_into(setup.form.field("hold"), "600 ms")
+    assert edit.hasFocus() and edit.text() == "600 ms"
+    QTest.keyClick(edit, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    lab.until(lambda: edit.text() == before)
+    QTest.keyClick(edit, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
+    lab.until(lambda: edit.text() == "600 ms")
+    setup.form.undo_edit()
