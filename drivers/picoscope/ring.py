@@ -100,15 +100,8 @@ class StreamRing:
                 f"The scope's library jumped from ring index {self._next} to {start}: "
                 "samples are missing. Relieve the computer or lower record.sample_rate."
             )
-        filled = self._filled + samples
-        if filled > self.samples:
-            raise SamplesLostError(
-                f"{filled} samples a channel arrived between two polls, more than the "
-                f"{self.samples} there is room for. Relieve the computer or lower "
-                "record.sample_rate."
-            )
         self._parts.append(self._ring[:, start:end].copy())
-        self._filled = filled
+        self._filled += samples
         self._overflow |= overflow
         self._next = end % self.samples
         self.at_end = end == self.samples

@@ -7,7 +7,18 @@ from collections import deque
 from tactile_lab.bench import Stream
 from tactile_lab.errors import SamplesLostError
 
-_LAG, _DRIFT, _WINDOW = 0.01, 1e-4, 8
+LAG = 0.01
+"""Rise of the lag that is taken for a loss on a real computer, s, or `SAMPLES`."""
+
+SAMPLES = 3
+"""Rise of the lag that is taken for a loss where nothing else delays a sample."""
+
+DRIFT = 1e-4
+"""Relative difference allowed between the scope's clock and the computer's."""
+
+WINDOW, POLLS = 1.0, 8
+"""Least time, s, and least polls over which a minimum is taken: a library may hand a
+part over and the rest much later, and a busy computer may be late for a while."""
 
 
 class SampleCount:
@@ -15,9 +26,10 @@ class SampleCount:
 
     After a poll has emptied all buffers, the samples received lag behind the clock by
     the transfer's latency. Lost samples raise that lag for good, so the minimum over
-    the last few polls is compared with that over as many before (a gap), and with the
+    the last second is compared with that over the one before (a gap), and with the
     minimum since the start (many small gaps). A poll that came later than the ring
-    holds samples is taken as a loss even if the count looks right.
+    holds samples is taken as a loss even if the count looks right. What is lost before
+    the first sample comes, or delays less than `tolerance`, cannot be seen so.
 
     A busy computer may halt between asking and being served, and samples of that time
     come along. So a lag lies between that at asking and that at having; a loss must
@@ -29,7 +41,8 @@ class SampleCount:
         depth: samples per channel that are kept for a late poll.
         tolerance: rise of the lag that is not yet a loss, s.
         drift: relative difference allowed between the two clocks.
-        window: polls over which a minimum is taken.
+        window: time over which a minimum is taken, s.
+        polls: over which it is taken at least.
     """
 
     def __init__(
@@ -40,18 +53,20 @@ class SampleCount:
         depth: int,
         tolerance: float,
         drift: float = 0.0,
-        window: int = 8,
+        window: float = WINDOW,
+        polls: int = POLLS,
     ) -> None:
         self.received = 0
+        self.tolerance = tolerance
+        self.window = window
         self._started = started
         self._polled = started
         self._interval = interval
         self._depth = depth
-        self._tolerance = tolerance
         self._drift = drift
-        self._window = window
+        self._polls = polls
         self._least: float | None = None
-        self._lags: deque[tuple[float, float, float]] = deque(maxlen=2 * window)
+        self._lags: deque[tuple[float, float, float]] = deque()
 
     @classmethod
     def of(
@@ -62,22 +77,34 @@ class SampleCount:
         Args:
             stream: the stream.
             depth: as above.
-            tolerance: as above; None for 10 ms, or three samples on a simulated clock,
-                which knows no latency.
+            tolerance: as above; None for three samples, and 10 ms at least but on a
+                simulated clock, which knows no latency.
             simulated: the clock is.
         """
-        window = _WINDOW
+        window, polls = WINDOW, POLLS
         if tolerance is None:
-            tolerance = _LAG
+            tolerance = SAMPLES * stream.interval
             if simulated:
-                tolerance, window = 3 * stream.interval, 1
+                window, polls = 0.0, 1
+            else:
+                tolerance = max(LAG, tolerance)
         return cls(
-            started=stream.started, interval=stream.interval, depth=depth,
-            tolerance=tolerance, drift=_DRIFT, window=window,
-        )  # fmt: skip
+            started=stream.started,
+            interval=stream.interval,
+            depth=depth,
+            tolerance=tolerance,
+            drift=DRIFT,
+            window=window,
+            polls=polls,
+        )
 
     def poll(
-        self, now: float, samples: int, drained: bool = True, had: float | None = None
+        self,
+        now: float,
+        samples: int,
+        drained: bool = True,
+        had: float | None = None,
+        began: float | None = None,
     ) -> None:
         """Take note of a poll.
 
@@ -86,11 +113,14 @@ class SampleCount:
             samples: a channel, that it brought.
             drained: nothing more waited to be read.
             had: clock time at which they were there, s; `now` unless given.
+            began: clock time of the first of several questions, s; `now` unless given.
 
         Raises:
             SamplesLostError: samples are missing or cannot be vouched for.
         """
-        waited, self._polled = now - self._polled, now
+        # while a poll was held up, what it brought was copied as it came
+        waited = (now if began is None else began) - self._polled
+        self._polled = now if had is None else had
         self.received += samples
         if samples and drained:
             elapsed = now - self._started
@@ -98,6 +128,11 @@ class SampleCount:
             most = least + (0.0 if had is None else had - now)
             self._least = most if self._least is None else min(self._least, most)
             self._lags.append((elapsed, least, most))
+            while (
+                len(self._lags) > 2 * self._polls
+                and self._lags[0][0] < elapsed - 2 * self.window
+            ):
+                self._lags.popleft()
         holds = self._depth * self._interval
         if waited > holds * (1 + 1e-9):
             raise SamplesLostError(
@@ -106,27 +141,29 @@ class SampleCount:
                 "or lower record.sample_rate."
             )
         if samples and drained:
-            self._compare(self._window)
+            self._compare(self._polls, self.window)
 
     def finish(self) -> None:
-        """Check once more, with fewer polls, at the end of a stream.
+        """Check once more, with the last two polls alone, at the end of a stream.
 
         Raises:
-            SamplesLostError: samples are missing.
+            SamplesLostError: samples are missing, or late: poll on for `window` s.
         """
-        self._compare(min(2, self._window))
+        self._compare(min(2, self._polls), 0.0)
 
-    def _compare(self, recent: int) -> None:
-        if self._least is None or len(self._lags) <= recent:
-            return
+    def _compare(self, polls: int, window: float) -> None:
         lags = list(self._lags)
+        recent = sum(lag[0] > lags[-1][0] - window for lag in lags) if lags else 0
+        recent = max(recent, polls)
+        if self._least is None or len(lags) <= recent:
+            return
         before, after = lags[:-recent], lags[-recent:]
         elapsed, now_least = after[-1][0], min(least for _, least, _ in after)
         gap = now_least - min(most for _, _, most in before)
-        if gap > self._tolerance + self._drift * (elapsed - before[0][0]):
+        if gap > self.tolerance + self._drift * (elapsed - before[0][0]):
             self._refuse(elapsed, gap)
         total = now_least - self._least
-        if total > self._tolerance + self._drift * elapsed:
+        if total > self.tolerance + self._drift * elapsed:
             self._refuse(elapsed, total)
 
     def _refuse(self, elapsed: float, missing: float) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,7 +38,8 @@ class _Running:
         data_at: clock time of the newest samples, s.
         failure: what the next poll raises, once all samples are taken, or the stop.
         told: it was raised.
-        asked: clock time of the last question for samples, s.
+        began: clock time of a poll's first question for samples, s.
+        asked: of its last one, s.
         drained: whether the library had no more to deliver then.
     """
 
@@ -46,6 +49,7 @@ class _Running:
     data_at: float
     failure: BaseException | None = None
     told: bool = False
+    began: float = 0.0
     asked: float = 0.0
     drained: bool = False
 
@@ -64,7 +68,7 @@ class PicoScope(Opened):
         watchdog: longest time without data before the scope is pinged, s.
         ring: samples per input in the library's ring; None for 2 s worth.
         lag_tolerance: rise of the samples' lag that is not yet a loss, s; None for
-            10 ms, or three samples on a simulated clock, which has no latency.
+            that of `SampleCount.of`.
     """
 
     def __init__(
@@ -88,6 +92,7 @@ class PicoScope(Opened):
         self._watchdog = watchdog
         self._ring_samples = ring
         self._lag_tolerance = lag_tolerance
+        self._tolerance = math.nan
         self._ring: StreamRing | None = None
         self._stream: Stream | None = None
         self._running: _Running | None = None
@@ -169,6 +174,7 @@ class PicoScope(Opened):
         count = SampleCount.of(
             self._stream, samples, self._lag_tolerance, simulated=self._clock.simulated
         )
+        self._tolerance = count.tolerance
         self._running = _Running(self._stream, ring, count, after)
         return self._stream
 
@@ -196,16 +202,26 @@ class PicoScope(Opened):
             if running.failure is not None:
                 running.told = True
                 raise running.failure
-            running.count.poll(running.asked, 0)
+            self._count(running, 0)
             return None
         codes, overrange = taken
         block = Block(running.count.received, codes, overrange, received)
         running.data_at = received
         try:
-            running.count.poll(running.asked, block.samples, running.drained, received)
+            self._count(running, block.samples)
         except SamplesLostError as error:
             running.failure = error
         return block
+
+    def _count(self, running: _Running, samples: int) -> None:
+        """Count what a poll has just brought.
+
+        Raises:
+            SamplesLostError: samples are missing.
+        """
+        running.count.poll(
+            running.asked, samples, running.drained, self._clock.now(), running.began
+        )
 
     def _ring_for(self, bits: list[int], samples: int) -> StreamRing:
         """Memory for a stream: the last stream's where it fits, it may be large."""
@@ -218,6 +234,7 @@ class PicoScope(Opened):
     def _fetch(self, running: _Running) -> BaseException | None:
         """Have the library deliver what it has; return what went wrong."""
         running.drained, ring = False, running.ring
+        running.began = self._clock.now()
         for _ in range(_MOST_PARTS):
             ring.at_end = False
             # samples are counted against the time they were asked for, because
@@ -266,13 +283,30 @@ class PicoScope(Opened):
         running, self._running = self._running, None
         if running is None:
             return
+        late = None if running.failure is not None else self._late(running)
         code = self._unit.call("ps3000aStop")
         if running.failure is None:
             if code not in (status.OK, *status.DEAD):
                 raise status.failure(code, "Stopping the scope")
-            running.count.finish()
+            if late is not None:
+                raise late
         elif not running.told:
             raise running.failure
+
+    def _late(self, running: _Running) -> SamplesLostError | None:
+        """What of the stream's end is missing, once all that is late has come."""
+        until = self._clock.now() + running.count.window
+        while True:
+            try:
+                running.count.finish()
+                return None
+            except SamplesLostError as missing:
+                if self._clock.now() >= until or self._fetch(running) is not None:
+                    return missing
+            if (taken := running.ring.take()) is not None:
+                with suppress(SamplesLostError):  # the next look tells
+                    self._count(running, taken[0].shape[1])
+            self._clock.sleep_until(self._clock.now() + self._poll_interval)
 
     def settings(self) -> dict[str, str]:
         """Settings in force, for the run's record."""
@@ -280,6 +314,7 @@ class PicoScope(Opened):
         known["power"] = ", ".join(self._unit.accepted) or "as wanted"
         if self._stream is not None:
             known["interval_s"] = repr(self._stream.interval)
+            known["loss_seen_from_s"] = f"{self._tolerance:g}"
             known["ring_samples"] = str(self._ring.samples if self._ring else 0)
             known |= described(self._stream.channels)
         return known

@@ -70,6 +70,10 @@ MEANINGS: dict[int, Meaning] = {
     0x04: Meaning(
         "FW_FAIL", "the scope's firmware did not load; plug the scope in anew"
     ),
+    0x05: Meaning(
+        "OPEN_OPERATION_IN_PROGRESS",
+        "another program is opening the scope; wait a moment and try again",
+    ),
     0x06: Meaning("OPERATION_FAILED", "the operation failed; plug the scope in anew"),
     NOT_RESPONDING: Meaning(
         "NOT_RESPONDING",
@@ -101,7 +105,11 @@ MEANINGS: dict[int, Meaning] = {
         "computer",
         SamplesLostError,
     ),
+    0x1D: Meaning(
+        "TOO_MANY_SAMPLES", "more samples than the scope has memory for", LimitError
+    ),
     0x23: Meaning("USER_CALLBACK", "the library was called from within its callback"),
+    0x24: Meaning("DEVICE_SAMPLING", "the scope is still sampling; stop it first"),
     BUSY: Meaning("BUSY", "busy"),
     0x2B: Meaning(
         "INVALID_SAMPLE_INTERVAL",
@@ -109,12 +117,19 @@ MEANINGS: dict[int, Meaning] = {
         "record.sample_rate or use fewer inputs",
         LimitError,
     ),
+    0x3A: Meaning("CANCELLED", "the operation was cancelled; start again"),
+    0x3C: Meaning("INVALID_CALL", "this call is not possible now; start again"),
     DRIVER_FUNCTION: Meaning(
         "DRIVER_FUNCTION", "two calls at once; one thread only may use the scope"
     ),
     0x45: Meaning("INVALID_COUPLING", 'coupling must be "DC" or "AC"', LimitError),
     0x46: Meaning("BUFFERS_NOT_SET", "no data buffers were registered"),
     0x4C: Meaning("POWER_FAILED", "the scope's power failed; check its supply"),
+    0x50: Meaning(
+        "INVALID_ANALOGUE_OFFSET",
+        "the scope does not have this offset at this range",
+        LimitError,
+    ),
     SUPPLY_CONNECTED: Meaning(
         "POWER_SUPPLY_CONNECTED",
         "the mains adapter was plugged in, which aborts streaming; start again",

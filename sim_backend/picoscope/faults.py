@@ -12,6 +12,7 @@ Kind = Literal[
     "hang",
     "status",
     "gap",
+    "late",
     "stall",
     "overrange",
     "supply_lost",
@@ -32,6 +33,7 @@ class ScopeFault:
         hang: the call takes `duration` s, then the link is dead.
         status: the call answers `code`, `times` times, and does nothing.
         gap: the unit drops `samples` samples without a word.
+        late: for `duration` s the newest `samples` samples do not come yet.
         stall: polls answer BUFFER_STALL.
         overrange: inputs `inputs` saturate for `duration` s.
         supply_lost, supply_connected, undervoltage: the power changes; the capture is
@@ -45,8 +47,8 @@ class ScopeFault:
         sample: strikes once this many samples a channel were produced.
         code: PICO_STATUS for kind "status".
         times: how often, for kind "status".
-        duration: s, for "hang" and "overrange".
-        samples: for "gap".
+        duration: s, for "hang", "late" and "overrange".
+        samples: for "gap" and "late".
         inputs: for "overrange".
     """
 

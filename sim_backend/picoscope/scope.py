@@ -106,6 +106,7 @@ class SimulatedPicoScope:
         self._stream_status = pico.OK
         self._answers: list[tuple[str | None, int]] = []
         self._saturated: dict[str, float] = {}
+        self._held_back, self._held_until = 0, -math.inf
 
     @property
     def streaming(self) -> bool:
@@ -140,6 +141,8 @@ class SimulatedPicoScope:
             self._answers += [(wanted, fault.code)] * fault.times
         elif fault.kind == "gap":
             self.drop(fault.samples)
+        elif fault.kind == "late":
+            self._held_back, self._held_until = fault.samples, now + fault.duration
         elif fault.kind == "overrange":
             self._saturated.update(dict.fromkeys(fault.inputs, now + fault.duration))
         elif fault.kind == "stream_fails":
@@ -270,6 +273,8 @@ class SimulatedPicoScope:
         if state is None:
             return pico.STREAMING_FAILED, None
         waiting = self.produced() - state.next
+        if self.clock.now() < self._held_until:
+            waiting -= self._held_back
         room = self.make.fifo or state.ring
         if waiting > room:
             self.drop(waiting - room)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.quantity import show
 from tactile_lab.store.folder import INFO, write_json
 from tactile_lab.store.run import Run
 
@@ -35,6 +37,8 @@ class Certificate:
         offline: spikes found again in the stored samples; None where the channel was
             not stored.
         differing: spikes that only one of the two searches found; None likewise.
+        seen_from: shortest stretch of missing samples that the scope's driver would
+            have noticed by its clock, s; None where it said nothing of that.
         missing: samples are missing, as the run found out, and how many is not known.
     """
 
@@ -46,6 +50,7 @@ class Certificate:
     differing: int | None
     covered: float | None = None
     streamed: float | None = None
+    seen_from: float | None = None
     missing: bool = False
 
     @property
@@ -71,6 +76,8 @@ class Certificate:
             samples = f"not known of {self.written} samples (the run was cut short)"
         else:
             samples = f"{self.samples} of {self.produced} samples"
+            if self.seen_from is not None and self.covered is None:
+                samples += f" (seen from {show(self.seen_from, 's')} a stretch on)"
         if self.covered is not None and self.streamed is not None:
             return (
                 f"loss: {samples}; gaps by design, {self.covered:.4g} of "
@@ -92,6 +99,7 @@ class Certificate:
             "gaps": self.gaps,
             "covered_s": self.covered,
             "streamed_s": self.streamed,
+            "seen_from_s": self.seen_from,
             "spikes_online": self.online,
             "spikes_offline": self.offline,
             "text": str(self),
@@ -120,11 +128,23 @@ def certify(run: Run) -> Certificate:
         gaps=missing,
         covered=covered,
         streamed=streamed,
+        seen_from=_seen_from(run.info),
         online=online.size,
         offline=None if offline is None else offline.size,
         differing=None if offline is None else unmatched(online, offline).size,
         missing=bool(run.info.get("samples_missing")),
     )
+
+
+def _seen_from(info: Mapping[str, Any]) -> float | None:
+    """What the scope's driver said that it would notice, s; None for nothing sound."""
+    instruments = info.get("instruments")
+    scope = instruments.get("scope") if isinstance(instruments, dict) else None
+    told = scope.get("loss_seen_from_s") if isinstance(scope, dict) else None
+    try:
+        return None if told is None else float(told)
+    except (TypeError, ValueError):
+        return None
 
 
 def write_certificate(path: Path) -> Certificate:

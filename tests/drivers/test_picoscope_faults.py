@@ -398,3 +398,42 @@ def test_what_the_last_poll_found_is_raised_by_the_stop_and_only_once() -> None:
             rig.scope.stop()
         rig.scope.stop()
         rig.scope.close()
+
+
+@pytest.mark.parametrize(
+    ("late", "begins", "lasts"),
+    [(1_500, 0.95, 0.3), (60_000, 0.3, 0.65)],
+    ids=["at the end", "a part of each poll, and the rest much later"],
+)
+def test_samples_that_come_late_are_not_called_lost(
+    late: int, begins: float, lasts: float
+) -> None:
+    rig = Rig(
+        ScopeFault(kind="late", time=begins, samples=late, duration=lasts),
+        lag_tolerance=0.01,
+    )
+    rig.stream(1.0)
+    rig.works()
+
+
+@pytest.mark.parametrize("begins", [0.5, 0.97])
+def test_samples_lost_shortly_before_the_end_are_told(begins: float) -> None:
+    rig = Rig(ScopeFault(kind="gap", time=begins, samples=1_500), lag_tolerance=0.01)
+    rig.fails(SamplesLostError, "about 15[0-9][0-9] too few", seconds=1.0)
+
+
+def test_a_call_that_takes_longer_than_the_ring_holds_has_lost_nothing() -> None:
+    """What the library hands over meanwhile is copied as it comes."""
+    rig = Rig(make=Make(parts=8), ring=3_000, lag_tolerance=0.01)
+    device = rig.library.device
+    render = device.source.render
+
+    class Slow:
+        def render(self, acquisition, first, samples):
+            if 30_000 <= first < 60_000:  # ten times in a row, within the polls
+                rig.clock.sleep_until(rig.clock.now() + 0.02)
+            return render(acquisition, first, samples)
+
+    device.source = Slow()
+    rig.stream(1.0)
+    assert rig.samples > 90_000

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.picoscope.sample_count import SampleCount
+from tactile_lab.bench import Stream
 from tactile_lab.errors import SamplesLostError
 
 RATE = 1e6
@@ -56,7 +57,8 @@ def test_a_few_samples_are_missed_where_there_is_no_latency(drift: float) -> Non
         depth=10**6,
         tolerance=3e-6,
         drift=1e-4,
-        window=1,
+        window=0.0,
+        polls=1,
     )
     lost = 0
     with pytest.raises(SamplesLostError, match=r"about [678] too few"):
@@ -76,7 +78,7 @@ def test_many_small_gaps_add_up() -> None:
 
 def test_a_poll_that_left_something_unread_is_not_judged() -> None:
     count = SampleCount(
-        started=0.0, interval=1 / RATE, depth=10**6, tolerance=3e-6, window=1
+        started=0.0, interval=1 / RATE, depth=10**6, tolerance=3e-6, window=0.0, polls=1
     )
     count.poll(0.02, 20_000)
     count.poll(0.04, 5_000, drained=False)
@@ -108,3 +110,23 @@ def test_a_computer_that_halts_while_it_asks_has_lost_nothing() -> None:
             count.poll(1.0 + 0.02 * k, produced - total, had=had)
             total = produced
     assert count.received == int(0.02 * 59 * RATE)
+
+
+@pytest.mark.parametrize("rate", [10.0, 20.0, 50.0])
+def test_a_slow_stream_is_judged_by_its_samples(rate: float) -> None:
+    """A poll sees an interval more or less; that is more than 10 ms here."""
+    stream = Stream(
+        channels=(),
+        interval=1 / rate,
+        full_scale=32512,
+        shift=8,
+        started=0.0,
+        uncertainty=0.0,
+    )
+    count = SampleCount.of(stream, 1 << 16, None, simulated=False)
+    for k in range(1, 2_000):
+        now = 0.02 * k
+        late = 0.9 / rate if 500 <= k < 520 else 0.0
+        arrived = max(0, int((now - late) * rate))
+        count.poll(now, arrived - count.received)
+    count.finish()
