@@ -9,6 +9,7 @@ what a file holds. Nothing here loads pydantic before a file is read.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, cast, get_type_hints
 
@@ -71,6 +72,24 @@ def fields_of(kind: Any) -> dict[str, FieldInfo]:
         for field in dataclasses.fields(kind)
         if not field.metadata.get("internal")
     }
+
+
+def described(kind: Any) -> dict[str, str]:
+    """What the keys of a table are, by key, as its docstring's `Attributes` tells."""
+    found: dict[str, str] = {}
+    lines = (inspect.getdoc(kind) or "").partition("Attributes:\n")[2].split("\n")
+    names: list[str] = []
+    for line in lines:
+        if line and not line.startswith(" " * 4):
+            break  # another part of the docstring
+        if line.startswith(" " * 8):
+            for name in names:
+                found[name] += f" {line.strip()}"
+        elif line.strip():
+            keys, _, text = line.strip().partition(": ")
+            names = keys.split(", ")
+            found |= dict.fromkeys(names, text)
+    return found
 
 
 def dumped(table: Any) -> dict[str, Any]:

@@ -50,6 +50,7 @@ _PATHS = {
     "tick": '<path d="M5 12.5l4.5 4.5L19 7.5" stroke-width="3"/>',
     "note": '<path d="M4 4h16v11l-5 5H4zM15 20v-5h5M8 9h8M8 13h4"/>',
     "edit": '<path d="M4 20l1-4.5L16.5 4l3.5 3.5L8.5 19zM14 6.5l3.5 3.5"/>',
+    "chevron-right": '<path d="M9 6l6 6-6 6"/>',
     "chevron": '<path d="M6 9l6 6 6-6"/>',
     "folder": '<path d="M3 6h6l2 2.5h10V19H3z"/>',
     "file": '<path d="M6 3h8l4 4v14H6zM14 3v4h4"/>',

@@ -100,6 +100,10 @@ QToolButton[role="segment"] { background: transparent; border: 1px solid transpa
 QToolButton[role="segment"]:checked { background: $panel;
   border: 1px solid $border_strong; font-weight: 600; }
 QToolButton[role="segment"]:focus { border: 2px solid $accent; padding: 2px 8px; }
+QToolButton[role="section"] { background: transparent; border: 1px solid transparent;
+  padding: 3px 4px; font-size: 11px; font-weight: 600; color: $muted; }
+QToolButton[role="section"]:hover { color: $text; }
+QToolButton[role="section"]:focus { border: 2px solid $accent; padding: 2px 3px; }
 QToolButton[role="tab"] { background: transparent; border: 0; border-radius: 0;
   border-bottom: 2px solid transparent; padding: 8px 10px; color: $muted;
   font-weight: 500; }

@@ -175,24 +175,34 @@ def editor(parameter: FormField) -> QuantityEdit | Switch | Choice:
     if parameter.kind is Kind.CHOICE:
         return Choice(parameter.choices)
     edit = QuantityEdit(parameter)
+    default = text_of(parameter, parameter.default)
     if parameter.optional:
         edit.setPlaceholderText("automatic")
-    elif not parameter.required and not text_of(parameter, parameter.default):
-        edit.setPlaceholderText("none")
+    elif not parameter.required:
+        edit.setPlaceholderText(default or "none")
     if parameter.kind in (Kind.QUANTITY, Kind.INTEGER, Kind.NUMBER):
         edit.setAlignment(Qt.AlignmentFlag.AlignRight)
     return edit
 
 
 class Field(QFrame):
-    """Label, mark, editor and the reason why a value cannot be used."""
+    """Label, mark, editor and the reason why a value cannot be used.
+
+    Args:
+        parameter: what is edited.
+        value: SI, shown at first.
+        usual: what it is unless somebody says otherwise; the parameter's own default
+            where None.
+    """
 
     changed = Signal()
 
-    def __init__(self, parameter: FormField, value: object) -> None:
+    def __init__(
+        self, parameter: FormField, value: object, usual: object = None
+    ) -> None:
         super().__init__()
         self.parameter = parameter
-        self.default = text_of(parameter, parameter.default)
+        self.default = text_of(parameter, parameter.default if usual is None else usual)
         self.problem = ""
         self._mark = QFrame()
         self._mark.setFixedSize(3, 22)
@@ -230,7 +240,7 @@ class Field(QFrame):
 
     @property
     def is_changed(self) -> bool:
-        """Whether the value differs from the protocol's own default."""
+        """Whether the value differs from what it is unless somebody says otherwise."""
         return self.text.strip() != self.default
 
     def entry(self) -> str | None:

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QWidget
 from gui.parts import column, empty
 from gui.setup.fields import Field
 from gui.setup.parameter import parameter
+from tactile_lab.table import described
 from tactile_lab.trial import Protocol
 
 
@@ -20,10 +21,10 @@ class Form(QWidget):
 
     changed = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, undo: QUndoStack | None = None) -> None:
         super().__init__()
         self.fields: list[Field] = []
-        self.undo = QUndoStack(self)
+        self.undo = undo or QUndoStack(self)
         self.protocol: type[Protocol] | None = None
         self._shown: dict[str, str] = {}
         self._table = "protocol"
@@ -35,7 +36,12 @@ class Form(QWidget):
         self.show_table("protocol", kind.parameters(), values)
 
     def show_table(
-        self, name: str, keys: Mapping[str, FieldInfo], values: Mapping[str, object]
+        self,
+        name: str,
+        keys: Mapping[str, FieldInfo],
+        values: Mapping[str, object],
+        usual: Mapping[str, object] | None = None,
+        about: type | None = None,
     ) -> None:
         """Make the fields of a table of a scene.
 
@@ -43,13 +49,17 @@ class Form(QWidget):
             name: of the table, such as "record".
             keys: what it may hold, as `tactile_lab.table.fields_of` tells.
             values: SI, by key; the default where one is not among them.
+            usual: SI, by key: what need not be said; the defaults unless given.
+            about: whose docstring says what the keys are, where their types do not.
         """
+        said = {} if about is None else described(about)
         empty(self._rows)
         self._table = name
         self.fields = []
         for key, info in keys.items():
-            wanted = parameter(key, info)
-            field = Field(wanted, values.get(key, wanted.default))
+            wanted = parameter(key, info, said.get(key, ""))
+            plain = None if usual is None else usual.get(key)
+            field = Field(wanted, values.get(key, wanted.default), plain)
             field.changed.connect(self._edited)
             self.fields.append(field)
             self._rows.addWidget(field)
@@ -112,6 +122,20 @@ class Form(QWidget):
             if entry is not None:
                 made.append(f"{self._table}.{field.parameter.key}={entry}")
         return made
+
+    def changes(self) -> list[str]:
+        """As `overrides`, of what differs from what is usual."""
+        made = []
+        for field in self.fields:
+            if field.is_changed and not field.problem:
+                entry = field.entry()
+                if entry is not None:
+                    made.append(f"{self._table}.{field.parameter.key}={entry}")
+        return made
+
+    def changed_texts(self) -> dict[str, str]:
+        """What stands in the fields that differ from what is usual."""
+        return {f.parameter.key: f.text for f in self.fields if f.is_changed}
 
     def _edited(self) -> None:
         now = self.texts()

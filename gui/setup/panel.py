@@ -33,6 +33,7 @@ from gui.setup.picker import Picker, about
 from gui.setup.preset_button import PresetButton
 from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
+from gui.setup.sections import Sections
 from gui.setup.subject import Subject
 from gui.state import Snapshot, WindowState, run_problem
 from tactile_lab.engine.request import Request
@@ -76,9 +77,10 @@ class SetupPanel(QFrame):
         self.about = label("", "muted", wrap=True)
         self.preview = WaveformPreview(theme)
         self.form = Form()
+        self.tables = Sections(theme, self.form.undo)
         self.warnings = label("", "warning", wrap=True)
         self.warnings.hide()
-        self.subject = Subject(session, self.form)
+        self.subject = Subject(session, self.form, self.tables)
         self.star = PresetButton(
             theme, self.form, session.out.resolve().parent / "presets", self.request
         )
@@ -94,6 +96,8 @@ class SetupPanel(QFrame):
         session, queue, buttons = self._session, self.queue, self.buttons
         self.picker.picked.connect(self._picked)
         self.form.changed.connect(self._form_changed)
+        self.tables.changed.connect(self._form_changed)
+        session.bench.ready.connect(self.subject.follow_bench)
         self.subject.changed.connect(self._show_subject)
         self.star.failed.connect(self._show_problem)
         buttons.run.clicked.connect(self.start)
@@ -135,8 +139,8 @@ class SetupPanel(QFrame):
     def plan_now(self) -> None:
         """Have the form's run planned."""
         self._timer.stop()
-        if self.form.problem:
-            self._show_problem(self.form.problem)
+        if self._mistake:
+            self._show_problem(self._mistake)
             return
         try:
             self._session.plan.make(self.request())
@@ -228,7 +232,12 @@ class SetupPanel(QFrame):
     @property
     def _unusable(self) -> str:
         """Why the form cannot be used, "" if it can."""
-        return self.form.problem or self._session.plan.problem
+        return self._mistake or self._session.plan.problem
+
+    @property
+    def _mistake(self) -> str:
+        """Why what stands in the fields cannot be used, "" if it can."""
+        return self.form.problem or self.tables.problem
 
     def _blocked(self) -> str:
         """Why a run cannot start now, "" if it can."""
@@ -273,7 +282,7 @@ class SetupPanel(QFrame):
 
     def _form_changed(self) -> None:
         self._once_planned, self.subject.lost = None, ""
-        self._show_problem(self.form.problem)
+        self._show_problem(self._mistake)
         self._timer.start()
         self.render_snapshot(self._snapshot)
 
@@ -295,13 +304,13 @@ class SetupPanel(QFrame):
 
     def _shows_run_in_progress(self) -> bool:
         """Whether the form holds what the run in progress was asked to do."""
-        if self.subject.edited is not None or self.form.problem:
+        if self.subject.edited is not None or self._mistake:
             return False
         return self.request() == self._session.run.request
 
     def _picked(self, scene: str) -> None:
         try:
-            self.open_scene(scene)
+            self.subject.pick(scene)
         except TactileLabError as error:
             self._show_problem(str(error))
 
@@ -320,8 +329,9 @@ class SetupPanel(QFrame):
         axes = label("mN against s", "small")
         caption = row(label("WAVEFORM", "section"), STRETCH, axes, spacing=6)
         inner, title = QWidget(), label("PARAMETERS", "section")
-        shown = (self.about, caption, self.preview, title, self.form, self.warnings)
-        inside = column(inner, *shown, STRETCH, spacing=9)
+        force = (self.about, caption, self.preview)
+        asked = (title, self.form, self.tables, self.warnings)
+        inside = column(inner, *force, *asked, STRETCH, spacing=9)
         return with_gutter(scrolling(inner), inside)
 
     def _lay_out(self) -> None:

@@ -12,7 +12,7 @@ from enum import Enum
 from functools import cached_property
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, PydanticUserError, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from tactile_lab.complaint import reason
@@ -29,6 +29,7 @@ class Kind(Enum):
     SWITCH = "switch"
     CHOICE = "choice"
     FILE = "file"
+    NAMES = "names"
     TEXT = "text"
     OTHER = "other"
 
@@ -51,6 +52,7 @@ class FormField:
         unit: of a quantity or of each of several; None otherwise.
         optional: whether it may be left out.
         choices: of a choice.
+        about: what it is, where its type does not say.
     """
 
     key: str
@@ -59,12 +61,15 @@ class FormField:
     unit: Unit | None
     optional: bool
     choices: tuple[str, ...] = ()
+    about: str = ""
 
     @property
     def title(self) -> str:
-        """The key as a person reads it."""
+        """The key as a person reads it; a symbol such as V_GS or g31 stays one."""
+        if len(self.key) < 3 or self.key[0].isupper() or self.key[-1].isdigit():
+            return self.key
         words = self.key.replace("_", " ")
-        return words if words[:1].isupper() else words[:1].upper() + words[1:]
+        return words[:1].upper() + words[1:]
 
     @property
     def required(self) -> bool:
@@ -82,7 +87,10 @@ class FormField:
     def help(self) -> str:
         """What it is and what is allowed, for a person."""
         limits = self.unit.limits() if self.unit is not None else ""
-        parts = [self.info.description, f"Allowed: {limits}." if limits else ""]
+        parts = [
+            self.info.description or self.about,
+            f"Allowed: {limits}." if limits else "",
+        ]
         default = text_of(self, self.default)
         parts.append(f"Default: {default}." if default else "")
         return " ".join(part for part in parts if part)
@@ -93,16 +101,21 @@ class FormField:
         kind: Any = self.info.annotation
         for constraint in self.info.metadata:
             kind = Annotated[kind, constraint]
-        return TypeAdapter(kind, config=ConfigDict(strict=True))
+        try:
+            return TypeAdapter(kind, config=ConfigDict(strict=True))
+        except PydanticUserError:  # a table within the table: it has its own
+            return TypeAdapter(kind)
 
 
-def parameter(key: str, info: FieldInfo) -> FormField:
-    """The parameter that a field of a table describes."""
+def parameter(key: str, info: FieldInfo, about: str = "") -> FormField:
+    """The parameter that a field of a table describes; `about` says what it is."""
     inner, optional, units = _taken_apart(info.annotation)
     units += [entry for entry in info.metadata if isinstance(entry, Unit)]
     choices: tuple[str, ...] = ()
     if get_origin(inner) is tuple and (items := _taken_apart(get_args(inner)[0])[2]):
         kind, units = Kind.QUANTITIES, items
+    elif get_origin(inner) is tuple and _taken_apart(get_args(inner)[0])[0] is str:
+        kind = Kind.NAMES
     elif units:
         kind = Kind.QUANTITY if units[0].symbol else Kind.NUMBER
     elif get_origin(inner) is Literal:
@@ -111,7 +124,9 @@ def parameter(key: str, info: FieldInfo) -> FormField:
         kind = Kind.FILE
     else:
         kind = PLAIN.get(inner, Kind.OTHER)
-    return FormField(key, info, kind, units[0] if units else None, optional, choices)
+    unit = units[0] if units else None
+    about = about[:1].upper() + about[1:]
+    return FormField(key, info, kind, unit, optional, choices, about)
 
 
 def _taken_apart(kind: Any) -> tuple[Any, bool, list[Unit]]:
@@ -138,6 +153,8 @@ def text_of(parameter: FormField, value: Any) -> str:
         return exact(float(value), unit.symbol)
     if parameter.kind is Kind.QUANTITIES and unit is not None:
         return listed([float(v) for v in value], unit.symbol)
+    if parameter.kind is Kind.NAMES:
+        return ", ".join(value)
     if parameter.kind is Kind.OTHER:
         return toml(parameter.type.dump_python(value))
     return str(value)
@@ -162,10 +179,12 @@ def entry_of(parameter: FormField, text: str) -> str | None:
         FieldError: the text cannot be used; says what is allowed.
     """
     text = text.strip()
-    if not text:
-        if parameter.optional or not parameter.required:
-            return None
+    if not text and parameter.required:
         raise FieldError(f"{parameter.title} must be given.")
+    if not text and not parameter.optional:
+        text = text_of(parameter, parameter.default)  # which the field shows in grey
+    if not text:
+        return None
     if parameter.kind is Kind.OTHER:
         return text
     value = _value(parameter, text)
@@ -189,6 +208,8 @@ def _value(parameter: FormField, text: str) -> Any:
             parts = [one for one in parts if one] or [""]
             shared = parts[-1].partition(" ")[2].strip() or symbol
             return tuple(_quantity(one, shared) for one in parts if one)
+        case Kind.NAMES:
+            return tuple(text.replace(",", " ").split())
         case Kind.SWITCH:
             return text == "True"
         case Kind.INTEGER | Kind.NUMBER as kind:

@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, Signal
 from gui.session.queue import Queued
 from gui.session.session import Session
 from gui.setup.form import Form
+from gui.setup.sections import TITLES, Sections
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.load import load
@@ -24,6 +25,8 @@ class Kept:
     path: str | None
     protocol: type[Protocol] | None
     texts: dict[str, str]
+    usual: Scene | None
+    tables: dict[str, dict[str, str]]
 
 
 class Subject(QObject):
@@ -36,14 +39,16 @@ class Subject(QObject):
 
     changed = Signal()
 
-    def __init__(self, session: Session, form: Form) -> None:
+    def __init__(self, session: Session, form: Form, tables: Sections) -> None:
         super().__init__(form)
         self.edited: Queued | None = None
         self.lost = ""
         self.path: str | None = None
-        self._session, self._form = session, form
-        self._before = Kept(None, None, {})
-        self._taken_up: dict[str, str] = {}
+        self._session, self._form, self._tables = session, form, tables
+        self._usual: Scene | None = None
+        self._before = Kept(None, None, {}, None, {})
+        self._taken_up: object = None
+        self._typed: dict[str, dict[str, str]] = {}
         session.queue.changed.connect(self._mind_queue)
 
     def open(self, path: str | None, overrides: tuple[str, ...] = ()) -> None:
@@ -52,11 +57,36 @@ class Subject(QObject):
         Raises:
             SceneError: it cannot be used.
         """
+        self._remember()
         scene = load(None if path is None else Path(path), overrides)
         given_up = self.edited if self.touched else None
         self.edited = None
         words = "" if given_up is None else f"{given_up.title} waits unchanged."
         self._fill(path, scene, words)
+
+    def pick(self, path: str) -> None:
+        """Fill the form with a protocol's ready scene, and what was typed there last.
+
+        Raises:
+            SceneError: it cannot be used.
+        """
+        self.open(path)
+        kind = self._form.protocol
+        if kind is not None and kind.name in self._typed:
+            self._form.propose(self._typed[kind.name])
+
+    def follow_bench(self) -> None:
+        """Another bench is connected: its limits and voltages are the usual ones."""
+        if self.edited is None and self._usual is not None:
+            texts = self._tables.texts()
+            before = {
+                name: {key: texts[name][key] for key in form.changed_texts()}
+                for name, form in self._tables.forms()
+            }
+            scene = self._on_bench(self.path)
+            self._tables.show_scene(scene, scene)
+            self._tables.set_texts(before)
+            self._usual = scene
 
     def request(self) -> Request:
         """What the form asks for; of a queued run only the parameters are replaced.
@@ -64,18 +94,40 @@ class Subject(QObject):
         Raises:
             FieldError: a field cannot be used.
         """
-        session, texts = self._session, self._form.overrides()
+        session = self._session
+        texts = [*self._form.overrides(), *self._tables.overrides()]
         if self.edited is None:
             overrides = (*texts, *session.bench.overrides)
             return Request(self.path, overrides, session.bench.choice)
         asked = self.edited.request
-        rest = [text for text in asked.overrides if not text.startswith("protocol.")]
+        own = ("protocol.", *(f"{name}." for name in TITLES))
+        rest = [text for text in asked.overrides if not text.startswith(own)]
         return Request(asked.path, (*texts, *rest), asked.bench)
 
     @property
     def touched(self) -> bool:
         """Whether the edited run's parameters were changed in the form."""
-        return self.edited is not None and self._form.texts() != self._taken_up
+        return self.edited is not None and self._all_texts() != self._taken_up
+
+    def _all_texts(self) -> object:
+        return self._form.texts(), self._tables.texts()
+
+    def _remember(self) -> None:
+        """Keep what was typed for when its protocol is picked again."""
+        kind = self._form.protocol
+        if kind is not None and self.edited is None:
+            self._typed.pop(kind.name, None)
+            if self._form.undo.count():
+                self._typed[kind.name] = self._form.texts()
+
+    def _on_bench(self, path: str | None) -> Scene:
+        """A scene as it is on the connected bench, or as it is where it cannot be."""
+        session = self._session
+        try:
+            overrides = session.bench.overrides
+            return Request(path, overrides, session.bench.choice).load()
+        except (TactileLabError, OSError):
+            return load(None if path is None else Path(path))
 
     def words(self, *, busy: bool, shown: bool) -> str:
         """What the form is about; "" where it simply holds the next run's parameters.
@@ -105,11 +157,16 @@ class Subject(QObject):
         except (TactileLabError, OSError) as error:
             return f"{item.title} cannot be edited: {error}"
         if self.edited is None:
-            texts = self._form.texts()
-            self._before = Kept(self.path, self._form.protocol, texts)
+            self._before = Kept(
+                self.path,
+                self._form.protocol,
+                self._form.texts(),
+                self._usual,
+                self._tables.texts(),
+            )
         self.edited = item
         self._fill(item.request.path, scene)
-        self._taken_up = self._form.texts()
+        self._taken_up = self._all_texts()
         return ""
 
     def leave(self) -> None:
@@ -121,6 +178,10 @@ class Subject(QObject):
         if before.protocol is not None:
             self._form.show_protocol(before.protocol, {})
             self._form.set_texts(before.texts)
+        if before.usual is not None:
+            self._usual = before.usual
+            self._tables.show_scene(before.usual, before.usual)
+            self._tables.set_texts(before.tables)
         self.changed.emit()
 
     def _fill(self, path: str | None, scene: Scene, lost: str = "") -> None:
@@ -128,6 +189,9 @@ class Subject(QObject):
         kind = type(scene.protocol)
         values = {key: getattr(scene.protocol, key) for key in kind.model_fields}
         self._form.show_protocol(kind, values)
+        self._usual = self._on_bench(path)
+        own = self._usual if self.edited is None else scene
+        self._tables.show_scene(own, self._usual)
         self.lost = lost
         self.changed.emit()
 
