@@ -34,6 +34,14 @@ class Lag:
     coil: float = 0.0
     eddy: float = 0.0
 
+    @property
+    def drawn(self) -> float:
+        """By how much the straight pieces of an answer come too late at most, s.
+
+        Two thirds of `FINE` for as long as a step's answer bends, some 30 lags.
+        """
+        return 20 * FINE * (self.coil + self.eddy)
+
     def follow(
         self, wave: Waveform, before: tuple[float, float] | None = None
     ) -> tuple[Waveform, tuple[float, float]]:

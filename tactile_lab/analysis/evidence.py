@@ -9,12 +9,14 @@ number of spikes jumps.
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C
 from tactile_lab.model.simulate import simulate
@@ -50,7 +52,7 @@ class Residuals:
         short = np.diff(times) <= LONGEST
         self._earlier, self._later = times[:-1][short], times[1:][short]
         self.bins = 0 if V_C1 is None else int(V_C1.time.size)
-        self.offset = 0.0 if V_C1 is None else V_C1.resolution
+        self.offset = 0.0 if V_C1 is None else math.hypot(V_C1.resolution, V_C1.offset)
         self.size = self.bins + self._earlier.size
         self._grids = [
             np.linspace(a, b, max(8, int((b - a) / STEP)) | 1)
@@ -75,9 +77,13 @@ class Residuals:
             return self._circuit.reset_voltage
         return float(getattr(self._circuit, name))
 
-    def residual(self, x: FloatArray, force: Waveform | None = None) -> FloatArray:
-        """All residuals, V, under `force`: those of V_C1, then those at firing."""
-        circuit, force = self.circuit(x), force or self._force
+    def residual(self, x: FloatArray) -> FloatArray:
+        """All residuals at scaled parameters `x`, V."""
+        return self.under(DrivenCircuit(self.circuit(x), self._force))
+
+    def under(self, driven: DrivenCircuit) -> FloatArray:
+        """All residuals of a circuit and its force, V: of V_C1, then at firing."""
+        circuit, force = driven
         found = simulate(
             circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
         )

@@ -5,17 +5,18 @@ What it is fitted to: `tactile_lab.analysis.evidence`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, scatter
-from tactile_lab.analysis.spike_pairs import PART
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import PARAMETERS, Circuit
 from tactile_lab.waveform import Waveform
@@ -62,7 +63,7 @@ def identify(
     *,
     V_C1: Measured | None = None,
     spike_times: FloatArray | None = None,
-    displaced: Sequence[Waveform] = (),
+    displaced: Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]] = lambda _: (),
 ) -> Identified:
     """Fit the parameters `names`, starting from those of `circuit`.
 
@@ -74,11 +75,11 @@ def identify(
         V_C1: measured, decimated; its bins must be independent. Its resolution is taken
             for what the channel's offset is known to.
         spike_times: detected spikes, s.
-        displaced: the force moved by `twin.PART` of its 95 % band, one for each
-            independent cause of its uncertainty.
+        displaced: what a circuit and its force become if either is moved by `PART` of
+            its 95 % band, for each independent cause of uncertainty.
 
     Intervals hold the scatter of the data, and what the offset of V_C1 and each
-    displaced force would move the estimate by.
+    cause of uncertainty would move the estimate by.
 
     Raises:
         ParameterError: an unknown parameter, or an option.
@@ -125,11 +126,14 @@ _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
 def _systematic(
-    problem: Residuals, x: FloatArray, displaced: Sequence[Waveform]
+    problem: Residuals,
+    x: FloatArray,
+    displaced: Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]],
 ) -> list[FloatArray]:
     """Half of the 95 % band each systematic cause gives all residuals, V."""
     here = problem.residual(x)
-    causes = [(problem.residual(x, f) - here) / PART for f in displaced]
+    moved = displaced(problem.circuit(x))
+    causes = [(problem.under(driven) - here) / PART for _, driven in moved]
     if problem.bins and problem.offset:
         shifted = np.zeros(problem.size)
         shifted[: problem.bins] = problem.offset

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_lab.analysis.belief import PART
 from tactile_lab.quantity import printed
 
 FloatArray = NDArray[np.float64]
@@ -16,9 +18,6 @@ WITHIN = 0.5
 """A spike may lie off its expected place by this part of the interval around it."""
 SILENCE = 3.0
 """A gap so many times longer than the interval before begins a new burst."""
-PART = 0.05
-"""Of the force's band by which it is moved: so little that each spike is known again;
-what it does is taken to grow in proportion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +32,9 @@ class Matched:
         rate_error: shape (j,), relative error of 1/ISI where two neighbours on both
             sides are paired: measured over predicted less 1.
         rated: shape (j,), times of the later of those neighbours, s.
-        tolerance: shape (k,), s: what the clocks and the uncertainty of the force leave
-            open, either sign; not a number where another force has no such spike.
-        rate_tolerance: shape (j,), the same for the rate error.
+        open: shape (k,) each, s: what each cause of uncertainty leaves open, either
+            sign, by its name; not a number where it has no such spike.
+        rate_tolerance: shape (j,): what all of them leave open of the rate error.
     """
 
     measured: FloatArray
@@ -44,8 +43,22 @@ class Matched:
     extra: int
     rate_error: FloatArray
     rated: FloatArray
-    tolerance: FloatArray
+    open: Mapping[str, FloatArray]
     rate_tolerance: FloatArray
+
+    @property
+    def tolerance(self) -> FloatArray:
+        """Shape (k,), s: what all causes leave open together, either sign."""
+        return together(self.open, self.offsets.size)
+
+    @property
+    def scatter(self) -> float:
+        """How irregularly measured spikes lie about the predicted ones, 95 %, s.
+
+        From second differences of the offsets, which no slow drift of them enters; not
+        a number with less than three pairs.
+        """
+        return irregularity(self.offsets)
 
     @property
     def within(self) -> float:
@@ -74,8 +87,7 @@ class Matched:
 def match(
     measured: ArrayLike,
     predicted: ArrayLike,
-    displaced: Sequence[ArrayLike] = (),
-    clock: float = 0.0,
+    displaced: Sequence[tuple[str, ArrayLike]] = (),
 ) -> Matched:
     """Pair spikes in order, each where the pair before lets expect it.
 
@@ -87,16 +99,15 @@ def match(
     Args:
         measured: s, ascending.
         predicted: s, ascending.
-        displaced: predicted under forces moved by `PART` of their band, for the
-            tolerance.
-        clock: how far measured times may lie from the force's, s.
+        displaced: by name of a cause of uncertainty, what is predicted where it is
+            moved by `PART` of its band.
     """
     ours = np.asarray(measured, dtype=np.float64)
     theirs = np.asarray(predicted, dtype=np.float64)
     if ours.size == 0 or theirs.size == 0:
         nothing = np.empty(0)
         return Matched(
-            nothing, nothing, theirs.size, ours.size, *(nothing for _ in range(4))
+            nothing, nothing, theirs.size, ours.size, nothing, nothing, {}, nothing
         )
     to_theirs = _followed(ours, theirs)
     paired = to_theirs >= 0
@@ -104,10 +115,11 @@ def match(
     index = np.flatnonzero(paired)
     both = paired[1:] & paired[:-1] & (np.diff(to_theirs) == 1)
     rate_error = np.diff(theirs[to_theirs])[both] / np.diff(ours)[both] - 1
-    shifts = [_shift(theirs, np.asarray(d, np.float64)) for d in displaced]
-    spread = np.sqrt(sum((s**2 for s in shifts), np.full(theirs.size, clock**2)))
+    shifts = [
+        (name, _shift(theirs, np.asarray(d, np.float64))) for name, d in displaced
+    ]
     bend = sum(
-        ((np.diff(s) / np.diff(theirs)) ** 2 for s in shifts),
+        ((np.diff(s) / np.diff(theirs)) ** 2 for _, s in shifts),
         np.zeros(max(theirs.size - 1, 0)),
     )
     return Matched(
@@ -117,9 +129,31 @@ def match(
         int(ours.size - index.size),
         rate_error,
         ours[1:][both],
-        spread[to_theirs[index]],
+        by_cause((name, shift[to_theirs[index]]) for name, shift in shifts),
         np.sqrt(bend)[to_theirs[:-1][both]],
     )
+
+
+def by_cause(parts: Iterable[tuple[str, FloatArray]]) -> dict[str, FloatArray]:
+    """Independent parts of an uncertainty, those of one cause put together."""
+    squares: dict[str, FloatArray] = {}
+    for name, part in parts:
+        squares[name] = squares.get(name, 0.0) + part**2
+    return {name: np.sqrt(square) for name, square in squares.items()}
+
+
+def together(parts: Mapping[str, FloatArray], size: int) -> FloatArray:
+    """Independent parts of an uncertainty as one, shape (size,)."""
+    return np.sqrt(sum((part**2 for part in parts.values()), np.zeros(size)))
+
+
+def irregularity(values: FloatArray) -> float:
+    """Half-width that holds 95 % of the scatter of `values` about a smooth course."""
+    if values.size < 3:
+        return float("nan")
+    bends = np.abs(values[2:] - 2 * values[1:-1] + values[:-2])
+    # of Gaussian noise: the median is 0.6745 sigma, a second difference sqrt(6) of it
+    return 1.96 * float(np.nanmedian(bends)) / 0.6745 / math.sqrt(6)
 
 
 def _shift(spikes: FloatArray, displaced: FloatArray) -> FloatArray:

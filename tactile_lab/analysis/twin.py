@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.analysis.spike_pairs import PART, Matched, match
+from tactile_lab.analysis.belief import PART
+from tactile_lab.analysis.spike_pairs import Matched, by_cause, match, together
+from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
@@ -27,12 +29,14 @@ class Measured:
         time: shape (n,), middle of each bin, s.
         value: shape (n,), mean of each bin, V.
         resolution: one code of the channel, V; what its mean may be off by.
+        offset: half of the 95 % band of its follower's offset, V.
     """
 
     signal: str
     time: FloatArray
     value: FloatArray
     resolution: float = 0.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +48,20 @@ class Residual:
         time: shape (n,), s.
         predicted: shape (n,), V.
         difference: shape (n,), V; not a number where a spike falls into the bin.
-        tolerance: shape (n,), V: what the channel's resolution and the uncertainty of
-            the force leave open, either sign.
+        open: shape (n,) each, V: what each cause of uncertainty leaves open, either
+            sign, by its name.
     """
 
     signal: str
     time: FloatArray
     predicted: FloatArray
     difference: FloatArray
-    tolerance: FloatArray
+    open: Mapping[str, FloatArray]
+
+    @property
+    def tolerance(self) -> FloatArray:
+        """Shape (n,), V: what all causes leave open together, either sign."""
+        return together(self.open, self.time.size)
 
     @property
     def within(self) -> float:
@@ -112,8 +121,7 @@ def twin(
     spike_times: ArrayLike | None = None,
     pauses: Sequence[tuple[float, float]] = (),
     start: Start | None = None,
-    displaced: Sequence[Waveform] = (),
-    clock: float = 0.0,
+    displaced: Sequence[tuple[str, DrivenCircuit]] = (),
 ) -> Twin:
     """Run the model beside measured data.
 
@@ -127,9 +135,9 @@ def twin(
         pauses: (start, end) in which nothing was streamed, s: spikes the model has
             there are not missed.
         start: voltages at time 0; equilibrium if None.
-        displaced: the force moved by `PART` of its 95 % band, one for each independent
-            cause of its uncertainty: what the model makes of them is the tolerance.
-        clock: how far spike times may lie from the force's, s.
+        displaced: circuit and force moved by `PART` of the 95 % band of each
+            independent cause of uncertainty, and its name: what the model makes of
+            them is the tolerance.
 
     Raises:
         ParameterError: nothing to compare with, or times beyond the run.
@@ -140,22 +148,22 @@ def twin(
     if not keep:
         raise ParameterError("A twin needs a measured voltage or spikes to compare.")
     result, *others = (
-        simulate(circuit, each, keep=tuple(keep), until=duration, start=start)
-        for each in (force, *displaced)
+        simulate(*each, keep=tuple(keep), until=duration, start=start)
+        for each in (DrivenCircuit(circuit, force), *(moved for _, moved in displaced))
     )
+    causes = [(name, other) for (name, _), other in zip(displaced, others, strict=True)]
     predicted = result.spike_times
     matched = None
     if spike_times is not None and predicted is not None:
         matched = match(
             spike_times,
             _streamed(predicted, pauses),
-            [_streamed(o.spike_times, pauses) for o in others],
-            clock,
+            [(name, _streamed(o.spike_times, pauses)) for name, o in causes],
         )
     measured_spikes = np.empty(0) if spike_times is None else np.asarray(spike_times)
     jumps = measured_spikes if predicted is None else np.r_[measured_spikes, predicted]
     residuals = tuple(
-        _residual(result, others, trace, np.sort(jumps)) for trace in voltages
+        _residual(result, causes, trace, np.sort(jumps)) for trace in voltages
     )
     return Twin(result, residuals, matched)
 
@@ -171,7 +179,10 @@ def _streamed(
 
 
 def _residual(
-    result: Result, others: Sequence[Result], trace: Measured, jumps: FloatArray
+    result: Result,
+    causes: Sequence[tuple[str, Result]],
+    trace: Measured,
+    jumps: FloatArray,
 ) -> Residual:
     inside = (trace.time >= 0) & (trace.time <= result.duration)
     time, value = trace.time[inside], trace.value[inside]
@@ -183,7 +194,15 @@ def _residual(
         near = np.minimum(after, jumps.size - 1)
         hit = (after < jumps.size) & (jumps[near] <= time + half)
         difference = np.where(hit, np.nan, difference)
-    square = np.full(time.size, trace.resolution**2)
-    for other in others:
-        square += ((other.sample(trace.signal, time) - predicted) / PART) ** 2
-    return Residual(trace.signal, time, predicted, difference, np.sqrt(square))
+    moved = (
+        (name, (other.sample(trace.signal, time) - predicted) / PART)
+        for name, other in causes
+    )
+    channel = (
+        (name, np.full(time.size, volts))
+        for name, volts in (("follower", trace.offset), ("codes", trace.resolution))
+        if volts > 0
+    )
+    return Residual(
+        trace.signal, time, predicted, difference, by_cause((*channel, *moved))
+    )

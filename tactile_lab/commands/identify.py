@@ -41,8 +41,8 @@ def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
     if found.scatter_V_C1 is not None:
         say(
             f"V_C1 is left with {found.scatter_V_C1 * 1e3:.2g} mV of scatter. The "
-            "intervals hold noise, one code of offset of its channel, and what the "
-            "bench states of the force's uncertainty."
+            "intervals hold noise, one code of offset of its channel, the clocks, and "
+            "what the bench states of followers, lag and force."
         )
     for text in found.warnings:
         warn(text)

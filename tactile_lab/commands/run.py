@@ -303,6 +303,11 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
             f"{done.duration:.1f} s of experiment in {took:.1f} s "
             f"({done.took:.1f} s of it running)."
         )
+        beside = report.findings.beside
+        if beside is not None:
+            say(beside.budget_line)
+            if beside.explanation is not None:
+                say(f"The model misses by more than that. {beside.explanation.text}")
         if run.accuracy:
             say(run.accuracy)
         if run.loss is not None:

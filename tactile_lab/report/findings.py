@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tactile_lab.analysis.twin import Twin
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import TactileLabError
 from tactile_lab.measurement import RecordedSignal
@@ -16,7 +15,7 @@ from tactile_lab.report.drift import drift_plot
 from tactile_lab.report.overview import overview
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import stretches
-from tactile_lab.report.twin import twin_plot, with_twin
+from tactile_lab.report.twin import BesideModel, twin_plot, with_twin
 from tactile_lab.stimulus.force import force_at_zero
 
 
@@ -31,7 +30,7 @@ class Findings:
         missing: what could not be told, and why, one sentence each.
         conclusion: what the protocol was run for.
         answers: the protocol's own plots.
-        twin: the model beside the run, or None.
+        beside: the model beside the run, or None.
     """
 
     run: RunData
@@ -39,7 +38,7 @@ class Findings:
     missing: tuple[str, ...]
     conclusion: Conclusion
     answers: tuple[Plot, ...]
-    twin: Twin | None
+    beside: BesideModel | None
 
     @property
     def plots(self) -> tuple[Plot, ...]:
@@ -47,7 +46,8 @@ class Findings:
         general = () if any(p.name == "figure" for p in self.answers) else (
             overview(self.run),
         )  # fmt: skip
-        twin = None if self.twin is None else twin_plot(self.run, self.twin)
+        beside = self.beside
+        twin = None if beside is None else twin_plot(self.run, beside.twin)
         further = (p for p in (twin, drift_plot(self.run)) if p is not None)
         return (*self.answers, *general, *further)
 
@@ -60,14 +60,14 @@ def find(run: RunData) -> Findings:
     """
     notes: tuple[str, ...] = ()
     missing: list[str] = []
-    twin = None
+    beside = None
     if not run.protocol.moves_probes:
         try:
             run, notes = _with_drain_current(run)
         except TactileLabError as reason:
             missing.append(f"No I_DS: {reason}")
         try:
-            run, twin = with_twin(run)
+            run, beside = with_twin(run)
         except TactileLabError as reason:
             missing.append(f"No model beside the run: {reason}")
     # a trial that was cut short is told and drawn, but nothing is concluded from it
@@ -90,7 +90,7 @@ def find(run: RunData) -> Findings:
         missing=(*conclusion.missing, *missing),
         conclusion=conclusion,
         answers=answers,
-        twin=twin,
+        beside=beside,
     )
 
 

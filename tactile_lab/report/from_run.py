@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
 from pathlib import Path
@@ -10,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.analysis.belief import Belief
 from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.quantity import show
 from tactile_lab.report.driven import told
@@ -20,6 +23,7 @@ from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.store.applied import held
 from tactile_lab.store.overrange import overrange
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.remarks import read_remarks
@@ -68,6 +72,7 @@ def read(folder: Path) -> RunData:
             newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
             traces=_traces(run),
             circuit=scene.circuit,
+            belief=_belief(run, scene),
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
             asks_I_DS="I_DS" in scene.record.signals,
@@ -86,6 +91,26 @@ def read(folder: Path) -> RunData:
             conditions=_conditions(info) | _said(run.path),
             environment=info.get("environment") or {},
         )
+
+
+def _belief(run: Run, scene: Scene) -> Belief | None:
+    """What is believed of sensor and bench; the clocks by what timed the current."""
+    applied = run.applied
+    if not len(applied.steps):
+        return None
+    clock = applied.uncertainty
+    if clock is None:
+        known = run.records("segments")["uncertainty"]
+        clock = float(np.nanmax(known, initial=0.0))
+        if scene.bench.coil is not None:  # it acted within one update before it told
+            clock = math.hypot(clock, coil_capability(scene.bench.coil).update_interval)
+    return Belief(
+        circuit=scene.circuit,
+        magnet=scene.bench.magnet,
+        setpoint=held(applied.steps, run.duration),
+        followers=scene.bench.followers,
+        clock=clock,
+    )
 
 
 def _conditions(info: Mapping[str, Any]) -> dict[str, str]:

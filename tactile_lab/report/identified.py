@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.identify import Identified, identify
-from tactile_lab.analysis.twin import Measured
+from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.measurement import Measurement
-from tactile_lab.report.twin import displaced
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.report.run_data import RunData
+from tactile_lab.report.twin import measured
 from tactile_lab.waveform import Waveform
 
 LAG = 0.03
-"""Time after a step of the current until the field has followed, s: the coil's L/R and
-the core's eddy currents, which the model does not know, last some milliseconds."""
+"""Time after a step of the current until the field has followed, s, where the bench
+file does not say how it lags: L/R and eddy currents last some milliseconds."""
 
 
-def identify_run(run: Measurement, names: Sequence[str]) -> Identified:
+def identify_run(run: RunData, names: Sequence[str]) -> Identified:
     """Fit the parameters `names` to V_C1 and the spikes of a run.
 
     Raises:
@@ -27,25 +29,36 @@ def identify_run(run: Measurement, names: Sequence[str]) -> Identified:
         ParameterError: an unknown parameter.
     """
     trace = run.trace("V_C1")
-    if run.circuit is None or (trace is None and not run.searched):
+    if (
+        run.circuit is None
+        or run.belief is None
+        or (trace is None and not run.searched)
+    ):
         raise NotIdentifiableError(
             "the run has neither V_C1 nor spikes; record V_C1 or V_K"
         )
+    believed = run.belief
     spikes = run.spike_times
     seen = None
     if trace is not None:
-        inside = (trace.time >= 0) & (trace.time <= run.duration)
-        inside &= settled(run.force, trace.time) & trace.within_range
-        code = trace.code or 0.0
-        seen = Measured("V_C1", trace.time[inside], trace.mean[inside], code)
+        seen = measured(run, believed, trace)
+        if believed.magnet.lag_uncertainty is None:
+            inside = settled(run.force, seen.time)
+            seen = replace(seen, time=seen.time[inside], value=seen.value[inside])
+
+    def displaced(circuit: Circuit) -> Iterator[tuple[str, DrivenCircuit]]:
+        for name, driven in replace(believed, circuit=circuit).displaced():
+            if not (name == "follower" and "I_bias" in names):
+                yield name, driven
+
     return identify(
-        run.circuit,
+        believed.circuit,
         names,
-        run.force,
+        believed.force,
         run.duration,
         V_C1=seen,
         spike_times=spikes[spikes <= run.duration] if run.searched else None,
-        displaced=displaced(run),
+        displaced=displaced,
     )
 
 

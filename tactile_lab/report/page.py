@@ -43,7 +43,7 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
         pictures: each plot with its SVG text as matplotlib wrote it in the light
             palette.
     """
-    run, twin = findings.run, findings.twin
+    run, beside = findings.run, findings.beside
     drawn = {plot.name: _picture(run, plot, svg) for plot, svg in pictures}
     kept = Environment(
         loader=PackageLoader("tactile_lab", "report"),
@@ -66,7 +66,8 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
         twin=drawn.pop("twin", None),
         drift=drawn.pop("drift", None),
         answers=tuple(drawn.values()),
-        beside=() if twin is None else sentences(run, twin),
+        beside=() if beside is None else sentences(beside),
+        budget="" if beside is None else beside.budget_line,
         drift_said=(said,) if said else (),
         certificate=_certificate(run),
         settings=_settings(run),

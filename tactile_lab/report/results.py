@@ -13,6 +13,7 @@ from tactile_lab.analysis.twin import Twin
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.report.findings import Findings
 from tactile_lab.report.run_data import RunData
+from tactile_lab.report.twin import to_dict
 
 SCHEMA = 1
 
@@ -60,7 +61,9 @@ def results(findings: Findings) -> dict[str, Any]:
         "statements": list(findings.conclusion.sentences),
         "tables": [asdict(table) for table in findings.conclusion.tables],
         "plots": [plot.to_dict() for plot in findings.answers],
-        "twin": None if findings.twin is None else _twin(findings.twin),
+        "twin": None
+        if findings.beside is None
+        else {**_twin(findings.beside.twin), **to_dict(findings.beside)},
         "accuracy": run.accuracy or None,
         "notes": list(findings.notes),
         "missing": list(findings.missing),

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from tactile_lab.analysis.belief import Belief
 from tactile_lab.measurement import Measurement
 from tactile_lab.model.state import Start
 from tactile_lab.trial import Protocol
@@ -53,6 +54,8 @@ class RunData(Measurement):
         run: name of the run's folder.
         status: "complete", "aborted", "faulted" or "recovered".
         took: wall time the run needed, s, or None.
+        belief: sensor and bench as they are believed to be, and how well; None where
+            the run has no current.
         start: voltages the circuit began with; None for the equilibrium.
         asks_I_DS: I_DS was asked for, and is derived from V_C1 where not measured.
         loss: counters, or None where nothing was acquired.
@@ -71,6 +74,7 @@ class RunData(Measurement):
     status: str
     scene: str = ""
     took: float | None = None
+    belief: Belief | None = None
     start: Start | None = None
     asks_I_DS: bool = True
     loss: Loss | None = None

@@ -2,23 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from tactile_lab.analysis.spike_pairs import PART, Matched
+from tactile_lab.analysis.belief import Belief
+from tactile_lab.analysis.error_budget import (
+    ErrorBudget,
+    V_C1_budget,
+    spike_time_budget,
+)
+from tactile_lab.analysis.spike_pairs import Matched
+from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
+from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import printed
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
-from tactile_lab.waveform import Waveform
+
+ENOUGH = 0.95
+"""Part of spikes and of V_C1 that a tolerance of 95 % should hold."""
 
 
-def with_twin(run: RunData) -> tuple[RunData, Twin | None]:
-    """The run with the model's V_C1 among its traces, and the twin behind it.
+@dataclass(frozen=True, eq=False)
+class BesideModel:
+    """The model beside a run, as a report tells of it.
+
+    Attributes:
+        twin: the comparison.
+        budgets: what each cause of uncertainty contributes, by what of.
+        explanation: what the usual suspects make of it where it misses; else None.
+    """
+
+    twin: Twin
+    budgets: Mapping[str, ErrorBudget]
+    explanation: Explanation | None
+
+    @property
+    def budget_line(self) -> str:
+        """The error budgets as one line; "" where nothing was compared."""
+        told = (f"{what} {budget.text}" for what, budget in self.budgets.items())
+        return f"Model (95 %): {'. '.join(told)}." if self.budgets else ""
+
+
+def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
+    """The run with the model's V_C1 among its traces, and the model beside it.
 
     The model is driven by the applied current's force. None where the run has no
     circuit, no applied current, or nothing to compare.
@@ -26,63 +58,101 @@ def with_twin(run: RunData) -> tuple[RunData, Twin | None]:
     Raises:
         SolverError: the model cannot follow this force.
     """
-    voltages = tuple(
-        Measured(name, trace.time[inside], trace.mean[inside], trace.code or 0.0)
-        for name in ("V_C1", "V_C2")
-        if (trace := run.trace(name)) and (inside := trace.within_range).any()
-    )
-    if run.circuit is None or run.current is None or not len(run.current):
+    believed = run.belief
+    if run.circuit is None or believed is None:
         return run, None
+    voltages = tuple(
+        measured(run, believed, trace)
+        for name in ("V_C1", "V_C2")
+        if (trace := run.trace(name)) and trace.within_range.any()
+    )
     if not voltages and not run.searched:
         return run, None
     pauses = [(t.start, t.start + t.duration) for t in run.trials if t.pause]
     found = twin(
-        run.circuit,
-        run.force,
+        believed.circuit,
+        believed.force,
         run.duration,
         voltages=voltages,
         spike_times=run.spike_times if run.searched else None,
         pauses=pauses,
         start=run.start,
-        displaced=displaced(run),
-        clock=max((t.clock_uncertainty or 0.0 for t in run.trials), default=0.0),
+        displaced=tuple(believed.displaced()),
+    )
+    budgets = {
+        "spike times": spike_time_budget(found, believed),
+        "V_C1": V_C1_budget(found, believed),
+    }
+    beside = BesideModel(
+        found,
+        {what: budget for what, budget in budgets.items() if budget is not None},
+        _explained(run, believed, found, voltages),
     )
     node_a = found.residual("V_C1")
     if node_a is None:
-        return run, found
+        return run, beside
     model = RecordedSignal(
         signal="V_C1", time=node_a.time, mean=node_a.predicted, source="model"
     )
-    return replace(run, traces=(*run.traces, model)), found
+    return replace(run, traces=(*run.traces, model)), beside
 
 
-def displaced(run: Measurement) -> list[Waveform]:
-    """The force moved a little by each cause of its uncertainty."""
-    known, force = run.force_uncertainty, run.force
-    if known is None:
-        return []
-    # at rest there is no force, by definition
-    pushed = np.where(force.value == 0, 0.0, PART * known.absolute)
-    moved = [
-        Waveform(force.time, force.value + pushed),
-        force.scaled(1 + PART * known.relative),
-    ]
-    causes = (known.absolute, known.relative)
-    return [w for w, size in zip(moved, causes, strict=True) if size > 0]
+def measured(run: RunData, believed: Belief, trace: RecordedSignal) -> Measured:
+    """A recorded voltage as compared: within the run, and within its input's range."""
+    inside = (trace.time >= 0) & (trace.time <= run.duration) & trace.within_range
+    time, mean = trace.time[inside], trace.mean[inside]
+    return Measured(trace.signal, time, mean, trace.code or 0.0, believed.offset)
 
 
-def sentences(run: Measurement, found: Twin) -> tuple[str, ...]:
+def _explained(
+    run: RunData, believed: Belief, found: Twin, voltages: Sequence[Measured]
+) -> Explanation | None:
+    """What explains a model that misses by more than its tolerance."""
+    node_a, spikes = found.residual("V_C1"), found.spikes
+    misses = node_a is not None and node_a.within < ENOUGH
+    if spikes is not None:
+        misses |= spikes.missed + spikes.extra > 0 or spikes.within < ENOUGH
+    if not misses or believed.circuit.saturation:
+        return None
+    try:
+        return explain(
+            believed,
+            run.duration,
+            V_C1=next((v for v in voltages if v.signal == "V_C1"), None),
+            spike_times=run.spike_times if run.searched else None,
+        )
+    except NotIdentifiableError:
+        return None
+
+
+def to_dict(beside: BesideModel) -> dict[str, Any]:
+    """The budgets and the explanation as plain values."""
+    explanation = beside.explanation
+    named = None if explanation is None else explanation.cause
+    return {
+        "error_budget_95": {
+            what: {"unit": budget.unit, "whole": budget.whole, **budget.parts}
+            for what, budget in beside.budgets.items()
+        },
+        "explanation": None
+        if explanation is None
+        else {
+            "cause": None if named is None else named.name,
+            "misfit": explanation.misfit,
+            "suspects": [
+                {"name": s.name, "size": s.size.to_dict(), "misfit": s.misfit}
+                for s in explanation.suspects
+            ],
+        },
+    }
+
+
+def sentences(beside: BesideModel) -> tuple[str, ...]:
     """What the twin says, for people."""
-    if run.force_uncertainty is None:
-        said = [
-            "Tolerance: what the scope's codes and the clocks leave open; no "
-            "uncertainty of the force is stated."
-        ]
-    else:
-        said = [
-            "Tolerance: what the scope's codes, the clocks and the force's uncertainty "
-            "leave open."
-        ]
+    found = beside.twin
+    said = [beside.budget_line] if beside.budgets else []
+    if beside.explanation is not None:
+        said.append(f"It misses by more than that. {beside.explanation.text}")
     for residual in found.residuals:
         shifted = (
             "; while it fires, spikes that come early or late make volts of difference"
@@ -127,10 +197,8 @@ def twin_plot(run: Measurement, twin: Twin) -> Plot | None:
         name="twin",
         title="measured less model",
         caption="Measured less model, the model driven by the applied current. "
-        f"{parts} Shaded: the tolerance, what the scope's codes, the clocks and the "
-        "stated uncertainty of the force leave open (95 %). Short peaks at steps of "
-        "the force are the field's lag behind the current, which the model does not "
-        "know.",
+        f"{parts} Shaded: the tolerance, what codes, clocks and what the bench "
+        "states of followers, lag, force and temperature leave open (95 %).",
         x_label="Time, recoveries left out at dotted lines" if axis.cuts else "Time",
         x_unit="s",
         x_prefix="",

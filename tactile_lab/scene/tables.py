@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationInfo
 
+from tactile_lab.deviation import Deviation
 from tactile_lab.errors import choices
 from tactile_lab.quantity import (
     Duration,
@@ -16,7 +17,6 @@ from tactile_lab.quantity import (
     Unit,
     parse,
 )
-from tactile_lab.scene.deviation import Deviation
 from tactile_lab.signals import SIGNALS
 from tactile_lab.table import SceneTable
 

@@ -51,6 +51,14 @@ class AppliedCurrent:
     edges: int
     lead: float
 
+    @property
+    def uncertainty(self) -> float | None:
+        """Half of the 95 % band of the steps' times against the samples, s.
+
+        A bin of the shunt; None where it told too few, and the clocks alone do.
+        """
+        return BIN_TIME if self.edges >= ENOUGH else None
+
 
 def applied_current(
     time: ArrayLike,

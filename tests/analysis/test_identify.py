@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.identify import identify
-from tactile_lab.analysis.spike_pairs import PART
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -85,8 +86,9 @@ def test_an_uncertain_force_and_offset_widen_the_intervals():
     def found(force=(), code=0.0):
         seen = replace(trace, resolution=code)
         return identify(
-            Circuit(), ("V_GS", "tau"), FORCE, FORCE.end, V_C1=seen, displaced=force
-        ).estimates
+            Circuit(), ("V_GS", "tau"), FORCE, FORCE.end, V_C1=seen,
+            displaced=lambda c: [("force", DrivenCircuit(c, f)) for f in force],
+        ).estimates  # fmt: skip
 
     noise, offset = found(), found(code=16e-3)
     assert offset["V_GS"].value == noise["V_GS"].value

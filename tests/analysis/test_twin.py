@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactile_lab.analysis.spike_pairs import PART, match
+from tactile_lab.analysis.belief import PART
+from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.analysis.twin import Measured, twin
+from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -79,7 +81,10 @@ def test_the_tolerance_is_what_another_force_within_its_band_would_do():
     there = Measured("V_C1", trace.time, found.sample("V_C1", trace.time), 1e-4)
     beside = twin(
         Circuit(), FORCE, FORCE.end, voltages=[there], spike_times=found.spike_times,
-        displaced=[FORCE.scaled(1 + 0.004 * PART)], clock=1e-4,
+        displaced=[
+            ("force", DrivenCircuit(Circuit(), FORCE.scaled(1 + 0.004 * PART))),
+            ("clocks", DrivenCircuit(Circuit(), FORCE.shifted(1e-4 * PART))),
+        ],
     )  # fmt: skip
     node_a = beside.residual("V_C1")
     assert node_a.tolerance.min() >= 1e-4

@@ -10,8 +10,9 @@ import pytest
 from protocols.calibrate_field import CalibrateField
 from protocols.force_check import ForceCheck
 from protocols.hold import Hold
+from tactile_lab.analysis.belief import Belief
 from tactile_lab.calibration import read_calibration
-from tactile_lab.magnetics import ForceUncertainty
+from tactile_lab.magnetics import ForceUncertainty, Magnet
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -28,6 +29,8 @@ from tactile_lab.waveform import Waveform
 
 NEWTONS_PER_AMPERE = 0.2
 LEVELS = (0.05, 0.1)
+
+MAGNET = Magnet(r=6e-3)
 
 
 def modelled(protocol, steps, *, circuit=None, bins=2000, parameters=None, **entries):
@@ -70,6 +73,9 @@ def modelled(protocol, steps, *, circuit=None, bins=2000, parameters=None, **ent
         "current": np.column_stack([force.time, force.value / NEWTONS_PER_AMPERE]),
         "traces": traces,
         "circuit": Circuit(),
+        "belief": Belief(
+            Circuit(), MAGNET, force.scaled(1 / MAGNET.newtons_per_ampere)
+        ),
     }
     return RunData(**{**plain, **entries})
 
@@ -319,7 +325,7 @@ def test_the_twin_is_reported(rate_force, tmp_path):
 
 
 def test_a_run_without_current_has_no_twin(rate_force):
-    assert find(replace(rate_force, current=None)).twin is None
+    assert find(replace(rate_force, belief=None)).beside is None
 
 
 def test_sine_sweep_gives_the_gain_of_small_forces():

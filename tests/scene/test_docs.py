@@ -8,10 +8,10 @@ import pytest
 
 from tactile_lab.cli import main
 from tactile_lab.complaint import known_keys
+from tactile_lab.deviation import Deviation
 from tactile_lab.model.state import Start
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.scene.bench_file import BenchSpec
-from tactile_lab.scene.deviation import Deviation
 from tactile_lab.scene.load import load, load_bench
 from tactile_lab.scene.sensor import Sensor
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated

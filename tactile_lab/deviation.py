@@ -1,23 +1,36 @@
-"""How the simulated world differs from what bench file and sensor say of it."""
+"""What is true of a bench and its sensor less what is believed of them.
+
+The simulated world takes one as its truth, the tolerance of the model beside a run as
+what the bench leaves open, and the search for what explains a misfit as its suspects.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
+from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.temperature import at_temperature, temperature
 from tactile_lab.quantity import Current, Unit, Voltage
 from tactile_lab.table import SceneTable
+from tactile_lab.waveform import Waveform
 
 Part = Annotated[float, Unit("", above=-1.0)]
 Later = Annotated[float, Unit("s")]
 Warmer = Annotated[float, Unit("K")]
 
 
+class DrivenCircuit(NamedTuple):
+    """A circuit, and the force on it, N."""
+
+    circuit: Circuit
+    force: Waveform
+
+
 @dataclass(frozen=True, kw_only=True)
 class Deviation(SceneTable):
-    """``[simulated.deviation]``: what is true less what is believed; 0: no surprise.
+    """True less believed, the table ``[simulated.deviation]``; 0: no surprise.
 
     Attributes:
         input_bias: of the follower at V_C2, A.
@@ -48,3 +61,21 @@ class Deviation(SceneTable):
         if self.temperature == 0:
             return true
         return at_temperature(true, temperature(true) + self.temperature)
+
+    def driven(
+        self, circuit: Circuit, magnet: Magnet, setpoint: Waveform
+    ) -> DrivenCircuit:
+        """The circuit as it really is, and the force really on it.
+
+        Args:
+            circuit: as it is believed to be.
+            magnet: likewise; a deviation takes at most all of its lag away.
+            setpoint: what the source gave, A.
+        """
+        if self.lag:
+            eddy = max(magnet.eddy_lag + self.lag, 0.0)
+            magnet = replace(magnet, eddy_lag=eddy)
+        force = magnet.lagged_force(setpoint)[0]
+        return DrivenCircuit(
+            self.circuit(circuit), force.scaled(1 + self.force) if self.force else force
+        )

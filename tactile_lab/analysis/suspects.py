@@ -1,0 +1,250 @@
+"""Which single thing that is other than believed explains a run's misfit.
+
+Each suspect is fitted alone, by a deviation of one size, to V_C1 and to the intervals
+between spikes; an offset of V_C1's channel is allowed to each. The one that leaves only
+the noise is named, if every other leaves clearly more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_lab.analysis.belief import PART, Belief
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.evidence import FloatArray, Residuals
+from tactile_lab.analysis.spike_pairs import irregularity
+from tactile_lab.analysis.twin import Measured
+from tactile_lab.deviation import Deviation
+from tactile_lab.errors import NotIdentifiableError, TactileLabError
+from tactile_lab.quantity import show
+
+SUSPECTS: Mapping[str, float] = {
+    "input_bias": 30e-12,
+    "V_GS": 3e-3,
+    "force": 0.02,
+    "lag": 2e-3,
+    "temperature": 2.0,
+    "R1": 0.02,
+}
+"""Names in `Deviation`, and the step each is fitted in."""
+TITLES = {
+    "input_bias": ("the follower's input bias", "A"),
+    "V_GS": ("V_GS", "V"),
+    "force": ("the force", "%"),
+    "lag": ("the lag of the field", "s"),
+    "temperature": ("the sensor's temperature", "K"),
+    "R1": ("R1", "%"),
+}
+"""What each is called, and its unit; a part of itself in %."""
+OWN = {"input_bias": "follower"}
+"""Name of the cause of uncertainty where it is not the suspect's own."""
+SYSTEMATIC = 0.03
+"""Of one code: what the mean of dithered codes is off by."""
+LEAST = 0.5e-3
+"""What V_C2 at firing is known to at best, V."""
+EXPLAINED = 3.0
+"""Times the noise that a misfit may have and still count as explained."""
+CLEARLY = 1.5
+"""Times the misfit of the best that every other suspect must leave at least."""
+
+ROUNDS, DIFFERENCE, LONGEST, CLOSE = 8, 0.03, 3.0, 3e-3
+"""Of the search for a size, in its steps."""
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """One suspect, fitted alone.
+
+    Attributes:
+        name: in `Deviation`.
+        size: true less believed, SI.
+        misfit: what it leaves, in multiples of the noise (root mean square).
+    """
+
+    name: str
+    size: Estimate
+    misfit: float
+
+    @property
+    def text(self) -> str:
+        """What differs, by how much: "V_GS +4 mV (3.6 mV to 4.4 mV, 95 %)"."""
+        title, unit = TITLES[self.name]
+        values = (self.size.value, self.size.low, self.size.high)
+        if unit == "%":
+            value, low, high = (f"{100 * v:.3g} %".replace("-", "−") for v in values)
+        else:
+            value, low, high = (show(v, unit, 3) for v in values)
+        sign = "+" if self.size.value > 0 else ""
+        return f"{title} {sign}{value} ({low} to {high}, 95 %) from what is believed"
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What the usual suspects make of a run's misfit.
+
+    Attributes:
+        misfit: without any deviation, in multiples of the noise (root mean square).
+        suspects: best first.
+    """
+
+    misfit: float
+    suspects: tuple[Suspect, ...]
+
+    @property
+    def text(self) -> str:
+        """For a person."""
+        if not self.suspects:
+            return "The model can follow none of the usual suspects."
+        best, *others = self.suspects
+        found = self.cause
+        if found is None:
+            names = ", ".join(TITLES[s.name][0] for s in self.suspects)
+            return (
+                f"What explains it cannot be told: of {names}, the best, "
+                f"{best.text}, leaves {best.misfit:.2g} times the noise"
+                + "".join(
+                    f" and {TITLES[o.name][0]} {o.misfit:.2g} times" for o in others[:1]
+                )
+                + ". Something else, or more than one thing, is other than believed."
+            )
+        next_best = "".join(
+            f"; the next best, {TITLES[o.name][0]}, leaves {o.misfit:.2g} times"
+            for o in others[:1]
+        )
+        return (
+            f"One cause explains it: {found.text}. That leaves {found.misfit:.2g} "
+            f"times the noise of {self.misfit:.3g} times{next_best}."
+        )
+
+    @property
+    def cause(self) -> Suspect | None:
+        """The one that explains the misfit; None: it cannot be told."""
+        if not self.suspects or self.misfit < EXPLAINED:
+            return None
+        best, *others = self.suspects
+        if best.misfit > EXPLAINED:
+            return None
+        if any(other.misfit < CLEARLY * best.misfit for other in others):
+            return None
+        return best
+
+
+def explain(
+    belief: Belief,
+    duration: float,
+    *,
+    V_C1: Measured | None = None,
+    spike_times: FloatArray | None = None,
+) -> Explanation:
+    """Try the usual suspects on a run.
+
+    Args:
+        belief: sensor and bench as they are believed to be.
+        duration: of the run, s.
+        V_C1: measured, decimated.
+        spike_times: detected spikes, s.
+
+    Raises:
+        NotIdentifiableError: there is neither V_C1 nor a pair of spikes.
+    """
+    problem = Residuals(belief.circuit, (), belief.force, duration, V_C1, spike_times)
+    if problem.size < 3:
+        raise NotIdentifiableError("neither V_C1 nor enough spikes tell of a cause")
+    trial = _Trial(belief, problem, 0.0 if V_C1 is None else V_C1.resolution)
+    moved = [
+        (name, (trial.weighted(problem.under(driven)) - trial.without) / PART)
+        for name, driven in belief.displaced()
+    ]
+    found = [s for name in SUSPECTS if (s := trial.fitted(name, moved)) is not None]
+    found.sort(key=lambda suspect: suspect.misfit)
+    return Explanation(trial.misfit(trial.without), tuple(found))
+
+
+class _Trial:
+    """Residuals over their noise, with an offset of V_C1 taken out."""
+
+    def __init__(self, belief: Belief, problem: Residuals, code: float) -> None:
+        self._belief, self._problem = belief, problem
+        plain = problem.under(belief.deviating(Deviation()))
+        bins, one = problem.bins, 1.96
+        self._noise = np.empty(problem.size)
+        self._noise[:bins] = max(
+            irregularity(plain[:bins]) / one if bins > 2 else 0.0,
+            SYSTEMATIC * code,
+            1e-5,
+        )
+        firing = irregularity(plain[bins:]) / one
+        self._noise[bins:] = max(firing if np.isfinite(firing) else 0.0, LEAST)
+        self.without = self.weighted(plain)
+
+    def weighted(self, residual: FloatArray) -> FloatArray:
+        """Residuals in multiples of the noise, and the offset taken out of V_C1."""
+        bins, half = self._problem.bins, self._problem.offset
+        scaled = residual / self._noise
+        if not bins or half == 0:
+            return scaled
+        one, prior = 1 / self._noise[:bins], 1.96 / half
+        offset = float(one @ scaled[:bins] / (one @ one + prior**2))
+        scaled[:bins] -= offset * one
+        return np.append(scaled, offset * prior)
+
+    def misfit(self, scaled: FloatArray) -> float:
+        """Root mean square of each kind of evidence, the larger."""
+        bins = self._problem.bins
+        parts = [scaled[:bins], scaled[bins : self._problem.size]]
+        return max(float(np.sqrt(np.mean(p**2))) for p in parts if p.size)
+
+    def fitted(
+        self, name: str, moved: Sequence[tuple[str, FloatArray]]
+    ) -> Suspect | None:
+        """The suspect's best size; None where the model cannot follow it.
+
+        Args:
+            name: of the suspect.
+            moved: by each cause of uncertainty, what its band changes in the residuals;
+                what a suspect itself is the cause of is not counted against it.
+        """
+        step = SUSPECTS[name]
+
+        def residual(x: float) -> FloatArray:
+            driven = self._belief.deviating(Deviation(**{name: step * x}))
+            return self.weighted(self._problem.under(driven))
+
+        try:
+            x, left, slope = _least(residual)
+        except TactileLabError:
+            return None
+        misfit = self.misfit(left)
+        length = float(np.linalg.norm(slope)) or math.inf
+        size = Estimate.of(step * x, step * max(misfit, 1.0) / length, left.size - 1)
+        own = OWN.get(name, name)
+        shifts = (slope @ change / length**2 for cause, change in moved if cause != own)
+        size = size.widened(*(step * abs(float(shift)) for shift in shifts))
+        return Suspect(name, size, misfit)
+
+
+def _least(
+    residual: Callable[[float], FloatArray],
+) -> tuple[float, FloatArray, FloatArray]:
+    """Where a residual is least, what it is there, and its slope.
+
+    By Gauss and Newton from 0, at most `LONGEST` at once, halved where that leads up.
+    """
+    x, left = 0.0, residual(0.0)
+    for _ in range(ROUNDS):
+        slope = (residual(x + DIFFERENCE) - left) / DIFFERENCE
+        square = float(slope @ slope) or np.inf
+        way = float(np.clip(-(slope @ left) / square, -LONGEST, LONGEST))
+        for _ in range(4):
+            there = residual(x + way)
+            if there @ there <= left @ left:
+                x, left = x + way, there
+                break
+            way /= 2
+        if abs(way) < CLOSE:
+            break
+    return x, left, slope

@@ -1,0 +1,79 @@
+"""The one thing that is other than believed is named, with its size; or none is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.belief import Belief
+from tactile_lab.analysis.suspects import SUSPECTS, explain
+from tactile_lab.analysis.twin import Measured
+from tactile_lab.bench import Followers
+from tactile_lab.deviation import Deviation
+from tactile_lab.magnetics import Magnet
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.waveform import Waveform
+
+MAGNET = Magnet(r=6e-3, coil_lag=1.1e-3, eddy_lag=3e-3, lag_uncertainty=1e-3)
+FOLLOWERS = Followers(input_bias_uncertainty=20e-12, offset_uncertainty=3e-3)
+FORCE = (
+    Waveform.pulse(0.13, ramp=0.1, hold=1.5, rest=1.0)
+    .then(Waveform.pulse(0.18, ramp=0.1, hold=1.5, rest=1.0))
+)  # fmt: skip
+BELIEF = Belief(
+    circuit=Circuit(I_bias=65e-12),
+    magnet=MAGNET,
+    setpoint=MAGNET.current_for(FORCE),
+    followers=FOLLOWERS,
+    clock=5e-4,
+)
+
+
+def explained(deviation, seed=1, **other):
+    """What is made of a run whose truth is off by `deviation`."""
+    circuit, force = BELIEF.deviating(deviation)
+    true = simulate(replace(circuit, **other), force, keep=("V_C1", "spikes"))
+    rng = np.random.default_rng(seed)
+    time = (np.arange(1000) + 0.5) * true.duration / 1000
+    volts = true.sample("V_C1", time) + rng.normal(0, 4e-4, time.size) + 1e-3
+    seen = Measured("V_C1", time, volts, resolution=16e-3, offset=3e-3)
+    return explain(BELIEF, true.duration, V_C1=seen, spike_times=true.spike_times)
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("input_bias", 45e-12), ("V_GS", -3e-3), ("force", 0.03), ("lag", 3e-3),
+        ("temperature", -2.0), ("R1", 0.02),
+    ],
+)  # fmt: skip
+def test_the_single_cause_is_named_with_its_size(name, size):
+    found = explained(Deviation(**{name: size}))
+    assert found.cause is not None
+    assert found.cause.name == name
+    assert found.cause.size.low <= size <= found.cause.size.high
+    assert found.cause.size.value == pytest.approx(size, rel=0.1)
+    assert set(SUSPECTS) == {suspect.name for suspect in found.suspects}
+    assert "One cause explains it" in found.text
+
+
+@pytest.mark.parametrize(
+    ("deviation", "other"),
+    [
+        (Deviation(V_GS=3e-3, R1=0.03), {}),
+        (Deviation(force=0.03, input_bias=-50e-12), {}),
+        (Deviation(), {"tau": 6.0}),
+        (Deviation(), {"C2": 165e-12}),
+    ],
+)
+def test_what_no_single_suspect_explains_is_pinned_on_none(deviation, other):
+    found = explained(deviation, **other)
+    assert found.cause is None
+    assert "cannot be told" in found.text
+
+
+def test_where_nothing_is_wrong_nothing_is_named():
+    found = explained(Deviation())
+    assert found.misfit < 2
+    assert found.cause is None

@@ -1,0 +1,69 @@
+"""The model beside a run of the simulated bench knows the bench, or says what not."""
+
+import json
+
+import pytest
+
+from tactile_lab.engine.execution import Execution
+from tactile_lab.report.findings import find
+from tactile_lab.report.from_run import read
+from tactile_lab.report.identified import identify_run
+from tactile_lab.report.results import results
+from tactile_lab.scene.load import load
+
+SHORT = {
+    "protocol.levels": (0.13, 0.18),
+    "protocol.hold": 1.0,
+    "protocol.rest": 0.5,
+    "record.signals": ("coil_current", "V_C1", "V_C2", "V_K", "spikes"),
+}
+
+
+def ran(folder, **deviation):
+    scene = load("surprise", {**SHORT, "simulated.deviation": deviation})
+    return read(Execution(scene, folder).run().folder)
+
+
+@pytest.fixture(scope="module")
+def as_believed(tmp_path_factory):
+    return ran(tmp_path_factory.mktemp("believed"))
+
+
+def test_out_of_the_box_the_model_knows_its_bench(as_believed):
+    found = find(as_believed).beside
+    spikes = found.twin.spikes
+    assert spikes.measured.size > 15
+    assert spikes.missed == spikes.extra == 0
+    assert spikes.within >= 0.95
+    assert abs(spikes.offsets).max() < 2e-4  # it was 23 ms without follower and lags
+    assert all(residual.within >= 0.95 for residual in found.twin.residuals)
+    assert [r.signal for r in found.twin.residuals] == ["V_C1", "V_C2"]
+    assert found.explanation is None
+
+
+def test_the_bias_of_the_follower_is_identified(as_believed):
+    bias = identify_run(as_believed, ["I_bias"]).estimates["I_bias"]
+    assert bias.low <= 65e-12 <= bias.high
+    assert bias.high - bias.low < 15e-12
+
+
+def test_the_error_budget_tells_what_is_stated_and_what_is_not(as_believed):
+    values = json.loads(json.dumps(results(find(as_believed))))["twin"]
+    spikes = values["error_budget_95"]["spike times"]
+    assert set(spikes) == {
+        "unit", "whole", "numerics", "clocks", "follower", "lag", "force",
+        "temperature", "noise",
+    }  # fmt: skip
+    assert spikes["clocks"] == pytest.approx(5e-4, rel=1e-3)  # timed by the shunt
+    assert 1e-3 < spikes["follower"] < 2e-2
+    assert spikes["force"] is None and spikes["temperature"] is None
+    assert 1e-9 < spikes["numerics"] < 1e-5
+    line = find(as_believed).beside.budget_line
+    assert "force, temperature not stated" in line
+
+
+def test_a_surprise_is_found_out_by_the_report(tmp_path):
+    found = find(ran(tmp_path, input_bias=60e-12)).beside
+    assert found.explanation.cause.name == "input_bias"
+    size = found.explanation.cause.size
+    assert size.low <= 60e-12 <= size.high
