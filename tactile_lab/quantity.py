@@ -183,6 +183,15 @@ class SIInt(int):
     """A whole number given in Python: SI, also where a file must write the unit."""
 
 
+def bytes_text(count: float) -> str:
+    """A number of bytes for people: "1.7 GB"."""
+    units = iter(("B", "kB", "MB", "GB", "TB", "PB"))
+    unit = next(units)
+    while count >= 999.5 and (larger := next(units, None)) is not None:
+        count, unit = count / 1000, larger
+    return f"{count:.3g} {unit}"
+
+
 def prefix_of(value: float, unit: str) -> str:
     """The prefix that keeps 1 to 999 in front of `unit`; "" for a compound unit."""
     if value == 0 or not unit.isalpha():

@@ -2,27 +2,44 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import fail, print_json, refusing, say, working
+from tactile_lab.commands.terminal import fail, print_json, progress, refusing, say
 
-FORMATS = ("csv", "mat", "nwb")
+FILES = {
+    "csv": "csv",
+    "mat": "{run}.mat",
+    "netcdf": "{run}.nc",
+    "nwb": "{run}.nwb",
+    "parquet": "parquet",
+    "ro-crate": "ro-crate-metadata.json",
+}
+"""What each format writes beside the run's data: a file, or a folder."""
+LARGE = 100_000_000
+"""Bytes that are announced beforehand wherever the output goes."""
 
 
 @click.command()
 @run_argument
-@click.option("--to", "form", type=click.Choice(FORMATS), required=True)
+@click.option("--to", "form", type=click.Choice(tuple(FILES)), required=True)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     metavar="PATH",
-    help="Folder (csv) or file (mat, nwb); beside the run's data unless given.",
+    help="Folder (csv, parquet), file (mat, netcdf, nwb) or .zip (ro-crate); beside "
+    "the run's data unless given.",
 )
-@click.option("--signal", "signals", multiple=True, help="Only this one; repeatable.")
+@click.option(
+    "--signal",
+    "signals",
+    multiple=True,
+    help="Only this one, stored or derived (force, rate, I_DS); repeatable.",
+)
 @click.option("--from", "start", metavar="TIME", help='Such as "2 s".')
 @click.option("--until", "end", metavar="TIME", help='Such as "4.5 s".')
 @click.option("--rate", metavar="RATE", help='Average down, such as "1 kS/s".')
@@ -37,8 +54,13 @@ def command(
     rate: str | None,
     as_json: bool,
 ) -> None:
-    """Export RUN as CSV (SI, units in the header), MATLAB or NWB file."""
+    """Export RUN for other programs, in SI units.
+
+    Signals with the force, rate and I_DS derived from them, spikes, trials with their
+    holds, and the settings. An RO-Crate describes the run's folder itself.
+    """
     with refusing():
+        from tactile_lab.quantity import bytes_text
         from tactile_lab.store.run import Run
         from tactile_lab.store.selection import Selection
 
@@ -48,20 +70,25 @@ def command(
             end=_quantity("--until", end, "s"),
             rate=_quantity("--rate", rate, "S/s"),
         )
-        target = out or run / (
-            "csv" if form == "csv" else f"{run.resolve().name}.{form}"
-        )
-        with Run.load(run) as loaded, working(f"writing {target}"):
-            try:
-                written = _exporter(form)(loaded, target, selection)
-            except OSError as error:
-                fail(f"{target} cannot be written: {error.strerror or error}.", 2)
-                return
+        target = out or run / FILES[form].format(run=run.resolve().name)
+        exporter = _exporter(form)
+        with Run.load(run) as loaded:
+            selection.check(loaded)
+            size = exporter.size(loaded, selection)
+            text = f"writing {target.name}, up to {bytes_text(size)}"
+            if size >= LARGE:
+                say(text, sys.stderr)
+            with progress(text) as update:
+                try:
+                    written = exporter.export(loaded, target, selection, update)
+                except OSError as error:
+                    fail(f"{target} cannot be written: {error.strerror or error}.", 2)
+                    return
     if as_json:
         print_json({"run": str(run), "files": [str(file) for file in written]})
     else:
         for file in written:
-            say(str(file))
+            say(f"{file}  {bytes_text(file.stat().st_size)}")
 
 
 def _quantity(option: str, text: str | None, unit: str) -> float | None:
@@ -75,7 +102,8 @@ def _quantity(option: str, text: str | None, unit: str) -> float | None:
 
 
 def _exporter(form: str) -> Any:
-    """The `export` of that format; loads only its own libraries."""
+    """The module of that format, with `size` and `export`; loads its own libraries."""
     import importlib
 
-    return importlib.import_module(f"tactile_lab.store.export.{form}").export
+    name = form.replace("-", "_")
+    return importlib.import_module(f"tactile_lab.store.export.{name}")

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 REFUSED = 2
 LINE_EVERY = 0.1
 """Part of the whole after which progress writes a line where it is piped."""
+PATIENCE = 10.0
+"""Seconds that piped work may take unmentioned."""
 REDRAW_EVERY = 0.1
 """Seconds between redraws on a terminal."""
 STYLES = {
@@ -132,6 +134,16 @@ def working(text: str) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def progress(text: str) -> Iterator[Callable[[float], None]]:
+    """How far a piece of work is: give what it yields the part done, 0 to 1.
+
+    On a terminal a bar with the time left; where piped, lines once it takes long.
+    """
+    with ProgressLine(1.0, text, patience=PATIENCE) as line:
+        yield line.update
+
+
 class StatusLine:
     """A line on a terminal that changes in place and leaves nothing behind."""
 
@@ -181,6 +193,7 @@ class ProgressLine:
         label: what is being done.
         stream: where to write; stderr unless given.
         now: seconds, for tests.
+        patience: seconds before a first line is written where it is piped.
     """
 
     def __init__(
@@ -189,7 +202,9 @@ class ProgressLine:
         label: str,
         stream: TextIO | None = None,
         now: Callable[[], float] = time.monotonic,
+        patience: float = 0.0,
     ) -> None:
+        self._patience = patience
         self._total = total
         self._label = label
         self._stream = sys.stderr if stream is None else stream
@@ -211,7 +226,7 @@ class ProgressLine:
             if self._now() - self._drawn >= REDRAW_EVERY or part == 1.0:
                 self._drawn = self._now()
                 self._line.show(self._described(part, text), part)
-        elif part >= self._next_line:
+        elif part >= self._next_line and self._now() - self._began >= self._patience:
             self._next_line = (int(part / LINE_EVERY + 1e-9) + 1) * LINE_EVERY
             self.note(self._described(part, text))
 

@@ -17,7 +17,7 @@ from tactile_lab.planning.plan import Plan
 from tactile_lab.plugins import ships
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
-from tactile_lab.store.folder import INPUTS, RunFolder
+from tactile_lab.store.folder import INPUTS, SCENE, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.table import dumped
 
@@ -79,7 +79,7 @@ def keep_scene(folder: RunFolder, scene: Scene) -> None:
         RecordingError: a file cannot be read any more, or the folder not be written.
     """
     copies = _names(scene.files)
-    folder.write_text("scene.toml", scene.to_toml(copies))
+    folder.write_text(SCENE, scene.to_toml(copies))
     sources = {path: f"{INPUTS}/{path.name}" for path in _shipped(scene)}
     for path, name in {**sources, **copies}.items():
         try:

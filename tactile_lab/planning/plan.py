@@ -14,7 +14,7 @@ from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, warnings
 from tactile_lab.planning.ways import ways_used
-from tactile_lab.quantity import count, show
+from tactile_lab.quantity import bytes_text, count, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY, SIGNALS
 
@@ -206,7 +206,7 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         f"{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
         f"{show(plan.scene.record.sample_rate, 'S/s')}; {cost.samples_stored:,} stored",
     )
-    yield "disk", f"{_bytes(cost.disk)} compressed, {_bytes(cost.disk_raw)} raw"
+    yield "disk", f"{bytes_text(cost.disk)} compressed, {bytes_text(cost.disk_raw)} raw"
     yield (
         "coil",
         f"peak {show(cost.peak_current, 'A')} for {show(cost.peak_force, 'N')}, heat "
@@ -239,11 +239,3 @@ def _time(seconds: float) -> str:
     if seconds < 7200:
         return f"{seconds / 60:.4g} min"
     return f"{seconds / 3600:.4g} h"
-
-
-def _bytes(count: float) -> str:
-    units = iter(("B", "kB", "MB", "GB", "TB", "PB"))
-    unit = next(units)
-    while count >= 999.5 and (larger := next(units, None)) is not None:
-        count, unit = count / 1000, larger
-    return f"{count:.3g} {unit}"

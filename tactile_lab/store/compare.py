@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.quantity import show
+from tactile_lab.store.folder import SCENE
 from tactile_lab.store.run import Run
-
-SCENE = "scene.toml"
 
 
 @dataclass(frozen=True)

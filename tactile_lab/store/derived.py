@@ -1,15 +1,16 @@
-"""A run's signals in columns of one time axis, those it did not store among them."""
+"""Signals that a run does not store but tells: force, rate and drain current."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent, drain_current
-from tactile_lab.store.selection import Selection
+from tactile_lab.store.folder import SCENE
+from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
 
 FloatArray = NDArray[np.float64]
@@ -19,44 +20,38 @@ STEP = 1e-3
 """V_C1 is averaged over so long before I_DS is derived from it, s."""
 
 
-def table(
-    run: StoredRun,
-    start: float,
-    end: float | None,
-    signals: Sequence[str] | None,
-    rate: float | None,
-) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Times, s, and the values of each signal there, SI (see `Run.to_xarray`).
+def derivable(run: StoredRun) -> tuple[str, ...]:
+    """What can be derived of this run."""
+    # a folder without a scene knows neither calibration nor circuit
+    known = (run.path / SCENE).exists()
+    able = {
+        "force": known and run.table("current").size > 0,
+        "rate": run.detection is not None,
+        "I_DS": known and "V_C1" in run.signals and run.samples > 3,
+    }
+    return tuple(name for name in DERIVED if able[name] and name not in run.signals)
+
+
+def derivation(run: StoredRun, name: str) -> Callable[[FloatArray], FloatArray]:
+    """Gives a derived signal at any times, s, in SI; reads what it rests on once.
 
     Raises:
-        RunFolderError: a signal is neither stored nor derived, or needs one that is
-            not stored.
+        RunFolderError: it rests on something that is not stored.
+        SceneError: the run's scene cannot be read any more.
     """
-    if signals is None:  # a folder without a scene knows no force
-        known = (run.path / "scene.toml").exists()
-        signals = (*run.signals, "force") if known else run.signals
-    names = (signals,) if isinstance(signals, str) else tuple(signals)
-    stored = tuple(name for name in names if name not in DERIVED)
-    axis = stored or run.signals[:1]
-    part = Selection(signals=axis, start=start, end=end, rate=rate)
-    time, read = part.read(run)
-    if not time.size:
-        return time, dict.fromkeys(names, time)
-    return time, {
-        name: _derived(run, name, time) if name in DERIVED else read[name]
-        for name in names
-    }
-
-
-def _derived(run: StoredRun, name: str, time: FloatArray) -> FloatArray:
     if name == "force":
-        return run.force.at(time)
-    if name == "I_DS":
-        found = drain_current_of(run)
-        return np.interp(time, found.time, found.current)
-    rates = run.rate
-    values: FloatArray = np.concatenate([[0.0], rates["rate"]])
-    return values[np.searchsorted(rates["time"], time, side="right")]
+        return run.force.at
+    if name == "rate":
+        changes = run.rate
+        return _held(changes["time"], np.append(0.0, changes["rate"]))
+    found = drain_current_of(run)
+    middles = (found.time[:-1] + found.time[1:]) / 2
+    return _held(middles, found.current)
+
+
+def _held(change: FloatArray, value: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Value 0 until the first change, s, and one more after each."""
+    return lambda time: value[np.searchsorted(change, time, side="right")]
 
 
 def drain_current_of(run: StoredRun) -> DrainCurrent:
@@ -66,9 +61,13 @@ def drain_current_of(run: StoredRun) -> DrainCurrent:
         RunFolderError: V_C1 was not stored, or there are too few samples of it.
         SceneError: the run's scene, which knows the divider, cannot be read any more.
     """
-    step = max(STEP, run.signal("V_C1").interval)
-    time, read = Selection(signals=("V_C1",), rate=1 / step).read(run)
-    V_C1, circuit = read["V_C1"], run.scene.circuit
+    signal = run.signal("V_C1")
+    step = max(STEP, signal.interval)
+    spans = run.axis.stretches(0, run.samples)
+    pieces = list(averages([signal], spans, max(1, round(step / signal.interval))))
+    time = np.concatenate([times for times, _ in pieces] or [np.empty(0)])
+    V_C1 = np.concatenate([means[0] for _, means in pieces] or [np.empty(0)])
+    circuit = run.scene.circuit
     even = np.abs(np.diff(time) - np.median(np.diff(time))) < 0.01 * step
     edges = np.flatnonzero(~even) + 1  # gaps, and last means of fewer samples
     parts = [

@@ -21,7 +21,7 @@ Status = Literal["running", "complete", "aborted", "faulted", "recovered"]
 SCHEMA = 1
 """Version of the folder's layout; raised when old readers would misread it."""
 
-INFO, DATA, LOG = "run.json", "data.h5", "log.jsonl"
+INFO, DATA, LOG, SCENE = "run.json", "data.h5", "log.jsonl", "scene.toml"
 
 INPUTS = "inputs"
 """Folder within a run for copies of what it was made from."""

@@ -7,14 +7,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab import notebook
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.derived import drain_current_of, table
+from tactile_lab.store.derived import derivable, drain_current_of
 from tactile_lab.store.layout import RECORDS
+from tactile_lab.store.selection import Selection
 from tactile_lab.store.stored_run import StoredRun
 
 if TYPE_CHECKING:
@@ -60,7 +62,7 @@ class Run(StoredRun):
             RunFolderError: xarray is not installed, or there is no such signal.
         """
         made = _optional("xarray").Dataset
-        time, columns = table(self, start, end, signals, rate)
+        time, columns = self._columns(start, end, signals, rate)
         dataset: xarray.Dataset = made(coords={"time": time})
         dataset["time"].attrs["units"] = "s"
         for name, values in columns.items():
@@ -95,7 +97,7 @@ class Run(StoredRun):
         pd = _optional("pandas")
         frame: pandas.DataFrame
         if what == "signals":
-            time, columns = table(self, start, end, signals, rate)
+            time, columns = self._columns(start, end, signals, rate)
             frame = pd.DataFrame(columns, index=pd.Index(time, name="time"))
             return frame
         if what in ("spikes", "rate"):
@@ -113,6 +115,19 @@ class Run(StoredRun):
                 fields[name] = np.char.decode(values, "utf-8", errors="replace")
         frame = pd.DataFrame(fields)
         return frame
+
+    def _columns(
+        self,
+        start: float,
+        end: float | None,
+        signals: Sequence[str] | None,
+        rate: float | None,
+    ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
+        if signals is None:
+            force = "force" in derivable(self)
+            signals = (*self.signals, "force") if force else self.signals
+        names = (signals,) if isinstance(signals, str) else tuple(signals)
+        return Selection(signals=names, start=start, end=end, rate=rate).read(self)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the run in a few words, and its trials."""

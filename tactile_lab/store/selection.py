@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import show
+from tactile_lab.store.derived import derivable, derivation
+from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
-
-PIECE = 1 << 18
-"""Rows handled at a time."""
 
 FloatArray = NDArray[np.float64]
 
@@ -24,7 +23,7 @@ class Selection:
     """A part of a run.
 
     Attributes:
-        signals: to export; None for all that are stored.
+        signals: to export, stored or derived; None for all there are.
         start: s on the run's axis.
         end: s on the run's axis; None for the last sample.
         rate: S/s to average down to; None for every sample.
@@ -39,14 +38,14 @@ class Selection:
         """Refuse what the run does not have, before a file is touched.
 
         Raises:
-            RunFolderError: a signal that is not stored, a rate above the run's, or a
-                time without anything in it.
+            RunFolderError: a signal that is neither stored nor derived, a rate above
+                the run's, or a time without anything in it.
         """
-        names = self.names(run)
-        if names:
-            self.average(run.signal(names[0]).interval)
+        self.names(run)
+        if run.signals:
+            self.average(run.signal(run.signals[0]).interval)
         end = run.duration if self.end is None else self.end
-        found = self.spans(run) if names else self.start < min(end, run.duration)
+        found = self.spans(run) if run.samples else self.start < min(end, run.duration)
         if not found or end <= self.start:
             raise RunFolderError(
                 f"The run has nothing from {show(self.start, 's')} until "
@@ -58,13 +57,16 @@ class Selection:
         """Signals to export.
 
         Raises:
-            RunFolderError: one of them is not stored.
+            RunFolderError: one of them is neither stored nor derived.
         """
-        if self.signals is None:
-            return run.signals
-        for name in self.signals:
-            run.signal(name)
-        return self.signals
+        known = (*run.signals, *derivable(run))
+        for name in self.signals or ():
+            if name not in known:
+                raise RunFolderError(
+                    f"{run.path} stores no {name}, nor can it be derived; there is "
+                    f"{', '.join(known) or 'no signal'}."
+                )
+        return known if self.signals is None else self.signals
 
     def average(self, interval: float) -> int:
         """Samples averaged into one.
@@ -84,37 +86,45 @@ class Selection:
 
     def spans(self, run: StoredRun) -> list[tuple[int, int]]:
         """(first, one past last) sample of each stretch without a gap."""
-        names = self.names(run)
-        if not names or not run.samples:
+        if not run.samples:
             return []
-        chosen = run.signal(names[0]).between(self.start, self.end)
+        chosen = run.signal(run.signals[0]).between(self.start, self.end)
         return run.axis.stretches(chosen.start, chosen.stop)
 
-    def rows(self, table: NDArray[Any]) -> NDArray[Any]:
+    def of(self, table: NDArray[Any]) -> NDArray[Any]:
         """Rows of a table whose time, or stretch of time, lies in the part."""
         end = np.inf if self.end is None else self.end
         if "time" in (table.dtype.names or ()):
             return table[(table["time"] >= self.start) & (table["time"] < end)]
         return table[(table["end"] > self.start) & (table["start"] < end)]
 
-    def pieces(self, run: StoredRun) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
-        """(times, one array of SI values per signal), a bounded piece at a time."""
+    def rows(self, run: StoredRun) -> int:
+        """How many rows `pieces` gives in all."""
         spans = self.spans(run)
+        count = self.average(run.signal(run.signals[0]).interval) if spans else 1
+        return sum(-(-(last - first) // count) for first, last in spans)
+
+    def pieces(self, run: StoredRun) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
+        """(times, one array of SI values per signal), a bounded piece at a time.
+
+        Raises:
+            RunFolderError: what a derived signal rests on is not stored.
+            SceneError: a derived signal needs the run's scene, which cannot be read.
+        """
+        spans, names = self.spans(run), self.names(run)
         if not spans:
             return
-        signals = [run.signal(name) for name in self.names(run)]
-        # read once: a scope with gaps leaves thousands of stretches
-        axis, count = signals[0].axis, self.average(signals[0].interval)
-        step = max(PIECE // count, 1) * count
-        for first, last in spans:
-            for at in range(first, last, step):
-                stop = min(at + step, last)
-                edges = np.arange(at, stop, count)
-                centre = (edges + np.minimum(edges + count, stop) - 1) / 2
-                yield (
-                    axis.time_of(centre),
-                    [_averaged(signal[at:stop], count) for signal in signals],
-                )
+        stored = [name for name in names if name in run.signals]
+        axis = run.signal(run.signals[0])
+        made = {n: derivation(run, n) for n in names if n not in stored}
+        read = averages(
+            [run.signal(name) for name in stored] or [axis],
+            spans,
+            self.average(axis.interval),
+        )
+        for time, columns in read:
+            found = dict(zip(stored, columns, strict=False))
+            yield time, [made[n](time) if n in made else found[n] for n in names]
 
     def read(self, run: StoredRun) -> tuple[FloatArray, dict[str, FloatArray]]:
         """Times, s, and the SI values of each signal there, all at once."""
@@ -124,13 +134,3 @@ class Selection:
             name: np.concatenate([columns[i] for _, columns in pieces] or none)
             for i, name in enumerate(self.names(run))
         }
-
-
-def _averaged(values: FloatArray, count: int) -> FloatArray:
-    """Means of each `count` values; the last may have fewer."""
-    if count == 1:
-        return values
-    edges = np.arange(0, values.size, count)
-    sizes = np.diff(np.append(edges, values.size))
-    means: FloatArray = np.add.reduceat(values, edges) / sizes
-    return means

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -17,6 +18,8 @@ from tactile_lab.trace import Trace
 
 PIECE = 1 << 20
 """Samples read at a time."""
+ROWS = 1 << 18
+"""Samples handed on at a time, of each signal."""
 
 FloatArray = NDArray[np.float64]
 
@@ -43,6 +46,9 @@ class Axis:
     def time_of(self, sample: NDArray[Any] | float) -> FloatArray:
         """Run time of (fractional) stored sample indices, any shape, s."""
         index = np.asarray(sample, dtype=np.float64)
+        if self.first.size == 1:
+            one: FloatArray = self.time[0] + (index - self.first[0]) * self.step[0]
+            return one
         which = np.searchsorted(self.first, index, side="right") - 1
         which = np.maximum(which, 0)
         at: FloatArray = (
@@ -282,6 +288,40 @@ class StoredSignal:
         stored = self._pyramid[first:middle]
         rest = pyramid_of(self.codes[middle * BIN : last * BIN])
         return np.concatenate([stored, rest])
+
+
+def averages(
+    signals: Sequence[StoredSignal], spans: Sequence[tuple[int, int]], count: int = 1
+) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
+    """Signals averaged down, a bounded piece at a time, each stretch for itself.
+
+    Args:
+        signals: of one run, at least one.
+        spans: (first, one past last) sample of stretches without a gap.
+        count: samples averaged into one; the last of a stretch may have fewer.
+
+    Yields:
+        Times, s, and an array of SI values per signal.
+    """
+    axis = signals[0].axis
+    step = max(ROWS // count, 1) * count
+    for first, last in spans:
+        for at in range(first, last, step):
+            stop = min(at + step, last)
+            edges = np.arange(at, stop, count)
+            centre = (edges + np.minimum(edges + count, stop) - 1) / 2
+            means = [_averaged(signal[at:stop], count) for signal in signals]
+            yield axis.time_of(centre), means
+
+
+def _averaged(values: FloatArray, count: int) -> FloatArray:
+    """Means of each `count` values; the last may have fewer."""
+    if count == 1:
+        return values
+    edges = np.arange(0, values.size, count)
+    sizes = np.diff(np.append(edges, values.size))
+    means: FloatArray = np.add.reduceat(values, edges) / sizes
+    return means
 
 
 class Codes:

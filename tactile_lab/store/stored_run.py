@@ -23,7 +23,7 @@ from tactile_lab.store.applied import (
     held,
 )
 from tactile_lab.store.data_file import open_data
-from tactile_lab.store.folder import DATA, is_live, read_info
+from tactile_lab.store.folder import DATA, SCENE, is_live, read_info
 from tactile_lab.store.signal import Axis, StoredSignal
 from tactile_lab.waveform import Waveform
 
@@ -322,7 +322,7 @@ class StoredRun:
         """
         from tactile_lab.scene.load import load
 
-        return load(self.path / "scene.toml")
+        return load(self.path / SCENE)
 
     @property
     def force(self) -> Waveform:

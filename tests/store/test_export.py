@@ -45,10 +45,11 @@ def test_csv_has_units_in_its_header_and_si_values(run, tmp_path):
     files = to_csv.export(run, tmp_path / "csv", Selection())
     names = {file.name for file in files}
     assert names == {
-        "signals.csv", "spikes.csv", "current.csv", "field.csv", "trials.csv"
+        "signals.csv", "spikes.csv", "current.csv", "field.csv", "trials.csv",
+        "about.csv",
     }  # fmt: skip
     head, *body = rows(tmp_path / "csv" / "signals.csv")
-    assert head == ["time_s", "V_C1_V", "V_K_V"]
+    assert head == ["time_s", "V_C1_V", "V_K_V", "rate_Hz"]
     table = np.array(body, dtype=float)
     np.testing.assert_allclose(table[:, 2], run.signal("V_K")[:], rtol=1e-9)
     np.testing.assert_allclose(table[[0, 2999, 3000], 0], [0, 2.999, 53.0])

@@ -2,68 +2,109 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import csv
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.store.export.content import (
+    UNITS,
+    Progress,
+    Table,
+    about,
+    nothing,
+    replacing,
+    tables,
+    unit,
+)
+from tactile_lab.store.export.lines import (
+    CodeText,
+    FloatArray,
+    Text,
+    fixed,
+    lines,
+    steps,
+    written,
+)
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
-UNITS = {
-    "gaps": {"start": "s", "end": "s"},
-    "spikes": {"time": "s", "amplitude": "V", "width": "s"},
-    "current": {"time": "s", "setpoint": "A", "measured": "A"},
-    "field": {"time": "s", "field": "T"},
-}
-"""Exported columns of each table."""
-
-Columns = Sequence[NDArray[np.float64]]
+AT_ONCE = 1 << 15
+"""Rows turned into text at once: more do not fit a processor's cache."""
+WIDTH = 12
+"""Bytes of a number with its comma, about."""
 
 
-def export(run: Run, folder: Path, selection: Selection) -> list[Path]:
-    """Write `signals.csv`, `spikes.csv`, `gaps.csv`, ... into `folder`.
+def size(run: Run, selection: Selection) -> int:
+    """Bytes the files will take, about."""
+    return selection.rows(run) * WIDTH * (1 + len(selection.names(run)))
+
+
+def export(
+    run: Run, folder: Path, selection: Selection, progress: Progress = nothing
+) -> list[Path]:
+    """Write `signals.csv`, `spikes.csv`, `trials.csv`, `about.csv`, ... into `folder`.
 
     Files of these names that an earlier export left there are replaced or removed.
 
     Raises:
         RunFolderError: a signal, rate or time the run does not have.
+        RecordingError: there is no room.
         OSError: the folder cannot be written.
     """
     selection.check(run)
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    names = selection.names(run)
-    if names:
-        heads = ["time_s", *(f"{name}_{run.signal(name).unit}" for name in names)]
-        pieces = ((times, *columns) for times, columns in selection.pieces(run))
-        written.append(_write(folder / "signals.csv", heads, pieces))
-    for name, units in UNITS.items():
-        rows = selection.rows(getattr(run, name))
-        if rows.size:
-            heads = [f"{column}_{unit}" for column, unit in units.items()]
-            columns = [rows[column] for column in units]
-            written.append(_write(folder / f"{name}.csv", heads, [columns]))
-    trials = run.trials
-    if trials.size:
-        written.append(folder / "trials.csv")
-        with written[-1].open("w", encoding="utf-8", newline="\n") as file:
-            file.write("index,label,level_N,start_s,end_s,spikes\n")
-            for row in trials:
-                label = row["label"].decode().replace('"', '""')
-                file.write(
-                    f'{row["index"]},"{label}",{row["level"]:.12g},'
-                    f"{row['start']:.12g},{row['end']:.12g},{row['spikes']}\n"
-                )
-    for name in {"signals", *UNITS, "trials"} - {file.stem for file in written}:
+    made = []
+    if selection.rows(run):
+        made.append(_signals(run, folder / "signals.csv", selection, progress))
+    for name, table in tables(run, selection).items():
+        made.append(_table(folder / f"{name}.csv", table))
+    told = about(run, selection.names(run))
+    keys = np.array(list(told)), np.array([str(value) for value in told.values()])
+    pairs = Table({"key": keys[0], "value": keys[1]}, {"key": "", "value": ""})
+    made.append(_table(folder / "about.csv", pairs))
+    for name in {"signals", *UNITS, "trials"} - {file.stem for file in made}:
         (folder / f"{name}.csv").unlink(missing_ok=True)
-    return written
+    return made
 
 
-def _write(path: Path, heads: Sequence[str], pieces: Iterable[Columns]) -> Path:
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(heads) + "\n")
-        for columns in pieces:
-            np.savetxt(file, np.column_stack(columns), "%.12g", ",")
+def _signals(run: Run, path: Path, selection: Selection, progress: Progress) -> Path:
+    names, rows = selection.names(run), selection.rows(run)
+    texts = [_text(run, name, selection) for name in names]
+    done = 0
+    with replacing(path, size(run, selection)) as part, part.open("wb") as file:
+        heads = ["time_s", *(f"{name}_{unit(name)}" for name in names)]
+        file.write((",".join(heads) + "\n").encode())
+        for time, columns in selection.pieces(run):
+            for at in range(0, time.size, AT_ONCE):
+                part_of = slice(at, at + AT_ONCE)
+                told = [f(c[part_of]) for f, c in zip(texts, columns, strict=True)]
+                file.write(lines([fixed(time[part_of]), *told]))
+            done += time.size
+            progress(done / rows)
     return path
+
+
+def _text(run: Run, name: str, selection: Selection) -> Callable[[FloatArray], Text]:
+    """How values of that signal become text."""
+    if name not in run.signals:
+        return fixed if name == "force" else steps  # nN; the others in twelve digits
+    signal = run.signal(name)
+    return CodeText(signal) if selection.average(signal.interval) == 1 else written
+
+
+def _table(path: Path, table: Table) -> Path:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table.heads)
+        columns = (_cells(column.tolist()) for column in table.columns.values())
+        writer.writerows(zip(*columns, strict=True))
+    return path
+
+
+def _cells(values: list[object]) -> list[object]:
+    """Numbers in 12 digits; what is not known stays empty."""
+    return [
+        ("" if v != v else f"{v:.12g}") if isinstance(v, float) else v for v in values
+    ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,55 +10,87 @@ import numpy as np
 import scipy.io
 
 from tactile_lab.errors import RunFolderError
+from tactile_lab.store.export.content import (
+    Progress,
+    Table,
+    about,
+    nothing,
+    replacing,
+    tables,
+    unit,
+)
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
 LARGEST = 2_000_000_000
 """Bytes one variable of a MAT file of version 5 can have."""
+DOUBLE, SINGLE = 8, 4
 
 
-def export(run: Run, file: Path, selection: Selection) -> list[Path]:
-    """Write `file`; signals are structs with time (s), values (single, SI) and unit.
+def size(run: Run, selection: Selection) -> int:
+    """Bytes the file will take, at most."""
+    return selection.rows(run) * (DOUBLE + SINGLE * len(selection.names(run)))
+
+
+def export(
+    run: Run, file: Path, selection: Selection, progress: Progress = nothing
+) -> list[Path]:
+    """Write `file`: time (s), and structs of values (single, SI) and unit.
+
+    Signals are not compressed: that would take a minute.
 
     Raises:
         RunFolderError: more samples than the format can hold, or a signal, rate or
             time the run does not have.
+        RecordingError: there is no room.
         OSError: the file cannot be written.
     """
     selection.check(run)
-    names = selection.names(run)
-    spans = selection.spans(run)
-    interval = run.signal(names[0]).interval if names else 1.0
-    count = sum(stop - start for start, stop in spans) / selection.average(interval)
-    if 8 * count > LARGEST:
+    rows, names = selection.rows(run), selection.names(run)
+    if DOUBLE * rows > LARGEST:
         raise RunFolderError(
-            f"{count:.3g} samples per signal are more than a MAT file holds "
-            f"({LARGEST // 8:.3g}). Choose a part with --from and --until, or --rate."
+            f"{rows:.3g} samples per signal are more than a MAT file holds "
+            f"({LARGEST // DOUBLE:.3g}). Choose a part with --from and --until, or "
+            "--rate."
         )
-    content: dict[str, Any] = {
-        "info": {
-            "run": run.path.resolve().name,
-            "status": run.status,
-            "simulated": run.simulated,
-        }
-    }
-    time, read = selection.read(run)
-    if time.size:
-        content["time"] = time
-    for name, values in read.items():
-        unit = run.signal(name).unit
-        content[name] = {"values": values.astype(np.float32), "unit": unit}
-    for name in ("gaps", "spikes", "current", "field"):
-        rows = selection.rows(getattr(run, name))
-        content[name] = {column: rows[column] for column in rows.dtype.fields or ()}
-    trials = run.trials
-    content["trials"] = {
-        column: trials[column]
-        for column in trials.dtype.fields or ()
-        if column not in ("label", "hold_start", "hold_end")
-    }
-    labels = np.array([row.decode() for row in trials["label"]], dtype=object)
-    content["trials"]["label"] = labels
-    file.parent.mkdir(parents=True, exist_ok=True)
-    scipy.io.savemat(file, content, do_compression=True, oned_as="column")
+    with replacing(file, size(run, selection)) as part, part.open("wb") as out:
+
+        def put(name: str, value: Any) -> None:
+            # the stubs know no open file
+            file: Any = out
+            scipy.io.savemat(
+                file, {name: value}, oned_as="column", long_field_names=True
+            )
+
+        told = about(run, names).items()
+        put("info", {re.sub(r"\W", "_", key): value for key, value in told})
+        # one signal after another: all of them at once would fill the memory
+        for number, name in enumerate(names if rows else ()):
+            alone = Selection(
+                signals=(name,), start=selection.start, end=selection.end,
+                rate=selection.rate,
+            )  # fmt: skip
+            values = np.empty(rows, np.float32)
+            time = np.empty(rows if number == 0 else 0)
+            done = 0
+            for times, (column,) in alone.pieces(run):
+                values[done : done + times.size] = column
+                if number == 0:
+                    time[done : done + times.size] = times
+                done += times.size
+                progress((number + done / rows) / len(names))
+            if number == 0:
+                put("time", time)
+                del time
+            content = {"values": values, "unit": unit(name)}
+            put(name, content)
+        for name, table in tables(run, selection).items():
+            put(name, _struct(table))
     return [file]
+
+
+def _struct(table: Table) -> dict[str, Any]:
+    return {
+        name: values.astype(object) if values.dtype.kind == "U" else values
+        for name, values in table.columns.items()
+    }

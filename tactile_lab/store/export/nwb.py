@@ -7,21 +7,52 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
+from tactile_lab.signals import SIGNALS
+from tactile_lab.store.derived import DERIVED, derivation
+from tactile_lab.store.export.content import (
+    Progress,
+    about,
+    nothing,
+    replacing,
+    tables,
+)
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
-UNITS = {"V": "volts", "A": "amperes", "T": "tesla", "N": "newtons"}
+UNITS = {"V": "volts", "A": "amperes", "T": "tesla", "N": "newtons", "Hz": "hertz"}
 """What NWB calls SI units."""
 
+EVEN = 1e-3
+"""Part of a step by which even steps may differ."""
 
-def export(run: Run, file: Path, selection: Selection) -> list[Path]:
+TRIALS = {
+    "level": "force the trial is filed under, N",
+    "label": "for people",
+    "hold_start": "start of the constant part, s",
+    "hold_end": "its end, s",
+    "complete": "whether it came to its end, 1 or 0",
+}
+"""Columns of trials beside those NWB has."""
+
+
+def size(run: Run, selection: Selection) -> int:
+    """Bytes the file will take, at most."""
+    stored = [run.signal(n) for n in selection.names(run) if n in run.signals]
+    return sum(selection.rows(run) * int(s.codes.dtype.itemsize) for s in stored)
+
+
+def export(
+    run: Run, file: Path, selection: Selection, progress: Progress = nothing
+) -> list[Path]:
     """Write `file`: codes with conversion and offset, units table, trials, stimulus.
 
     Raises:
         RunFolderError: pynwb is not installed, a rate was asked for, or a signal or
             time the run does not have.
+        RecordingError: there is no room.
         OSError: the file cannot be written.
     """
     try:
@@ -33,44 +64,74 @@ def export(run: Run, file: Path, selection: Selection) -> list[Path]:
     if selection.rate is not None:
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
     selection.check(run)
+    session = _session(pynwb, run, about(run, selection.names(run)))
+    _add_signals(pynwb, session, run, selection)
+    _add_derived(pynwb, session, run, selection)
+    _add_readings(pynwb, session, run, selection)
+    _add_trials(session, run)
+    for gap in selection.of(run.gaps):
+        session.add_invalid_time_interval(
+            start_time=float(gap["start"]), stop_time=float(gap["end"])
+        )
+    if run.detection is not None:
+        session.units = pynwb.misc.Units(
+            name="units",
+            description="detected spikes",
+            resolution=float(run.attributes["interval"]),
+        )
+        session.add_unit_column("signal", "the channel the spikes were detected on")
+        times = selection.of(run.spikes)["time"]
+        session.add_unit(spike_times=times, signal=run.detection.signal)
+    progress(0.5)
+    with (
+        replacing(file, size(run, selection)) as part,
+        pynwb.NWBHDF5IO(str(part), "w") as writer,
+    ):
+        writer.write(session)
+    progress(1.0)
+    return [file]
+
+
+def _session(pynwb: Any, run: Run, told: dict[str, str | float]) -> Any:
+    """The file's head: what was done by whom, on what, with which instruments."""
     kind = "simulated" if run.simulated else "measured"
     notes = run.info.get("notes") or {}
     title = run.info.get("title") or run.info.get("protocol") or "run"
+    scene = told.pop("scene.toml", None)
     session = pynwb.NWBFile(
         session_description=f"{title} on a spiking tactile sensor, {kind}",
         identifier=run.path.resolve().name,
+        session_id=run.path.resolve().name,
         session_start_time=datetime.fromisoformat(run.info["started"]),
-        experimenter=[notes["operator"]] if notes.get("operator") else None,
+        experimenter=[_last_first(notes["operator"])]
+        if notes.get("operator")
+        else None,
         institution=notes.get("institution"),
+        lab=notes.get("lab"),
+        protocol=run.info.get("protocol"),
         experiment_description=run.info.get("scene"),
-        notes=str(notes) if notes else None,
+        notes="\n".join(f"{key}: {value}" for key, value in told.items()),
+        source_script=scene,
+        source_script_file_name=None if scene is None else "scene.toml",
         keywords=["tactile sensor", "spikes", kind],
     )
     session.subject = pynwb.file.Subject(
         subject_id=str(notes.get("sensor") or "sensor"),
         description="a piezoelectric tactile sensor; no animal was involved",
+        species=notes.get("species"),
         sex="O",
         age="P0D",
     )
-    _add_signals(pynwb, session, run, selection)
-    _add_slow(pynwb, session, run)
-    _add_trials(session, run)
-    for gap in selection.rows(run.gaps):
-        session.add_invalid_time_interval(
-            start_time=float(gap["start"]), stop_time=float(gap["end"])
-        )
-    times = selection.rows(run.spikes)["time"]
-    if run.detection is not None:
-        step = run.signal(run.signals[0]).interval if run.signals else -1.0
-        session.units = pynwb.misc.Units(
-            name="units", description="detected spikes", resolution=step
-        )
-        session.add_unit_column("signal", "the channel the spikes were detected on")
-        session.add_unit(spike_times=times, signal=run.detection.signal)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with pynwb.NWBHDF5IO(str(file), "w") as writer:
-        writer.write(session)
-    return [file]
+    for name, found in (run.info.get("instruments") or {}).items():
+        settings = ", ".join(f"{key} {value}" for key, value in found.items())
+        session.create_device(name=name, description=settings)
+    return session
+
+
+def _last_first(name: str) -> str:
+    """A person as archives list them: "Petaru, A."."""
+    *first, last = name.split()
+    return name if "," in name or not first else f"{last}, {' '.join(first)}"
 
 
 def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
@@ -79,6 +140,8 @@ def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
     if spans and not run.gapless:
         spans = [(spans[0][0], spans[-1][1])]
     for name in selection.names(run):
+        if name not in run.signals:
+            continue
         signal = run.signal(name)
         for number, (first, stop) in enumerate(spans):
             title = name if len(spans) == 1 else f"{name}_{number + 1}"
@@ -103,9 +166,48 @@ def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
             )
 
 
-def _add_slow(pynwb: Any, session: Any, run: Run) -> None:
+def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
+    """The force as a stimulus, I_DS and rate in a module of their own."""
+    names, module = selection.names(run), None
+    for name in (n for n in DERIVED if n in names):
+        if name == "force":
+            time = run.force.time
+        elif name == "rate":
+            time = run.rate["time"]
+        else:
+            time = run.I_DS.time
+        end = np.inf if selection.end is None else selection.end
+        time = time[(time >= selection.start) & (time < end)]
+        if not time.size:
+            continue
+        series = pynwb.TimeSeries(
+            name=name,
+            description=f"{SIGNALS[name].title}, derived",
+            data=derivation(run, name)(time),
+            unit=UNITS[SIGNALS[name].unit],
+            continuity="step" if name == "rate" else "continuous",
+            **_times(time),
+        )
+        if name == "force":
+            session.add_stimulus(series)
+            continue
+        module = module or session.create_processing_module(
+            name="ecephys", description="signals derived from those recorded"
+        )
+        module.add(series)
+
+
+def _times(time: NDArray[np.float64]) -> dict[str, Any]:
+    """A start and a rate where times, s, are even; else each of them."""
+    steps = np.diff(time)
+    if steps.size and np.ptp(steps) < EVEN * steps.mean():
+        return {"starting_time": float(time[0]), "rate": float(1 / steps.mean())}
+    return {"timestamps": time}
+
+
+def _add_readings(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
     """Applied current as stimulus, field readings as acquisition."""
-    current = run.current
+    current, field = selection.of(run.current), selection.of(run.field)
     if current.size:
         session.add_stimulus(
             pynwb.TimeSeries(
@@ -114,9 +216,9 @@ def _add_slow(pynwb: Any, session: Any, run: Run) -> None:
                 data=current["setpoint"],
                 timestamps=current["time"],
                 unit="amperes",
+                continuity="step",
             )
         )
-    field = run.field
     if field.size:
         session.add_acquisition(
             pynwb.TimeSeries(
@@ -130,16 +232,14 @@ def _add_slow(pynwb: Any, session: Any, run: Run) -> None:
 
 
 def _add_trials(session: Any, run: Run) -> None:
-    trials = run.trials
-    if trials.size == 0:
+    table = tables(run, Selection()).get("trials")
+    if table is None:
         return
-    session.add_trial_column("level", "force the trial is filed under, N")
-    session.add_trial_column("label", "for people")
-    for row in trials:
-        level = float(row["level"])
+    for name, meaning in TRIALS.items():
+        session.add_trial_column(name, meaning)
+    columns = {name: table.columns[name].tolist() for name in ("start", "end", *TRIALS)}
+    for row in zip(*columns.values(), strict=True):
+        found = dict(zip(columns, row, strict=True))
         session.add_trial(
-            start_time=float(row["start"]),
-            stop_time=float(row["end"]),
-            level=np.nan if np.isnan(level) else level,
-            label=row["label"].decode(),
+            start_time=found.pop("start"), stop_time=found.pop("end"), **found
         )

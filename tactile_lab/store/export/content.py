@@ -1,0 +1,162 @@
+"""What every export tells of a run beside its signals: what it is, and its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.quantity import show
+from tactile_lab.signals import SIGNALS
+from tactile_lab.store.derived import derivable, derivation
+from tactile_lab.store.folder import SCENE, check_space
+from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+
+Progress = Callable[[float], None]
+"""Told the part that is done, 0 to 1."""
+
+UNITS = {
+    "gaps": {"start": "s", "end": "s"},
+    "spikes": {"time": "s", "amplitude": "V", "width": "s"},
+    "current": {"time": "s", "setpoint": "A", "measured": "A"},
+    "field": {"time": "s", "field": "T"},
+    "events": {"time": "s", "kind": "", "text": ""},
+}
+"""Exported columns of each table and their SI units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Records in columns.
+
+    Attributes:
+        columns: by name, all of one length; texts are arrays of str.
+        units: of each column, SI; "" for numbers without one and for texts.
+    """
+
+    columns: dict[str, NDArray[Any]]
+    units: dict[str, str]
+
+    @property
+    def heads(self) -> list[str]:
+        """Column names with their units: "time_s"."""
+        return [f"{n}_{u}" if u else n for n, u in self.units.items()]
+
+    def __len__(self) -> int:
+        return next(iter(self.columns.values())).size
+
+
+def nothing(part: float) -> None:
+    """For whom progress is of no interest."""
+
+
+def tables(run: Run, selection: Selection) -> dict[str, Table]:
+    """Records of the part, by name; empty ones are left out. Trials are all there.
+
+    Times are s on the run's axis.
+    """
+    found = {}
+    for name, units in UNITS.items():
+        rows = selection.of(getattr(run, name))
+        columns = {column: _plain(rows[column]) for column in units}
+        if name == "current" and "force" in derivable(run):
+            columns["force"] = derivation(run, "force")(rows["time"])
+            units = units | {"force": "N"}
+        found[name] = Table(columns, units)
+    found["trials"] = _trials(run)
+    return {name: table for name, table in found.items() if len(table)}
+
+
+def _trials(run: Run) -> Table:
+    rows = run.trials
+    columns = {
+        "index": rows["index"],
+        "label": _plain(rows["label"]),
+        "level": rows["level"],
+        "start": rows["start"],
+        "end": rows["end"],
+        "hold_start": rows["start"] + rows["hold_start"],
+        "hold_end": rows["start"] + rows["hold_end"],
+        "spikes": rows["spikes"],
+        "pause": rows["pause"],
+        "complete": run.completed.astype(np.uint8),
+    }
+    units = dict.fromkeys(columns, "")
+    units |= {"level": "N", "start": "s", "end": "s", "hold_start": "s"}
+    units |= {"hold_end": "s"}
+    for name in ("rest_V_C1", "drift_V_C1"):
+        if name in (rows.dtype.names or ()):  # older runs lack it
+            columns[name], units[name] = rows[name], "V"
+    return Table(columns, units)
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype.kind == "S":
+        return np.char.decode(values, "utf-8", errors="replace")
+    return values
+
+
+def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
+    """What the run is, by name; of the signals in `names` how they were measured."""
+    info = run.info
+    told: dict[str, str | float] = {"run": run.path.resolve().name}
+    for key in ("title", "protocol", "scene", "bench", "started", "reason"):
+        if info.get(key):
+            told[key] = str(info[key])
+    told |= {
+        "status": run.status,
+        "physics": "simulated" if run.simulated else "measured",
+        "duration_s": run.duration,
+    }
+    if (temperature := (info.get("temperature") or {}).get("K")) is not None:
+        told["temperature_K"] = float(temperature)
+    for name, found in (info.get("instruments") or {}).items():
+        told[name] = str(found.get("identity") or found.get("driver") or "")
+    for note, text in (info.get("notes") or {}).items():
+        told[f"note {note}"] = str(text)
+    for name in names:
+        if name in run.signals:
+            signal = run.signal(name)
+            at = signal.attributes
+            told[f"{name} input"] = f"{at['input']}, {at['coupling']}"
+            told[f"{name} range"] = " to ".join(
+                show(end, signal.unit) for end in signal.span
+            )
+            told[f"{name} one code {signal.unit}"] = abs(signal.gain)
+        else:
+            told[f"{name} source"] = "derived"
+    if (run.path / SCENE).exists():
+        told["scene.toml"] = (run.path / SCENE).read_text(encoding="utf-8")
+    return told
+
+
+def unit(name: str) -> str:
+    """SI unit of a signal; V where it is none this program knows."""
+    return SIGNALS[name].unit if name in SIGNALS else "V"
+
+
+@contextmanager
+def replacing(path: Path, size: int) -> Iterator[Path]:
+    """A new file to write, which takes the place of `path` once it is whole.
+
+    Args:
+        path: what it will be called; its folder is made.
+        size: about how many bytes it will take.
+
+    Raises:
+        RecordingError: that many are not free.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    check_space(path.parent, size)
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

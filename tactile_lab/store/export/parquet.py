@@ -1,0 +1,90 @@
+"""Parquet files: one for the signals, one per table, with units in the schema."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.export.content import (
+    UNITS,
+    Progress,
+    about,
+    nothing,
+    replacing,
+    tables,
+    unit,
+)
+from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+
+ROW = 4
+"""Bytes a row takes per column, about; compression makes less of most."""
+
+
+def size(run: Run, selection: Selection) -> int:
+    """Bytes the files will take, at most."""
+    return selection.rows(run) * ROW * (2 + len(selection.names(run)))
+
+
+def export(
+    run: Run, folder: Path, selection: Selection, progress: Progress = nothing
+) -> list[Path]:
+    """Write `signals.parquet`, `spikes.parquet`, `trials.parquet`, ... into `folder`.
+
+    Signals are single precision, times double. Every column names its unit in the
+    field's metadata; the schema of each file says what the run is. Files of these
+    names that an earlier export left there are replaced or removed.
+
+    Raises:
+        RunFolderError: pyarrow is not installed, or a signal, rate or time the run
+            does not have.
+        RecordingError: there is no room.
+        OSError: the folder cannot be written.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise RunFolderError(
+            "pyarrow is not installed; `pip install tactile-lab[parquet]`, or export "
+            "--to csv or mat."
+        ) from error
+    selection.check(run)
+    rows, names = selection.rows(run), selection.names(run)
+    told = {key: str(value) for key, value in about(run, names).items()}
+
+    def schema(columns: dict[str, Any], units: dict[str, str]) -> Any:
+        fields = [
+            pa.field(n, kind, metadata={"unit": units[n]})
+            for n, kind in columns.items()
+        ]
+        return pa.schema(fields, metadata=told)
+
+    made = []
+    if rows:
+        made.append(folder / "signals.parquet")
+        kinds = {"time": pa.float64()} | dict.fromkeys(names, pa.float32())
+        shape = schema(kinds, {"time": "s"} | {name: unit(name) for name in names})
+        done = 0
+        with (
+            replacing(made[-1], size(run, selection)) as part,
+            parquet.ParquetWriter(part, shape, compression="zstd") as writer,
+        ):
+            for time, values in selection.pieces(run):
+                single = [column.astype(np.float32) for column in values]
+                writer.write_table(pa.table([time, *single], schema=shape))
+                done += time.size
+                progress(done / rows)
+    for name, table in tables(run, selection).items():
+        made.append(folder / f"{name}.parquet")
+        arrays = {n: pa.array(values) for n, values in table.columns.items()}
+        shape = schema({n: a.type for n, a in arrays.items()}, table.units)
+        with replacing(made[-1], 0) as part:
+            whole = pa.table(list(arrays.values()), schema=shape)
+            parquet.write_table(whole, part)
+    for name in {"signals", *UNITS, "trials"} - {file.stem for file in made}:
+        (folder / f"{name}.parquet").unlink(missing_ok=True)
+    return made

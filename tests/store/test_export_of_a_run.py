@@ -1,0 +1,215 @@
+"""Exports of a run tell all of it: force, rate, drain current, holds, settings."""
+
+import csv
+
+import numpy as np
+import pytest
+import scipy.io
+from click.testing import CliRunner
+
+from tactile_lab.cli import cli
+from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import RunFolderError
+from tactile_lab.scene.load import load
+from tactile_lab.store.export import csv as to_csv
+from tactile_lab.store.export import mat as to_mat
+from tactile_lab.store.export import ro_crate
+from tactile_lab.store.export.lines import fixed, steps, written
+from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+
+OVERRIDES = (
+    'protocol.levels=["200 mN"]',
+    "protocol.hold=0.8 s",
+    "protocol.rest=0.3 s",
+    "record.sample_rate=200 kS/s",
+)
+NOTES = {"operator": "Ada B. Petaru", "lab": "Touch", "institution": "TU"}
+SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current", "force", "rate", "I_DS")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs")
+    done = Execution(load("demo", OVERRIDES), out, notes=NOTES).run()
+    assert done.exit_code == 0, done.reason
+    return done.folder
+
+
+@pytest.fixture
+def run(folder):
+    with Run.load(folder) as loaded:
+        yield loaded
+
+
+@pytest.fixture(scope="module")
+def columns(folder):
+    with Run.load(folder) as loaded:
+        return Selection().read(loaded)
+
+
+def test_csv_holds_what_is_derived_beside_what_was_stored(run, columns, tmp_path):
+    told = []
+    to_csv.export(run, tmp_path, Selection(), told.append)
+    time, expected = columns
+    with (tmp_path / "signals.csv").open() as file:
+        head = file.readline().strip().split(",")
+        table = np.loadtxt(file, delimiter=",")
+    units = ("V", "V", "V", "A", "N", "Hz", "A")
+    pairs = zip(SIGNALS, units, strict=True)
+    assert head == ["time_s", *(f"{name}_{unit}" for name, unit in pairs)]
+    np.testing.assert_allclose(table[:, 0], time, atol=1e-9)
+    for column, name in zip(table.T[1:], SIGNALS, strict=True):
+        np.testing.assert_allclose(column, expected[name], rtol=1e-11, atol=1e-9)
+    middle = time.searchsorted(1.0)
+    assert expected["force"][middle] == pytest.approx(0.2, rel=0.02)
+    assert expected["rate"].max() > 5
+    assert told[-1] == 1.0 and told == sorted(told)
+    assert sum(f.stat().st_size for f in tmp_path.iterdir()) == pytest.approx(
+        to_csv.size(run, Selection()), rel=0.5
+    )
+
+
+def test_csv_says_what_the_run_was_and_when_it_held(run, tmp_path):
+    to_csv.export(run, tmp_path, Selection(rate=1e3))
+    with (tmp_path / "about.csv").open(newline="") as file:
+        about = dict(csv.reader(file))
+    assert about["scene"] == "demo"
+    assert about["note operator"] == "Ada B. Petaru"
+    assert float(about["V_C1 one code V"]) == run.signal("V_C1").gain
+    assert 'levels = ["0.2 N"]' in about["scene.toml"].replace("\n    ", "").replace(
+        ",\n]", "]"
+    )
+    with (tmp_path / "trials.csv").open(newline="") as file:
+        (trial,) = csv.DictReader(file)
+    held = float(trial["hold_end_s"]) - float(trial["hold_start_s"])
+    assert held == pytest.approx(0.8)
+    assert trial["complete"] == "1"
+    with (tmp_path / "current.csv").open(newline="") as file:
+        forces = [float(row["force_N"]) for row in csv.DictReader(file)]
+    assert max(forces) == pytest.approx(0.2, rel=0.02)
+
+
+def test_matlab_holds_the_same(run, columns, tmp_path):
+    to_mat.export(run, tmp_path / "run.mat", Selection())
+    read = scipy.io.loadmat(tmp_path / "run.mat", simplify_cells=True)
+    for name in SIGNALS:
+        np.testing.assert_allclose(
+            read[name]["values"], columns[1][name], rtol=1e-6, atol=1e-12
+        )
+    assert read["force"]["unit"] == "N"
+    assert read["trials"]["hold_end"] - read["trials"]["hold_start"] == pytest.approx(
+        0.8
+    )
+    assert read["info"]["note_lab"] == "Touch"
+    assert not list(tmp_path.glob(".*")), "no part of a file stays"
+
+
+def test_netcdf_is_read_by_xarray(run, columns, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    from tactile_lab.store.export import netcdf
+
+    file = tmp_path / "run.nc"
+    netcdf.export(run, file, Selection())
+    with xarray.open_dataset(file, engine="h5netcdf") as read:
+        assert tuple(read.data_vars) == SIGNALS
+        for name in SIGNALS:
+            np.testing.assert_allclose(
+                read[name], columns[1][name], rtol=1e-6, atol=1e-12
+            )
+        assert read["force"].units == "N"
+        assert read.attrs["scene"] == "demo"
+    with xarray.open_dataset(file, group="trials", engine="h5netcdf") as trials:
+        assert trials["label"].values.tolist() == ["200 mN"]
+    part = Selection(signals=("V_K",), start=0.5, end=0.6, rate=1e4)
+    netcdf.export(run, file, part)
+    with xarray.open_dataset(file, engine="h5netcdf") as read:
+        assert read["V_K"].shape == (1000,)
+
+
+def test_parquet_is_read_with_its_units(run, columns, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    from tactile_lab.store.export import parquet as to_parquet
+
+    to_parquet.export(run, tmp_path, Selection())
+    read = parquet.read_table(tmp_path / "signals.parquet")
+    assert read.column_names == ["time", *SIGNALS]
+    np.testing.assert_allclose(read["V_C1"], columns[1]["V_C1"], rtol=1e-6)
+    assert read.schema.field("I_DS").metadata == {b"unit": b"A"}
+    assert read.schema.metadata[b"note lab"] == b"Touch"
+    trials = parquet.read_table(tmp_path / "trials.parquet").to_pylist()
+    assert trials[0]["hold_end"] - trials[0]["hold_start"] == pytest.approx(0.8)
+
+
+def test_nwb_says_who_where_and_with_what(run, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    from tactile_lab.store.export import nwb
+
+    nwb.export(run, tmp_path / "run.nwb", Selection())
+    with pynwb.NWBHDF5IO(str(tmp_path / "run.nwb"), "r") as reader:
+        session = reader.read()
+        assert session.experimenter == ("Petaru, Ada B.",)
+        assert (session.lab, session.institution) == ("Touch", "TU")
+        assert set(session.devices) >= {"coil", "scope"}
+        assert "[protocol]" in session.source_script
+        force = session.stimulus["force"]
+        assert max(force.data[:]) == pytest.approx(0.2, rel=0.02)
+        assert set(session.processing["ecephys"].data_interfaces) == {"rate", "I_DS"}
+        assert session.trials["hold_end"][0] - session.trials["hold_start"][
+            0
+        ] == pytest.approx(0.8)
+
+
+def test_nwb_of_spikes_alone_passes_its_inspector(tmp_path):
+    inspector = pytest.importorskip("nwbinspector")
+    from tactile_lab.store.export import nwb
+
+    alone = (*OVERRIDES, 'record.signals=["spikes"]')
+    done = Execution(load("demo", alone), tmp_path, notes=NOTES).run()
+    with Run.load(done.folder) as loaded:
+        assert loaded.signals == ()
+        nwb.export(loaded, tmp_path / "run.nwb", Selection())
+    found = inspector.inspect_nwbfile(nwbfile_path=tmp_path / "run.nwb")
+    told = {message.check_function_name for message in found}
+    # a sensor has no species, this run one trial
+    assert told <= {"check_subject_species_exists", "check_single_row"}
+
+
+def test_the_folder_is_an_ro_crate(run, folder, tmp_path):
+    rocrate = pytest.importorskip("rocrate.rocrate")
+    (file,) = ro_crate.export(run, folder / ro_crate.METADATA, Selection())
+    read = rocrate.ROCrate(folder)
+    assert read.mainEntity is None and read.name == f"Pulses: {folder.name}"
+    parts = {entity.id for entity in read.data_entities}
+    assert {"data.h5", "run.json", "scene.toml", "inputs/pulses.py"} <= parts
+    assert read.get("#measurement")["agent"][0]["name"] == "Ada B. Petaru"
+    file.unlink()
+    ro_crate.export(run, tmp_path / "run.zip", Selection())
+    assert rocrate.ROCrate(tmp_path / "run.zip").get("data.h5") is not None
+    with pytest.raises(RunFolderError, match="whole run folder"):
+        ro_crate.export(run, tmp_path / "x.zip", Selection(end=1.0))
+
+
+@pytest.mark.parametrize("form", ["csv", "mat", "netcdf", "nwb", "parquet"])
+def test_a_window_with_nothing_in_it_is_refused_in_every_format(folder, form):
+    before = sorted(folder.rglob("*"))
+    wrong = ["export", str(folder), "--to", form, "--from", "1 s", "--until", "0.5 s"]
+    done = CliRunner().invoke(cli, wrong)
+    assert done.exit_code == 2
+    assert "nothing from 1 s until 500 ms" in done.output
+    assert sorted(folder.rglob("*")) == before
+
+
+def text(rows):
+    return [bytes(row[row != 0]).decode() for row in rows]
+
+
+def test_numbers_as_text():
+    values = np.array([0.0, -0.25, -1e-12, np.nan, 12.000000001, 1e-9])
+    assert text(fixed(values)) == [
+        "0.000000000", "-0.250000000", "0.000000000", "", "12.000000001",
+        "0.000000001",
+    ]  # fmt: skip
+    held = np.array([1.5, 1.5, np.nan, np.nan, -2e-9])
+    assert text(steps(held)) == text(written(held)) == ["1.5", "1.5", "", "", "-2e-09"]
