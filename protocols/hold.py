@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from tactile_lab.analysis.adrian import ADRIAN, MARK
+from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 from tactile_lab.analysis.spike_train import within
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
-from tactile_lab.measurement import Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, show
 from tactile_lab.stimulus.force import ForceProtocol
@@ -48,42 +49,55 @@ class Hold(ForceProtocol):
         )
 
     def conclude(self, run: Measurement) -> Conclusion:
-        """The time constant of the falling rate."""
+        """The circuit's own adaptation, and the exponential of the paper beside it."""
         if not run.searched:
             return Conclusion(missing=(NOT_SEARCHED,))
         held = [t for t in run.results if t.hold is not None]
-        fit = next((t.adaptation for t in held if t.adaptation is not None), None)
-        if fit is None:
-            why = held[0].why_not if held else "no hold was completed"
-            return Conclusion(
-                (), {"time_constant_s": None}, (f"No time constant: {why}.",)
-            )
-        tau = fit.time_constant
-        said = f"The rate falls with a time constant of {tau.text('s')}."
-        return Conclusion((said,), {"time_constant_s": tau})
+        if not held:
+            why = "No adaptation: no hold was completed."
+            return Conclusion((), {"tau_s": None, "time_constant_s": None}, (why,))
+        return _by_circuit(run, held[0]) + _by_exponential(held[0])
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
-        """The decay with its fit (Fig. 5c), beside Adrian's curves (Fig. 5d left)."""
-        trial = next((t for t in run.results if t.adaptation is not None), None)
-        if trial is None or trial.adaptation is None:
+        """The decay with its fits (Fig. 5c), beside Adrian's curves (Fig. 5d left)."""
+        trial = next((t for t in run.results if t.hold is not None), None)
+        if trial is None or trial.hold is None:
             return
-        fit = trial.adaptation
-        start, end = fit.hold
-        held = within(trial.spike_times, fit.hold)
-        time, later = np.linspace(start, end, 300), np.linspace(0, 8, 200)
-        values = (
-            ("α", fit.alpha, "Hz"),
-            ("β", fit.beta, "1/s"),
-            ("γ", fit.gamma, "Hz"),
-        )
-        fitted = [f"{name} = {value.text(unit)}" for name, value, unit in values]
+        fit, (law, _) = trial.adaptation, run.circuit_adaptation(trial)
+        if fit is None and law is None:
+            return
+        start, end = trial.hold
+        held = within(trial.spike_times, trial.hold)
+        curves, fitted = [], []
+        if law is not None:
+            time = np.linspace(law.hold[0], end, 600)
+            curves.append(
+                Series(x=time - start, y=law.rate(time), name="Eq. (15)", colour="V_C1")
+            )
+            fitted += [f"τ = {law.tau.text('s')}", _gate(law)]
+        if fit is not None:
+            time, rate = fit.drawn
+            curves.append(
+                Series(
+                    x=time - start, y=rate, name="α exp(βt) + γ", mark="dashed",
+                    colour="ink",
+                )
+            )  # fmt: skip
+            values = (("α", fit.alpha, "Hz"), ("β", fit.beta, "1/s"))
+            fitted += [
+                f"{name} = {value.text(unit)}"
+                for name, value, unit in (*values, ("γ", fit.gamma, "Hz"))
+            ]
+        later = np.linspace(0, 8, 200)
         colours = zip(ADRIAN, ("V_C1", "V_C2"), strict=True)
         yield Plot(
             name="summary",
             title="adaptation",
-            caption="Left: instantaneous rate during the hold and the fit α exp(βt) + "
-            "γ, as in Fig. 5c. Right: Adrian and Zotterman's adaptation drawn from the "
-            "coefficients the paper prints (Fig. 5d, left); these curves are not data.",
+            caption="Left: instantaneous rate during the hold, as in Fig. 5c; line: "
+            "Eq. (15) with V_P(t), fitted to the spikes and the silence; dashed: "
+            "α exp(βt) + γ, as in the paper, up to the last spike. Right: Adrian and "
+            "Zotterman's adaptation drawn from the coefficients the paper prints (Fig. "
+            "5d, left); these curves are not data.",
             x_label="Time",
             x_unit="s",
             beside=True,
@@ -93,10 +107,7 @@ class Hold(ForceProtocol):
                     unit="Hz",
                     series=(
                         Series(x=held[1:] - start, y=1 / np.diff(held), mark="dots"),
-                        Series(
-                            x=time - start, y=fit.rate(time), mark="dashed",
-                            colour="ink",
-                        ),
+                        *curves,
                     ),
                     limits=(0, None),
                     text="\n".join(fitted),
@@ -116,3 +127,52 @@ class Hold(ForceProtocol):
                 ),
             ),
         )  # fmt: skip
+
+
+def _by_circuit(run: Measurement, trial: MeasuredTrial) -> Conclusion:
+    """Tau and V_GS by the circuit's own law, and where it falls silent."""
+    law, why = run.circuit_adaptation(trial)
+    if law is None:
+        return Conclusion((), {"tau_s": None}, (f"No tau of the film: {why}.",))
+    said = (
+        f"By the circuit's own law, Eq. (15) with V_P(t), the film leaks with tau = "
+        f"{law.tau.text('s')} and {_gate(law)}; the rates lie within "
+        f"{show(law.rms, 'Hz', 2)} of it (rms)."
+    )
+    measured = trial.response.silent
+    if law.silent_from is not None and measured is not None:
+        said += (
+            f" It fires its last spike at {law.silent_from:.4g} s, the sensor did at "
+            f"{measured:.4g} s."
+        )
+    values = {
+        "tau_s": law.tau, "V_GS_V": law.V_GS, "V_P_V": law.V_P, "rms_Hz": law.rms,
+        "law_silent_from_s": law.silent_from,
+    }  # fmt: skip
+    return Conclusion((said,), values)
+
+
+def _by_exponential(trial: MeasuredTrial) -> Conclusion:
+    """The exponential's time constant, and what it cannot tell."""
+    fit = trial.adaptation
+    if fit is None:
+        why = f"No time constant of an exponential: {trial.why_not}."
+        return Conclusion((), {"time_constant_s": None}, (why,))
+    said = (
+        "As in the paper, an exponential describes the falling rate with a time "
+        f"constant of {fit.time_constant.text('s')}"
+    )
+    if fit.systematic:
+        said += "; the rates leave it systematically, so that interval is too narrow"
+    silent = trial.response.silent
+    if silent is not None and fit.unseen >= 0.5:
+        said += (
+            f"; it knows no silence and expects {fit.unseen:.1f} more spikes after "
+            f"the last one at {silent:.4g} s"
+        )
+    return Conclusion((f"{said}.",), {"time_constant_s": fit.time_constant})
+
+
+def _gate(law: CircuitAdaptation) -> str:
+    half = show(law.V_GS.half, "V", 2)
+    return f"V_GS = {law.V_GS.value:.4f} V ± {half}"

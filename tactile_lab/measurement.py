@@ -9,6 +9,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.signals import Source
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 
 FloatArray = NDArray[np.float64]
 
@@ -153,6 +157,8 @@ class Measurement:
         field: teslameter readings, shape (m, 2), s and T, or None.
         traces: decimated signals, the derived I_DS and the model's V_C1 among them.
         circuit: the sensor as it is believed to be, to compare with, or None.
+        bias_uncertainty: half of the 95 % band of the current a measuring follower
+            draws from C2, A.
         searched: whether spikes were looked for.
         settings: settings read back, by instrument, then by name.
         conditions: temperature, operator, sensor and notes, as text by name.
@@ -172,6 +178,7 @@ class Measurement:
     field: FloatArray | None = None
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
+    bias_uncertainty: float = 0.0
     searched: bool = True
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
     conditions: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -186,6 +193,41 @@ class Measurement:
             if t.level is not None or t.hold is not None or t.spike_times.size
         )
         return telling or played
+
+    def circuit_adaptation(
+        self, trial: MeasuredTrial
+    ) -> tuple[CircuitAdaptation | None, str]:
+        """The circuit's own law fitted to a trial's hold, or None and why not.
+
+        The hold counts from when the applied force was there and node A had followed.
+        """
+        if trial.start not in self._circuit_fits:
+            self._circuit_fits[trial.start] = self._fit_circuit(trial)
+        return self._circuit_fits[trial.start]
+
+    @cached_property
+    def _circuit_fits(self) -> dict[float, tuple[CircuitAdaptation | None, str]]:
+        return {}
+
+    def _fit_circuit(
+        self, trial: MeasuredTrial
+    ) -> tuple[CircuitAdaptation | None, str]:
+        begin = self.applied_edge(trial)
+        if self.circuit is None or trial.hold is None or begin is None:
+            return None, "no hold, or no circuit to compare with"
+        from tactile_lab.analysis.circuit_adaptation import (
+            FOLLOWED,
+            fit_circuit_adaptation,
+        )
+
+        hold = begin + FOLLOWED - trial.start, trial.hold[1]
+        try:
+            found = fit_circuit_adaptation(
+                self.circuit, trial.spike_times, hold, self.bias_uncertainty
+            )
+        except NotIdentifiableError as error:
+            return None, str(error)
+        return found, ""
 
     @property
     def origin(self) -> str:
@@ -245,15 +287,8 @@ class Measurement:
         """
         if trial.held is None:
             return None
-        force, (start, end) = self.force, trial.held
-        inside = (force.time >= trial.start) & (force.time <= (start + end) / 2)
-        held = float(force.at((start + end) / 2))
-        apart = np.abs(force.value[inside] - held) > 0.01 * abs(held)
-        away = np.flatnonzero(apart)
-        if not away.size:
-            return start
-        later = force.time[inside][away[-1] + 1 : away[-1] + 2]
-        return max(start, float(later[0]) if later.size else start)
+        start, end = trial.held
+        return max(start, self.force.arrival((start + end) / 2, trial.start))
 
     def field_between(self, start: float, end: float) -> FloatArray:
         """Field read in [start, end] s of run time, T; empty where none was."""

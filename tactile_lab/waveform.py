@@ -143,6 +143,22 @@ class Waveform:
         )
         return value
 
+    def arrival(self, at: float, since: float, within: float = 0.01) -> float:
+        """When it came near the value it has at `at` s, to stay until then, s.
+
+        Args:
+            at: s.
+            since: nothing before is looked at; the answer where it stayed near, s.
+            within: part of that value that counts as near.
+        """
+        held = float(self.at(at))
+        inside = (self.time >= since) & (self.time <= at)
+        away = np.flatnonzero(np.abs(self.value[inside] - held) > within * abs(held))
+        if not away.size:
+            return since
+        there = self.time[inside][away[-1] + 1 :]
+        return float(there[0]) if there.size else at
+
     def segments(self) -> Iterator[tuple[float, float, float, float]]:
         """Each (start s, end s, value at start, value at end); jumps have no length."""
         for i in range(self.time.size - 1):

@@ -117,6 +117,14 @@ def test_the_force_of_a_run_is_what_was_asked_for(run):
     assert run.force.at(run.duration) == pytest.approx(0.0, abs=1e-3)
 
 
+def test_a_run_tells_its_adaptation_by_the_circuit_s_own_law(run):
+    found = run.adaptation()
+    assert found.tau.low < 8.69 < found.tau.high
+    assert found.V_GS.value == pytest.approx(1.4, abs=5e-3)
+    with pytest.raises(IndexError):
+        run.adaptation(7)
+
+
 def test_signals_in_columns_stored_and_derived(run):
     pytest.importorskip("xarray")
     data = run.to_xarray(1.0, 3.0, signals=("V_C1", "force", "I_DS", "rate"), rate=1e3)

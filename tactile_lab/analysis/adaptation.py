@@ -10,6 +10,7 @@ hold is longer than about 2/|beta|, and is refused otherwise.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,12 @@ STEEPEST = 300.0
 """Largest |beta| times the hold that the fit tries."""
 SMALLEST_FALL = 1e-3
 """Part of the mean rate; a smaller fall is none."""
+UNLIKELY = 0.01
+"""A misfit with a smaller chance than this is taken to be systematic."""
+DRAWN = 200
+"""Points with which a law is drawn."""
+BEYOND = 3.841458820694124
+"""By which twice the logarithm of a likelihood falls at the end of a 95 % interval."""
 SHORTEST_HOLD = 2.0
 """The hold must last this many time constants 1/|beta|."""
 _GRID = np.geomspace(0.05, 200.0, 60)
@@ -42,9 +49,14 @@ class Adaptation:
         time_constant: 1/|beta|, s.
         irregularity: standard deviation of the rescaled intervals, 0 for a train that
             follows the law exactly.
+        chance: with which a train that scatters about the law at random would lie on
+            one side of it for as long as this one (runs test), 0 to 1.
         r_squared: part of the variance of 1/ISI that the law explains.
         intervals: number of intervals used.
         hold: (start, end) used, s.
+        last: the last spike of the hold, s on the axis of the spike times: the law
+            describes no more.
+        unseen: spikes that the law expects from there to the hold's end.
     """
 
     alpha: Estimate
@@ -52,9 +64,23 @@ class Adaptation:
     gamma: Estimate
     time_constant: Estimate
     irregularity: float
+    chance: float
     r_squared: float
     intervals: int
     hold: tuple[float, float]
+    last: float
+    unseen: float
+
+    @property
+    def systematic(self) -> bool:
+        """Whether the rates leave the law systematically: its intervals are narrow."""
+        return self.chance < UNLIKELY
+
+    @property
+    def drawn(self) -> tuple[FloatArray, FloatArray]:
+        """Times, s, from the hold's start to the last spike, and the law there, Hz."""
+        time = np.linspace(self.hold[0], self.last, DRAWN)
+        return time, self.rate(time)
 
     def rate(self, time: ArrayLike) -> FloatArray:
         """The law at `time`, s on the axis of the spike times, Hz."""
@@ -85,7 +111,7 @@ def fit_adaptation(spike_times: ArrayLike, hold: tuple[float, float]) -> Adaptat
             f"{FEWEST_INTERVALS} are needed"
         )
     starts, ends = times[:-1] - hold[0], times[1:] - hold[0]
-    theta, covariance, dispersion, bound = _fit(starts, ends)
+    theta, covariance, dispersion = _fit(starts, ends)
     beta, error = float(theta[1]), float(np.sqrt(covariance[1, 1]))
     length = hold[1] - hold[0]
     quantile = student_95(count - 3)
@@ -119,12 +145,15 @@ def fit_adaptation(spike_times: ArrayLike, hold: tuple[float, float]) -> Adaptat
     return Adaptation(
         alpha=alpha,
         beta=_estimate(theta, covariance, 1, quantile),
-        gamma=_gamma(theta, covariance, quantile, bound),
+        gamma=_gamma(theta, covariance, quantile, starts, ends),
         time_constant=constant,
         irregularity=float(np.sqrt(dispersion)),
+        chance=_chance(_count(theta, starts, ends) - 1),
         r_squared=float(1 - unexplained / np.sum((observed - observed.mean()) ** 2)),
         intervals=count,
         hold=hold,
+        last=float(times[-1]),
+        unseen=float(_count(theta, ends[-1:], np.array([length]))[0]),
     )
 
 
@@ -144,24 +173,54 @@ def _estimate(
 
 
 def _gamma(
-    theta: FloatArray, covariance: FloatArray, quantile: float, free: float
+    theta: FloatArray,
+    covariance: FloatArray,
+    quantile: float,
+    starts: FloatArray,
+    ends: FloatArray,
 ) -> Estimate:
-    """Gamma with its interval cut at 0; `free` is its value without the bound."""
-    error = float(np.sqrt(covariance[2, 2]))
-    half = quantile * error
-    return Estimate(
-        float(theta[2]), error, max(0.0, free - half), max(0.0, free + half)
-    )
+    """Gamma; at its bound 0 with an interval by the profile of the likelihood."""
+    value, error = float(theta[2]), float(np.sqrt(covariance[2, 2]))
+    if value > 0:
+        half = quantile * error
+        return Estimate(value, error, max(0.0, value - half), value + half)
+    least = _cost(theta, starts, ends)
+    surprise = _count(theta, starts, ends) - 1
+    shape = starts.size / max(float(np.sum(surprise**2)), 1e-12 * starts.size)
+
+    def beyond(gamma: float) -> bool:
+        there = np.array([theta[0], theta[1], gamma])
+        moves = np.array([True, True, False])
+        cost = _cost(_scored(there, starts, ends, moves), starts, ends)
+        return 2 * shape * (cost - least) > BEYOND
+
+    low, high = 0.0, 1e-3 * theta[0]
+    while not beyond(high) and high < theta[0]:
+        low, high = high, 2 * high
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (low, middle) if beyond(middle) else (middle, high)
+    return Estimate(0.0, error, 0.0, high)
 
 
-def _fit(
-    starts: FloatArray, ends: FloatArray
-) -> tuple[FloatArray, FloatArray, float, float]:
-    """(theta, covariance, dispersion, gamma without its bound)."""
+def _chance(surprise: FloatArray) -> float:
+    """Of so few changes of sign, by Wald and Wolfowitz's runs test, one-sided."""
+    above = surprise > 0
+    n, m = int(above.sum()), int((~above).sum())
+    if n == 0 or m == 0:
+        return 0.0 if surprise.size > 10 else 1.0
+    runs = 1 + int(np.count_nonzero(above[1:] != above[:-1]))
+    mean = 1 + 2 * n * m / (n + m)
+    variance = (mean - 1) * (mean - 2) / (n + m - 1)
+    z = (runs + 0.5 - mean) / math.sqrt(max(variance, 1e-12))
+    return 0.5 * math.erfc(-z / math.sqrt(2))
+
+
+def _fit(starts: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """(theta, covariance, dispersion)."""
     theta = _scored(_start(starts, ends), starts, ends, np.array([True, True, True]))
-    free = float(theta[2])
     jacobian = _log_jacobian(theta, starts, ends)
-    if free < 0:
+    if theta[2] < 0:
         bounded = np.array([True, True, False])
         theta = _scored(np.array([theta[0], theta[1], 0.0]), starts, ends, bounded)
         jacobian = _log_jacobian(theta, starts, ends)
@@ -169,8 +228,7 @@ def _fit(
     dispersion = max(float(np.sum(surprise**2) / (starts.size - 3)), 1e-12)
     information = jacobian.T @ jacobian
     inverse = np.linalg.pinv(information, hermitian=True)
-    covariance = np.asarray(dispersion * inverse, dtype=np.float64)
-    return theta, covariance, dispersion, free
+    return theta, np.asarray(dispersion * inverse, dtype=np.float64), dispersion
 
 
 def _scored(

@@ -39,9 +39,9 @@ class Estimate:
 
     def text(self, unit: str, factor: float = 1.0) -> str:
         """For a person: "3.1 s (2.9 to 3.3 s, 95 %)"; `factor`: from SI to `unit`."""
-        if self.low == self.high:
-            return f"{_plain(self.value * factor)} {unit} (at its bound)"
         low, high = _plain(self.low * factor), _plain(self.high * factor)
+        if self.value == self.low < self.high:
+            return f"{low} {unit} (at its bound; below {high} {unit}, 95 %)"
         return f"{_plain(self.value * factor)} {unit} ({low} to {high} {unit}, 95 %)"
 
     def widened(self, *halves: float) -> Estimate:

@@ -73,6 +73,7 @@ def read(folder: Path) -> RunData:
             traces=_traces(run),
             circuit=scene.circuit,
             belief=_belief(run, scene),
+            bias_uncertainty=_bias_uncertainty(scene),
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
             asks_I_DS="I_DS" in scene.record.signals,
@@ -111,6 +112,12 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
         followers=scene.bench.followers,
         clock=clock,
     )
+
+
+def _bias_uncertainty(scene: Scene) -> float:
+    """Of the current that the follower at V_C2 draws, A."""
+    followers = scene.bench.followers
+    return 0.0 if followers is None else followers.input_bias_uncertainty
 
 
 def _conditions(info: Mapping[str, Any]) -> dict[str, str]:

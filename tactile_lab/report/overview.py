@@ -234,7 +234,6 @@ def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray, float]:
 
 
 def _fit(trial: MeasuredTrial, start: float) -> Series:
-    assert trial.adaptation is not None and trial.hold is not None
-    held = np.linspace(*trial.hold, 100)
-    rate = trial.adaptation.rate(held)
+    assert trial.adaptation is not None
+    held, rate = trial.adaptation.drawn
     return Series(x=held + start, y=rate, mark="dashed", colour="ink")

@@ -20,7 +20,12 @@ from tactile_lab.report.canvas import HEAD_HEIGHT
 from tactile_lab.report.drift import drift_sentence
 from tactile_lab.report.findings import Findings
 from tactile_lab.report.run_data import RunData
-from tactile_lab.report.table import NONE, fits_table, trials_table
+from tactile_lab.report.table import (
+    NONE,
+    circuit_fits_table,
+    fits_table,
+    trials_table,
+)
 from tactile_lab.report.twin import sentences
 
 LONG = 12
@@ -63,6 +68,7 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
         trials=trials_table(run),
         long=len(run.results) > LONG,
         fits=fits_table(run),
+        laws=circuit_fits_table(run),
         twin=drawn.pop("twin", None),
         drift=drawn.pop("drift", None),
         answers=tuple(drawn.values()),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.analysis.adaptation import Adaptation
+from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 from tactile_lab.analysis.twin import Twin
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.report.findings import Findings
@@ -83,6 +84,7 @@ def as_json(findings: Findings) -> str:
 
 def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
     response, fit = trial.response, trial.adaptation
+    law, why_not = run.circuit_adaptation(trial)
     return {
         "label": trial.label,
         "complete": trial.complete,
@@ -107,6 +109,8 @@ def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
         "silent_from_s": response.silent,
         "adaptation": None if fit is None else _adaptation(fit),
         "adaptation_why_not": trial.why_not or None,
+        "circuit_adaptation": None if law is None else _circuit_adaptation(law),
+        "circuit_adaptation_why_not": why_not or None,
     }
 
 
@@ -151,4 +155,18 @@ def _adaptation(fit: Adaptation) -> dict[str, Any]:
         "irregularity": fit.irregularity,
         "r_squared": fit.r_squared,
         "intervals": fit.intervals,
+        "chance_of_misfit": fit.chance,
+        "spikes_expected_in_silence": fit.unseen,
+    }
+
+
+def _circuit_adaptation(law: CircuitAdaptation) -> dict[str, Any]:
+    return {
+        "tau_s": law.tau.to_dict(),
+        "V_GS_V": law.V_GS.to_dict(),
+        "V_P_V": law.V_P.to_dict(),
+        "scatter_at_firing_V": law.scatter,
+        "rms_Hz": law.rms,
+        "intervals": law.intervals,
+        "silent_from_s": law.silent_from,
     }

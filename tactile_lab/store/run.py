@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab import notebook
-from tactile_lab.errors import RunFolderError
+from tactile_lab.errors import NotIdentifiableError, RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
@@ -22,6 +22,8 @@ from tactile_lab.store.stored_run import StoredRun
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+    from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 
 
 class Run(StoredRun):
@@ -40,6 +42,32 @@ class Run(StoredRun):
             RunFolderError: V_C1 was not stored.
         """
         return drain_current_of(self)
+
+    def adaptation(self, trial: int = 0) -> CircuitAdaptation:
+        """The circuit's own law fitted to the spikes in a trial's hold, Eqs. (7), (15).
+
+        Args:
+            trial: its number among `trials`.
+
+        Raises:
+            NotIdentifiableError: no hold, too few spikes, or a tau they leave open.
+        """
+        from tactile_lab.analysis.circuit_adaptation import (
+            FOLLOWED,
+            fit_circuit_adaptation,
+        )
+
+        row, followers = self.trials[trial], self.scene.bench.followers
+        start, end = (float(row["start"] + row[n]) for n in ("hold_start", "hold_end"))
+        if not start < end:
+            raise NotIdentifiableError("the trial has no hold")
+        arrived = self.force.arrival((start + end) / 2, float(row["start"]))
+        return fit_circuit_adaptation(
+            self.scene.circuit,
+            self.spikes["time"],
+            (max(start, arrived) + FOLLOWED, end),
+            0.0 if followers is None else followers.input_bias_uncertainty,
+        )
 
     def to_xarray(
         self,

@@ -50,6 +50,29 @@ def test_gamma_never_falls_below_zero():
         assert fit.gamma.low >= 0
 
 
+def test_gamma_at_its_bound_says_so_and_has_a_profile_interval():
+    times = spikes_of_the_law(20.0, -0.5, 0.0, hold=8.0, shape=30, seed=2)
+    fits = [fit_adaptation(times, (0.0, 8.0)) for _ in range(1)]
+    for seed in range(3, 30):
+        times = spikes_of_the_law(20.0, -0.5, 0.0, hold=8.0, shape=30, seed=seed)
+        fits.append(fit_adaptation(times, (0.0, 8.0)))
+    bound = [fit.gamma for fit in fits if fit.gamma.value == 0]
+    assert len(bound) > 3
+    assert all(gamma.low == 0 < gamma.high < 4.0 for gamma in bound)
+    assert "at its bound; below" in bound[0].text("Hz")
+
+
+def test_a_systematic_misfit_is_told_from_irregularity():
+    scattered = spikes_of_the_law(15.0, -0.6, 4.0, hold=10.0, shape=100, seed=5)
+    assert not fit_adaptation(scattered, (0.0, 10.0)).systematic
+    time = np.linspace(0, 10, 40_001)
+    bent = np.cumsum(18 / (1 + time)) * (time[1] - time[0])
+    train = np.interp(np.arange(0.5, bent[-1]), bent, time)
+    fit = fit_adaptation(train, (0.0, 10.0))
+    assert fit.systematic
+    assert fit.drawn[0][-1] == fit.last == train[-1]
+
+
 def test_time_constant_is_one_over_beta_with_its_interval():
     times = spikes_of_the_law(12.0, -0.5, 4.0, hold=10.0, shape=50, seed=1)
     fit = fit_adaptation(times, (0.0, 10.0))

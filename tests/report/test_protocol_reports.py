@@ -381,10 +381,10 @@ def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
 def test_too_few_spikes_to_fit_are_said(rate_force, tmp_path):
     held = replace(rate_force, protocol=Hold(), trials=rate_force.trials[2:3])
     report = write(tmp_path, held)
-    (said,) = report.findings.missing
-    assert said.startswith("No time constant: not identifiable: ")
+    film, said = report.findings.missing
+    assert said.startswith("No time constant of an exponential: not identifiable: ")
     found = json.loads(report.results.read_text(encoding="utf-8"))
-    assert found["missing"] == [said]
+    assert found["missing"] == [film, said]
     assert found["conclusion"]["time_constant_s"] is None
     assert found["trials"][0]["spikes"] > 3, "what there is, is kept"
     assert "Not determined" in report.html.read_text(encoding="utf-8")

@@ -1,0 +1,110 @@
+"""The circuit's own adaptation law, fitted to spikes and to the silence after them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.adaptation import fit_adaptation
+from tactile_lab.analysis.circuit_adaptation import fit_circuit_adaptation
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import I_C, rest_V_C1
+from tactile_lab.model.simulate import simulate
+from tactile_lab.waveform import Waveform
+
+HOLD = (0.3, 10.25)
+
+
+def held(circuit, level=0.15, hold=10.0):
+    force = Waveform.pulse(level, ramp=0.25, hold=hold)
+    return simulate(circuit, force, keep=("spikes",)).spike_times
+
+
+def scattered(circuit, V_P, wobble, seed, *, hold=10.0, step=5e-4):
+    """Spikes of a hold whose V_fire is another each time, by `wobble` V."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, hold, step)
+    grid = np.linspace(0, V_P, 200)
+    known = [float(I_C(circuit, rest_V_C1(circuit, v))) for v in grid]
+    current = np.interp(V_P * np.exp(-time / circuit.tau), grid, known)
+    left, V, spikes = np.exp(-step / circuit.tau_L), 0.0, []
+    charge = circuit.R_L * current * (1 - left)
+    level = circuit.fire_voltage + wobble * rng.normal()
+    for i in range(time.size):
+        before, V = V, V * left + charge[i]
+        if V >= level:
+            part = (level - before) / (V - before)
+            spikes.append(time[i] + part * step)
+            # the charge that came after the spike within this step
+            V, level = (
+                (1 - part) * charge[i],
+                circuit.fire_voltage + wobble * rng.normal(),
+            )
+    return np.array(spikes)
+
+
+@pytest.mark.parametrize("tau", [8.69, 6.0])
+def test_it_gives_the_circuit_back_from_the_believed_one(tau):
+    circuit = Circuit(tau=tau, V_GS=1.41)
+    found = fit_circuit_adaptation(Circuit(), held(circuit) + 4.0, (4.3, 14.25))
+    assert found.tau.value == pytest.approx(tau, rel=1e-3)
+    assert found.V_GS.value == pytest.approx(1.41, abs=1e-4)
+    assert found.rms < 1e-3
+
+
+def test_it_knows_the_silence_where_the_exponential_expects_more_spikes():
+    times = held(Circuit())
+    law, described = (fit_circuit_adaptation(Circuit(), times, HOLD),
+                      fit_adaptation(times, HOLD))  # fmt: skip
+    assert law.silent_from == pytest.approx(times[-1], abs=0.05)
+    assert described.unseen > 5
+    assert described.systematic
+    left = np.diff(times) ** -1 - described.rate((times[1:] + times[:-1]) / 2)
+    assert law.rms < np.sqrt(np.mean(left[3:] ** 2)) / 50
+    late = law.rate([times[-1] - 0.1, times[-1] + 1.0])
+    assert late[0] > 3.0 and late[1] == 0.0
+
+
+def test_the_silence_is_evidence_too():
+    """Cut the hold right after a spike, or let it be silent for seconds more."""
+    train = scattered(Circuit(), 0.225, 0.02, 3)[:-1]
+    going_on, stopped = (
+        fit_circuit_adaptation(Circuit(), train, (0.0, end))
+        for end in (train[-1] + 1e-2, 10.0)
+    )
+    assert going_on.silent_from is None
+    assert stopped.silent_from is not None
+    assert stopped.tau.value > 1.1 * going_on.tau.value
+    with pytest.raises(NotIdentifiableError, match="explains both"):
+        fit_circuit_adaptation(Circuit(), train[:24], (0.0, 10.0))
+
+
+def test_its_intervals_cover_the_truth():
+    hits, repeats = np.zeros(2), 40
+    for seed in range(repeats):
+        train = scattered(Circuit(), 0.25, 0.01, seed, hold=8.0)
+        found = fit_circuit_adaptation(Circuit(), train, (0.0, 8.0))
+        for i, (estimate, truth) in enumerate(((found.tau, 8.69), (found.V_GS, 1.4))):
+            hits[i] += estimate.low < truth < estimate.high
+    assert np.all(hits / repeats >= 0.86)
+    assert np.all(hits / repeats <= 1.0)
+    assert found.tau.half < 1.5
+
+
+def test_an_unknown_input_bias_is_in_the_interval():
+    times = held(replace(Circuit(), I_bias=20e-12))
+    sure = fit_circuit_adaptation(Circuit(), times, HOLD)
+    open_ = fit_circuit_adaptation(Circuit(), times, HOLD, bias_uncertainty=20e-12)
+    assert not sure.tau.low < 8.69 < sure.tau.high
+    assert open_.tau.low < 8.69 < open_.tau.high
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [(np.arange(5) * 0.2, "4 intervals"), (np.arange(40) * 0.1, "V_P"),
+     (np.log1p(0.05 * np.arange(40)), "V_P")],
+)  # fmt: skip
+def test_trains_that_tell_nothing_are_refused(times, message):
+    with pytest.raises(NotIdentifiableError, match=message):
+        fit_circuit_adaptation(Circuit(), times, (0.0, 5.0))
