@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
+from tactile_lab.commands.terminal import (
+    print_json,
+    progress,
+    refusing,
+    say,
+    warn,
+    working,
+)
 
 if TYPE_CHECKING:
     from tactile_lab.analysis.identify import Identified
@@ -28,8 +35,10 @@ def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
         from tactile_lab.report.from_run import read
         from tactile_lab.report.identified import identify_run
 
+        with progress("reading the run") as update:
+            data = read(run, update)
         with working("fitting"):
-            found = identify_run(read(run), parameters)
+            found = identify_run(data, parameters)
     if as_json:
         print_json(answer(found))
         return

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import print_json, refusing, say, working
+from tactile_lab.commands.terminal import print_json, progress, refusing, say
 
 
 @click.command()
@@ -21,8 +21,8 @@ def command(run: Path, as_json: bool) -> None:
     with refusing():
         from tactile_lab.store.recover import recover
 
-        with working("recovering"):
-            done = recover(run)
+        with progress("recovering") as update:
+            done = recover(run, update)
     if as_json:
         print_json(
             {

@@ -7,7 +7,10 @@ from pathlib import Path
 import click
 
 from tactile_lab.commands.options import run_argument
-from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
+from tactile_lab.commands.terminal import print_json, progress, refusing, say, warn
+
+READ = 0.3
+"""Part of the work until the run is read."""
 
 
 @click.command()
@@ -27,13 +30,16 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
         from tactile_lab.report.results import results
         from tactile_lab.report.table import trials_table
         from tactile_lab.report.write import write
+        from tactile_lab.store.progress import share
 
         folder = out or run
         try:
-            with working("writing the report"):
-                data = read(run)
+            with progress("writing the report") as update:
+                data = read(run, share(update, 0.0, READ))
                 folder.mkdir(parents=True, exist_ok=True)
-                written = write(folder, data, pdf=pdf)
+                written = write(
+                    folder, data, pdf=pdf, progress=share(update, READ, 1.0)
+                )
         except OSError as reason:
             raise RunFolderError(
                 f"{folder} cannot be written: {reason.strerror}. Name another folder "

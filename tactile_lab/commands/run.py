@@ -24,11 +24,11 @@ from tactile_lab.commands.terminal import (
     ProgressLine,
     fail,
     print_json,
+    progress,
     refusing,
     say,
     somebody,
     warn,
-    working,
 )
 
 if TYPE_CHECKING:
@@ -280,8 +280,8 @@ def _report(done: Executed) -> Report | None:
     from tactile_lab.report.write import write
 
     try:
-        with working("writing the report"):
-            report = write(done.folder, read(done.folder))
+        with progress("writing the report") as update:
+            report = write(done.folder, read(done.folder), progress=update)
     except (TactileLabError, OSError) as error:
         warn(f"the report could not be written: {error}")
         return None

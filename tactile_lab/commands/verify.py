@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import print_json, refusing, say, working
+from tactile_lab.commands.terminal import print_json, progress, refusing, say
 
 if TYPE_CHECKING:
     from tactile_lab.store.verify import Verification
@@ -30,8 +30,8 @@ def command(run: Path, as_json: bool) -> None:
 
         if not run.is_dir():
             raise RunFolderError(f"{run} is no folder; give the folder of one run.")
-        with working("checking every sample"):
-            verdict = verify(run)
+        with progress("checking every sample") as update:
+            verdict = verify(run, update)
     proof = verdict.certificate
     if as_json:
         print_json(

@@ -26,6 +26,7 @@ from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.applied import held
 from tactile_lab.store.overrange import overrange
 from tactile_lab.store.overrange import told as overrange_told
+from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import Records
@@ -36,7 +37,7 @@ CELLS = 4000
 """Cells of a trace over the whole run."""
 
 
-def read(folder: Path) -> RunData:
+def read(folder: Path, progress: Progress = nothing) -> RunData:
     """The run in `folder`, decimated.
 
     Raises:
@@ -70,7 +71,7 @@ def read(folder: Path) -> RunData:
             force_uncertainty=scene.bench.magnet.force_uncertainty,
             field_per_ampere=_field_per_ampere(scene),
             newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
-            traces=_traces(run),
+            traces=_traces(run, progress),
             circuit=scene.circuit,
             belief=_belief(run, scene),
             bias_uncertainty=_bias_uncertainty(scene),
@@ -218,9 +219,9 @@ def _clock_uncertainty(segments: Records, time: float) -> float | None:
     return float(segments["uncertainty"][number])
 
 
-def _traces(run: Run) -> tuple[RecordedSignal, ...]:
+def _traces(run: Run, progress: Progress) -> tuple[RecordedSignal, ...]:
     """What was recorded; a scope that was lost at once has left nothing of a signal."""
-    traces = (_trace(run, name) for name in run.signals)
+    traces = (_trace(run, name) for name, _ in each(run.signals, progress))
     return tuple(trace for trace in traces if trace.time.size)
 
 

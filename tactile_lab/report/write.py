@@ -12,6 +12,10 @@ from tactile_lab.report.findings import Findings, find
 from tactile_lab.report.page import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
+from tactile_lab.store.progress import Progress, counted, nothing, share
+
+FOUND = 0.3
+"""Part of the work until all is found that is then drawn."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,7 +36,9 @@ class Report:
         return notebook.framed(self.html.read_text(encoding="utf-8"))
 
 
-def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
+def write(
+    folder: Path, run: RunData, *, pdf: bool = False, progress: Progress = nothing
+) -> Report:
     """Write figure.png, figure.svg, report.html and results.json into `folder`.
 
     Each further plot of the run gets files of its own name: summary (the protocol's
@@ -43,17 +49,20 @@ def write(folder: Path, run: RunData, *, pdf: bool = False) -> Report:
         folder: exists; figures and pages of these names are replaced.
         run: the run.
         pdf: also write the figures as PDF.
+        progress: told as figures are drawn.
 
     Raises:
         OSError: the folder cannot be written.
     """
     findings = find(run)
+    progress(FOUND)
     results = folder / "results.json"
     # the numbers first: they survive if drawing should fail
     results.write_text(as_json(findings), encoding="utf-8")
     _keep(folder, findings.conclusion.files)
     pictures = []
-    for plot in findings.plots:
+    plots = findings.plots
+    for plot in counted(plots, len(plots), share(progress, FOUND, 1.0)):
         title = ": ".join(part for part in (run.title, plot.title) if part)
         try:
             figure = draw(plot, title, run.subtitle, simulated=run.simulated)

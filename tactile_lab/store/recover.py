@@ -27,10 +27,14 @@ from tactile_lab.store.folder import (
 )
 from tactile_lab.store.layout import RECORDS, create_channel
 from tactile_lab.store.ledger import LEDGER, Written, goes_on, read_ledger
+from tactile_lab.store.progress import Progress, nothing, share
 from tactile_lab.store.run import Run
 
 KEPT = "data.killed.h5"
 """What the file is called that the crash left."""
+
+FILLING = 0.6
+"""Part of the work until the samples are copied; then spikes are searched twice."""
 
 EMPTY = 1 << 18
 """Bytes that no data file has before its first sample."""
@@ -57,7 +61,7 @@ class Recovered:
     original: Path | None
 
 
-def recover(path: Path) -> Recovered:
+def recover(path: Path, progress: Progress = nothing) -> Recovered:
     """Recover the run in folder `path`; the file as it was stays beside the new one.
 
     Raises:
@@ -88,13 +92,15 @@ def recover(path: Path) -> Recovered:
     try:
         new.write_bytes(written.declared)
         with h5py.File(new, "r+", libver="latest") as file:
-            samples, dropped = _fill(file, written, killed)
+            told = share(progress, 0.0, FILLING)
+            samples, dropped = _fill(file, written, killed, told)
     except OSError as error:
         new.unlink(missing_ok=True)
         raise RecordingError(f"{new} cannot be written: {error}.") from error
     killed.rename(path / KEPT)
     new.replace(path / DATA)
     recovery = _derive(path, samples, dropped)
+    progress(1.0)
     (path / LEDGER).unlink()
     return recovery
 
@@ -133,13 +139,16 @@ def _can_be_opened(path: Path) -> bool:
     return True
 
 
-def _fill(file: h5py.File, written: Written, killed: Path) -> tuple[int, int]:
+def _fill(
+    file: h5py.File, written: Written, killed: Path, progress: Progress
+) -> tuple[int, int]:
     """Put what was written and can be read into `file`.
 
     Args:
         file: as it was declared.
         written: what the ledger says.
         killed: the file as the crash left it.
+        progress: told as chunks are put.
 
     Returns:
         Samples per channel, and samples dropped.
@@ -147,7 +156,9 @@ def _fill(file: h5py.File, written: Written, killed: Path) -> tuple[int, int]:
     names = list(file.get("samples", ()))
     channels = [_Chunks(file[f"samples/{name}"], written, killed) for name in names]
     columns = [SampleColumn(file, name) for name in names]
+    longest = max((channel.length for channel in channels), default=0)
     for number in count() if names else ():
+        progress(min(number * channels[0].size / max(longest, 1), 1.0))
         codes = [channel.read(number) for channel in channels]
         samples = min(part.size for part in codes)
         for column, part in zip(columns, codes, strict=True):
@@ -163,7 +174,6 @@ def _fill(file: h5py.File, written: Written, killed: Path) -> tuple[int, int]:
         if names and name in OF_SAMPLES:
             rows = rows[rows[OF_SAMPLES[name]] < max(kept, 1)]
         Column(file[name]).put(0, rows)
-    longest = max((channel.length for channel in channels), default=0)
     return kept, longest - kept
 
 

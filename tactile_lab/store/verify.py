@@ -23,6 +23,7 @@ from tactile_lab.store.certificate import (
 from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.folder import DATA, INFO, digest, is_live, read_info
 from tactile_lab.store.layout import BIN, RECORDS
+from tactile_lab.store.progress import Progress, counted, each, nothing
 from tactile_lab.store.run import Run
 
 UNREADABLE = (OSError, KeyError, RuntimeError)
@@ -65,7 +66,7 @@ class Verification:
         return not self.findings
 
 
-def verify(path: Path) -> Verification:
+def verify(path: Path, progress: Progress = nothing) -> Verification:
     """Check the run in folder `path`, reading all of it; changes nothing."""
     try:
         info = read_info(path)
@@ -97,11 +98,12 @@ def verify(path: Path) -> Verification:
             findings += _length(run)
             findings += _tables(run)
             findings += _missing(run)
-            for name in run.signals:
-                findings += _channel(run, name)
+            for name, told in each(run.signals, progress, more=1):
+                findings += _channel(run, name, told)
             if not any(finding.where.startswith(DATA) for finding in findings):
                 findings += _counters(run)
                 certificate = certify(run)
+                progress(1.0)
                 findings += _certificate(run, certificate)
                 # the spikes of a cut-short run lag behind its samples
                 if certificate.differing and info["status"] != "running":
@@ -162,7 +164,7 @@ def _certificate(run: Run, found: Certificate) -> Iterator[Damage]:
             )
 
 
-def _channel(run: Run, name: str) -> Iterator[Damage]:
+def _channel(run: Run, name: str, progress: Progress) -> Iterator[Damage]:
     """Chunks of one channel that are missing, unreadable or not as written."""
     place, derived = f"{DATA} /samples/{name}", f"{DATA} /pyramid/{name}"
     running = run.status == "running"
@@ -184,7 +186,8 @@ def _channel(run: Run, name: str) -> Iterator[Damage]:
         yield Damage(
             place, f"{samples.shape[0]} samples are stored but {stored} have checksums"
         )
-    for number, (count, crc) in enumerate(written.tolist()):
+    chunks = counted(written.tolist(), written.size, progress)
+    for number, (count, crc) in enumerate(chunks):
         first = number * samples.chunks[0]
         stop = first + count
         codes = _chunk(samples, first, count, crc)

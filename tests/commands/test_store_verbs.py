@@ -12,6 +12,7 @@ from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.verify import verify
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "store" / "conftest.py"))
 
@@ -90,3 +91,10 @@ def test_a_folder_that_is_no_run_is_one_clear_message(verb, tmp_path):
     missing = tell(verb, tmp_path / "nothing")
     assert missing.exit_code == 2
     assert "Traceback" not in missing.output
+
+
+def test_verify_tells_how_far_it_is(run):
+    told = []
+    assert verify(run, told.append).sound
+    assert told == sorted(told) and told[-1] == 1.0
+    assert len(told) > 3, "one for each chunk of each channel"

@@ -222,3 +222,9 @@ def test_what_a_protocol_calls_its_trials_stands_in_table_and_figure(demo):
     texts = [text for s in force.series for text in s.texts]
     assert texts == [t.label for t in trials]
     assert trials_table(demo).headings[0] == "Force", "there the force is the name"
+
+
+def test_writing_tells_how_far_it_is(demo, tmp_path):
+    told = []
+    write(tmp_path, demo, progress=told.append)
+    assert told == sorted(told) and told[-1] == 1.0 and len(told) > 2

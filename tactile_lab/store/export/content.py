@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +17,6 @@ from tactile_lab.store.derived import derivable, derivation
 from tactile_lab.store.folder import SCENE, check_space
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
-
-Progress = Callable[[float], None]
-"""Told the part that is done, 0 to 1."""
 
 UNITS = {
     "gaps": {"start": "s", "end": "s"},
@@ -50,10 +47,6 @@ class Table:
 
     def __len__(self) -> int:
         return next(iter(self.columns.values())).size
-
-
-def nothing(part: float) -> None:
-    """For whom progress is of no interest."""
 
 
 def tables(run: Run, selection: Selection) -> dict[str, Table]:

@@ -10,10 +10,8 @@ import numpy as np
 
 from tactile_lab.store.export.content import (
     UNITS,
-    Progress,
     Table,
     about,
-    nothing,
     replacing,
     tables,
     unit,
@@ -27,6 +25,7 @@ from tactile_lab.store.export.lines import (
     steps,
     written,
 )
+from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 

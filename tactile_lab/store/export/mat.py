@@ -11,14 +11,13 @@ import scipy.io
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export.content import (
-    Progress,
     Table,
     about,
-    nothing,
     replacing,
     tables,
     unit,
 )
+from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 

@@ -13,12 +13,11 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivation
 from tactile_lab.store.export.content import (
-    Progress,
     about,
-    nothing,
     replacing,
     tables,
 )
+from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 

@@ -10,13 +10,12 @@ import numpy as np
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export.content import (
     UNITS,
-    Progress,
     about,
-    nothing,
     replacing,
     tables,
     unit,
 )
+from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 

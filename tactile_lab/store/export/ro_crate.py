@@ -14,7 +14,8 @@ from typing import Any
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.export.content import Progress, nothing, replacing
+from tactile_lab.store.export.content import replacing
+from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
