@@ -95,6 +95,32 @@ class Lag:
         value = np.concatenate([known[:, 1], inner])
         return Waveform(time[order], value[order]), (y, z)
 
+    def led(self, wave: Waveform, fine: float) -> Waveform:
+        """What the source must be set to that the field follows `wave`, A.
+
+        u = z + (coil + eddy) z' + coil eddy z'', by differences over `fine` s: what
+        changes faster stays behind. A wave that rests needs no lead.
+
+        Args:
+            wave: the field as the current that would hold it, A.
+            fine: time between two points where it moves, s.
+        """
+        if self.coil == 0 and self.eddy == 0:
+            return wave
+        inside = np.concatenate([
+            np.arange(max(start - 2 * fine, wave.start), end + 2 * fine, fine)
+            for start, end, a, b in wave.segments() if a != b
+        ] or [np.empty(0)])  # fmt: skip
+        inside = np.unique(np.round(inside / fine)) * fine
+        inside = inside[(inside > wave.start) & (inside < wave.end)]
+        time = np.concatenate([[wave.start], inside, [wave.end]])
+        before, at, after = (wave.at(time + by) for by in (-fine, 0.0, fine))
+        slope = (after - before) / (2 * fine)
+        bend = (after - 2 * at + before) / fine**2
+        lead = (self.coil + self.eddy) * slope + self.coil * self.eddy * bend
+        lead[[0, -1]] = 0.0  # it begins and ends at rest
+        return Waveform.tidied(time, at + lead)
+
     def _apart(self) -> tuple[float, float]:
         """Both lags, not too alike."""
         if self.coil > 0 and abs(self.eddy / self.coil - 1) < ALIKE:

@@ -90,6 +90,24 @@ class Waveform:
         return cls.through(points)
 
     @classmethod
+    def stairs(cls, steps: FloatArray, end: float) -> Waveform:
+        """0, then each value of `steps` until the next, the last until `end` s.
+
+        Args:
+            steps: shape (n, 2): from that time on, s, that value.
+            end: s; or the last step's time, if that is later.
+        """
+        if len(steps) == 0:
+            return cls.constant(0.0)
+        if steps[0, 0] > 0:  # the first may come late, and be no small one
+            steps = np.concatenate([[[0.0, 0.0]], steps])
+        time = np.repeat(steps[:, 0], 2)[1:]
+        value = np.repeat(steps[:, 1], 2)[:-1]
+        return cls.tidied(
+            np.append(time, max(end, time[-1])), np.append(value, value[-1])
+        )
+
+    @classmethod
     def tidied(cls, time: FloatArray, value: FloatArray) -> Waveform:
         """Without points equal to the one before, or between two of the same instant.
 
@@ -176,6 +194,11 @@ class Waveform:
     def scaled(self, by: float) -> Waveform:
         """The same waveform with every value multiplied."""
         return Waveform(self.time, self.value * by)
+
+    def plus(self, other: Waveform) -> Waveform:
+        """The sum of two waveforms without jumps, with the points of both."""
+        time = np.union1d(self.time, other.time)
+        return Waveform(time, self.at(time) + other.at(time))
 
     def then(self, other: Waveform) -> Waveform:
         """This waveform followed by `other`, whose time 0 is put at this one's end."""

@@ -103,7 +103,7 @@ def limited(
     if steepest > slew * (1 + 1e-9):
         asked = "a jump" if math.isinf(steepest) else f"{steepest:.3g} A/s"
         warnings.append(f"{asked} asked, {slew:g} A/s is the slew limit")
-        wave = _slewed(wave, slew, before)
+        wave = slewed(wave, slew, before)
     sampled, missed = _on_grid(wave, update_interval)
     if missed > SHORT_OF * max(wave.peak, 1e-12):
         warnings.append(
@@ -114,7 +114,7 @@ def limited(
     return wave, "; ".join(warnings) or None
 
 
-def _slewed(wave: Waveform, slew: float, before: float) -> Waveform:
+def slewed(wave: Waveform, slew: float, before: float) -> Waveform:
     """The nearest waveform that starts at `before` and never exceeds the slew."""
     now, value = wave.start, before
     points = [(now, value)]

@@ -7,17 +7,18 @@ The first of these whose force is as near as the scene wants is taken, else the 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_lab.current_list import CurrentList
+from tactile_lab.current_list import CurrentList, ListCapability
 from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.instruments.registry import BY_PERSON, coil_capability
+from tactile_lab.lag import Lag
 from tactile_lab.magnetics import Magnet
-from tactile_lab.planning.current import cut, limited, wanted_current
+from tactile_lab.planning.current import cut, limited, slewed, wanted_current
 from tactile_lab.quantity import show
 from tactile_lab.scene.bench_file import CoilSpec
 from tactile_lab.scene.scene import Scene
@@ -26,6 +27,9 @@ from tactile_lab.waveform import Waveform
 
 AT_ZERO = 1e-5
 """Current that counts as none, A."""
+
+LEADS = 3
+"""Times a current is led by what the one before left behind."""
 
 
 def drive_for(
@@ -87,14 +91,18 @@ def _set_points(
     if asked is None:
         return Drive(played, why=why, warning=warning)
     starts = np.arange(0.0, wanted.end, interval)
-    error = _error(asked, starts, played.at(starts), magnet)
+    steps = np.column_stack([starts, played.at(starts)])
+    new = np.abs(np.diff(steps[:, 1], prepend=np.inf)) > 0
+    stairs = cut(Waveform.stairs(steps[new], wanted.end), wanted.end)
+    given, _ = magnet.lagged_force(stairs, (before, before))
+    error = _difference(asked, given)
     return Drive(played, error=error, why=why, warning=warning)
 
 
 def _list(
     trial: Trial, scene: Scene, wanted: Waveform, asked: Waveform, before: float
 ) -> Drive:
-    """Played as a list.
+    """Played as a list, ahead of the lags that the bench knows.
 
     Raises:
         LimitError: it cannot be, and why.
@@ -114,38 +122,64 @@ def _list(
                 "a list begins and ends at 0 A, and this trial does not "
                 f"({show(current, 'A')})."
             )
-    played, warning = limited(wanted, coil.limits.fastest, can.shortest, before)
-    played = cut(played, wanted.end)
-    points = CurrentList.following(played, can)
-    error = _error(asked, points.starts, points.currents, magnet)
-    load = can.load_time(len(points))
-    dwells = points.dwells[:-1]
-    why = (
-        f"{len(points)} points of {show(float(dwells.min()), 's', 3)} and more, loaded "
-        f"in {show(load, 's', 2)}"
-    )
-    return Drive(played, points, error=error, why=why, warning=warning, load=load)
+    found = _listed(wanted, asked, magnet, coil, can)
+    if magnet.lag != Lag():
+        ahead, late = Waveform.constant(0.0), wanted
+        for _ in range(LEADS):
+            lead = _within(ahead.plus(magnet.lag.led(late, can.shortest)), coil)
+            drive = _listed(lead, asked, magnet, coil, can)
+            if found.error is not None and drive.error is not None:
+                found = drive if drive.error < found.error else found
+            ahead, late = lead, wanted.plus(_field(drive, magnet).scaled(-1.0))
+    return found
 
 
-def _error(
+def _within(current: Waveform, coil: CoilSpec) -> Waveform:
+    """What source and coil can of a current that runs ahead of the lags, A."""
+    most = coil.limits.current
+    if coil.limits.resistance is not None:
+        most = min(most, coil.limits.compliance / coil.limits.resistance)
+    least = -most if coil_capability(coil).bipolar else 0.0
+    return Waveform(current.time, np.clip(current.value, least, most))
+
+
+def _listed(
+    wave: Waveform,
     asked: Waveform,
-    starts: NDArray[np.float64],
-    currents: NDArray[np.float64],
     magnet: Magnet,
-) -> float:
-    """Largest difference of the force asked for and that of a stair of currents, N.
+    coil: CoilSpec,
+    can: ListCapability,
+) -> Drive:
+    """The list nearest to `wave` A within the slew that lists may have."""
+    slew, steepest, warning = coil.limits.fastest, wave.steepest, None
+    if steepest > slew * (1 + 1e-9):
+        wave = cut(slewed(wave, slew, 0.0), wave.end)
+        asks = "a jump" if math.isinf(steepest) else show(steepest, "A/s")
+        warning = f"{asks} needed, {show(slew, 'A/s')} is the slew limit of lists"
+    points = CurrentList.following(wave, can)
+    load = can.load_time(len(points))
+    shortest = show(float(points.dwells[:-1].min()), "s", 3)
+    why = f"{len(points)} points of {shortest} and more, loaded in {show(load, 's', 2)}"
+    drive = Drive(wave, points, error=0.0, why=why, warning=warning, load=load)
+    force = magnet.force_for(_field(drive, magnet), beyond="hold")
+    return replace(drive, error=_difference(asked, force))
 
-    Within a step it is largest where the step begins or ends, or at a corner between.
+
+def _field(drive: Drive, magnet: Magnet) -> Waveform:
+    """The field of a list, as the current that would hold it, A."""
+    points = drive.points
+    assert points is not None
+    steps = np.column_stack([points.starts, points.currents])
+    end = drive.current.end
+    return magnet.lag.follow(cut(Waveform.stairs(steps, end), end), (0.0, 0.0))[0]
+
+
+def _difference(asked: Waveform, given: Waveform) -> float:
+    """Largest difference of two forces, N.
+
+    Both are straight between their points, so one of these has it.
     """
-    force = magnet.force(currents)
-    ends = np.append(starts[1:], max(asked.end, starts[-1]))
-    ends = np.nextafter(ends, -np.inf)
-    step = np.clip(np.searchsorted(starts, asked.time, side="right") - 1, 0, None)
-    left = np.nextafter(asked.time, -np.inf)
-    differences = (
-        asked.at(starts) - force,
-        asked.at(ends) - force,
-        asked.value - force[step],
-        asked.at(left) - force[np.clip(np.searchsorted(starts, left) - 1, 0, None)],
-    )
-    return float(max(np.abs(one).max() for one in differences))
+    time = np.concatenate([asked.time, given.time])
+    left = np.nextafter(time, -np.inf)
+    both = np.concatenate([time, left[left >= 0]])
+    return float(np.abs(asked.at(both) - given.at(both)).max())

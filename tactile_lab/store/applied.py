@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.waveform import Waveform
-
 FloatArray = NDArray[np.float64]
 Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
 """The coil current between two times, s: its bins' middles, s, and means, A."""
@@ -103,22 +101,6 @@ def applied_current(
         begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     steps = np.column_stack([begin, level])
     return AppliedCurrent(steps, ends, edges, lead)
-
-
-def held(steps: FloatArray, end: float) -> Waveform:
-    """The current of `steps`, A, each held until the next, the last until `end` s.
-
-    Before the first one the coil carries nothing: a run begins with the coil off.
-    """
-    if len(steps) == 0:
-        return Waveform.constant(0.0)
-    if steps[0, 0] > 0:  # the first may come late, and be no small one
-        steps = np.concatenate([[[0.0, 0.0]], steps])
-    time = np.repeat(steps[:, 0], 2)[1:]
-    value = np.repeat(steps[:, 1], 2)[:-1]
-    return Waveform.tidied(
-        np.append(time, max(end, time[-1])), np.append(value, value[-1])
-    )
 
 
 def _level(sent: float, read: FloatArray) -> float:

@@ -20,7 +20,6 @@ from tactile_lab.store.applied import (
     AppliedCurrent,
     Shunt,
     applied_current,
-    held,
 )
 from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import DATA, SCENE, is_live, read_info
@@ -332,7 +331,7 @@ class StoredRun:
             SceneError: the run's scene cannot be read any more.
         """
         magnet = self.scene.bench.magnet
-        current = held(self.applied.steps, self.duration)
+        current = Waveform.stairs(self.applied.steps, self.duration)
         return magnet.lagged_force(current)[0]
 
     @property

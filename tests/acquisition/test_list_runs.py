@@ -5,7 +5,7 @@ import pytest
 
 from sim_backend.coil.list_mode import ListFault
 from tactile_lab.acquisition.events import RunState, TrialStarted
-from tactile_lab.store.applied import held
+from tactile_lab.waveform import Waveform
 
 LIST = (
     'protocol.levels=["200 mN", "200 mN"]',
@@ -55,7 +55,7 @@ def test_its_points_stand_where_the_samples_show_them(ran):
     """Not where the host began to tell the source to start: up to 40 ms before."""
     run = ran.stored()
     trace = run.signal("coil_current").trace(cells=20_000)
-    applied = held(run.applied.steps, run.duration)
+    applied = Waveform.stairs(run.applied.steps, run.duration)
     for start in run.trials["start"]:
         inside = (trace.time > start - 0.05) & (trace.time < start + 1.15)
         time, seen = trace.time[inside] + trace.width / 2, trace.mean[inside]
