@@ -20,6 +20,8 @@ class Drive:
     Attributes:
         current: A against s from 0 to the trial's length, as far as it can follow.
         points: the list that is played instead of set-points, or None.
+        force: N, as the bench believes it comes from a list; None for set-points, whose
+            force depends on what was before.
         error: largest difference between the force asked for and the one given, N;
             None where the trial asks for a current.
         why: why this way.
@@ -29,6 +31,7 @@ class Drive:
 
     current: Waveform
     points: CurrentList | None = None
+    force: Waveform | None = None
     error: float | None = None
     why: str = ""
     warning: str | None = None

@@ -112,7 +112,10 @@ class Lag:
             for start, end, a, b in wave.segments() if a != b
         ] or [np.empty(0)])  # fmt: skip
         inside = np.unique(np.round(inside / fine)) * fine
-        inside = inside[(inside > wave.start) & (inside < wave.end)]
+        # no point so near an end that what differs there would be a jump
+        inside = inside[
+            (inside > wave.start + fine / 2) & (inside < wave.end - fine / 2)
+        ]
         time = np.concatenate([[wave.start], inside, [wave.end]])
         before, at, after = (wave.at(time + by) for by in (-fine, 0.0, fine))
         slope = (after - before) / (2 * fine)

@@ -121,8 +121,7 @@ def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
     points, began = played.points, played.began - zero
     if float(np.std(points.currents)) < SMALLEST:
         return None
-    spread = (played.latest - played.earliest) / 2
-    reach = spread + SEARCH
+    reach = played.latest - played.earliest + SEARCH
     shifts = np.arange(-reach, reach + COIL_LAG, SHIFT)
     inside = shunt.cut(began - reach, began + points.duration + reach)
     if inside.time.size < 3:
@@ -132,7 +131,8 @@ def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
         slice(None), slice(None, half), slice(half, None)
     )]  # fmt: skip
     (shift, unlike), first, last = found[0], found[1], found[2]
-    edge = Edge(began + shift, began - spread, began + spread + COIL_LAG)
+    latest = played.latest - zero + COIL_LAG
+    edge = Edge(began + shift, played.earliest - zero, latest)
     return SeenList(edge, unlike, last[0] - first[0])
 
 

@@ -147,7 +147,10 @@ class _Driver:
         if self.through_coil:
             drive = self._played(trial)
             current = drive.current
-            force, self._field = magnet.lagged_force(current, self._field)
+            if drive.force is None:
+                force, self._field = magnet.lagged_force(current, self._field)
+            else:
+                force, self._field = drive.force, (0.0, 0.0)
             self._wait_for_load(drive)
         elif current is not None:
             force = cut(magnet.force_for(current, beyond="hold"), length)

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
+from tactile_lab.bench import CoilLimits
 from tactile_lab.current_list import CurrentList, ListCapability
 from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, SceneError
@@ -109,9 +111,10 @@ def _list(
     """
     coil, magnet, meter = scene.bench.coil, scene.bench.magnet, scene.bench.field_meter
     assert coil is not None
-    can = coil_capability(coil).lists
+    source = coil_capability(coil)
+    can = source.lists
     if can is None:
-        raise LimitError(f"{coil_capability(coil).title} plays none.")
+        raise LimitError(f"{source.title} plays none.")
     if trial.pause:
         raise LimitError("in a pause nothing is recorded.")
     if meter is not None and meter.driver == BY_PERSON and trial.hold is not None:
@@ -122,24 +125,39 @@ def _list(
                 "a list begins and ends at 0 A, and this trial does not "
                 f"({show(current, 'A')})."
             )
-    found = _listed(wanted, asked, magnet, coil, can)
-    if magnet.lag != Lag():
-        ahead, late = Waveform.constant(0.0), wanted
-        for _ in range(LEADS):
-            lead = _within(ahead.plus(magnet.lag.led(late, can.shortest)), coil)
-            drive = _listed(lead, asked, magnet, coil, can)
-            if found.error is not None and drive.error is not None:
-                found = drive if drive.error < found.error else found
-            ahead, late = lead, wanted.plus(_field(drive, magnet).scaled(-1.0))
+    return _nearest_list(wanted, asked, magnet, coil.limits, source.bipolar, can)
+
+
+@lru_cache(maxsize=64)  # protocols repeat their presentations
+def _nearest_list(
+    wanted: Waveform,
+    asked: Waveform,
+    magnet: Magnet,
+    limits: CoilLimits,
+    bipolar: bool,
+    can: ListCapability,
+) -> Drive:
+    """The list whose force, behind the lags that the bench knows, is nearest."""
+    found = _listed(wanted, asked, magnet, limits, can)
+    if magnet.lag == Lag():
+        return found
+    ahead, late = Waveform.constant(0.0), wanted
+    for _ in range(LEADS):
+        lead = ahead.plus(magnet.lag.led(late, can.shortest))
+        ahead = _within(lead, limits, bipolar)
+        drive = _listed(ahead, asked, magnet, limits, can)
+        if (drive.error or 0.0) < (found.error or 0.0):
+            found = drive
+        late = wanted.plus(_field(drive, magnet).scaled(-1.0))
     return found
 
 
-def _within(current: Waveform, coil: CoilSpec) -> Waveform:
+def _within(current: Waveform, limits: CoilLimits, bipolar: bool) -> Waveform:
     """What source and coil can of a current that runs ahead of the lags, A."""
-    most = coil.limits.current
-    if coil.limits.resistance is not None:
-        most = min(most, coil.limits.compliance / coil.limits.resistance)
-    least = -most if coil_capability(coil).bipolar else 0.0
+    most = limits.current
+    if limits.resistance is not None:
+        most = min(most, limits.compliance / limits.resistance)
+    least = -most if bipolar else 0.0
     return Waveform(current.time, np.clip(current.value, least, most))
 
 
@@ -147,22 +165,28 @@ def _listed(
     wave: Waveform,
     asked: Waveform,
     magnet: Magnet,
-    coil: CoilSpec,
+    limits: CoilLimits,
     can: ListCapability,
 ) -> Drive:
     """The list nearest to `wave` A within the slew that lists may have."""
-    slew, steepest, warning = coil.limits.fastest, wave.steepest, None
+    slew, steepest, warning = limits.fastest, wave.steepest, None
     if steepest > slew * (1 + 1e-9):
         wave = cut(slewed(wave, slew, 0.0), wave.end)
         asks = "a jump" if math.isinf(steepest) else show(steepest, "A/s")
         warning = f"{asks} needed, {show(slew, 'A/s')} is the slew limit of lists"
+    ends = wave.value.copy()
+    ends[[0, -1]] = 0.0
+    wave = Waveform(wave.time, ends)
     points = CurrentList.following(wave, can)
     load = can.load_time(len(points))
     shortest = show(float(points.dwells[:-1].min()), "s", 3)
     why = f"{len(points)} points of {shortest} and more, loaded in {show(load, 's', 2)}"
     drive = Drive(wave, points, error=0.0, why=why, warning=warning, load=load)
     force = magnet.force_for(_field(drive, magnet), beyond="hold")
-    return replace(drive, error=_difference(asked, force))
+    error = _difference(asked, force)
+    # what it is between two points of the list matters to nobody
+    time = np.union1d(asked.time, points.starts[points.starts < asked.end])
+    return replace(drive, force=Waveform(time, force.at(time)), error=error)
 
 
 def _field(drive: Drive, magnet: Magnet) -> Waveform:

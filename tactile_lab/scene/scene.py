@@ -90,7 +90,7 @@ class Scene:
                 own = (spec.dialect, spec.driver)
                 named += [Path(str(name)) for name in own if is_file(name)]
         file = getattr(self.protocol, "file", None)
-        if isinstance(file, str):
+        if isinstance(file, str) and file:
             named.append(Path(file))
         return tuple(dict.fromkeys(path for path in named if path is not None))
 

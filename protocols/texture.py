@@ -1,0 +1,243 @@
+"""A profile that the sensor is drawn over at each of some speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from tactile_lab.analysis.phase_locking import strongest_frequency
+from tactile_lab.analysis.spike_train import within
+from tactile_lab.columns import read_columns
+from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
+from tactile_lab.errors import NotIdentifiableError, SceneError
+from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.quantity import Duration, Force, Pause, Unit, show
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.stimulus.indentation import on_indentation
+from tactile_lab.trial import Trial, Trials
+
+FloatArray = NDArray[np.float64]
+Length = Annotated[float, Unit("m", above=0.0)]
+Speed = Annotated[float, Unit("m/s", above=0.0)]
+PushForce = Annotated[float, Unit("N", above=0.0)]
+
+SEARCHED = 0.5, 1.6
+"""Between which parts of the expected frequency the spikes' own is looked for: not at
+its double, which repeats as well."""
+
+
+class Texture(ForceProtocol):
+    """A grating, or a profile of your own, scanned at each of some speeds.
+
+    The force is what the profile would give a sensor that moves over it: the force at
+    position x comes at the time x / speed.
+    """
+
+    name: ClassVar[str] = "texture"
+    title: ClassVar[str] = "Texture"
+    accuracy: ClassVar[float] = 0.03
+
+    base: Force = Field(default=0.16, description="Force the sensor is pressed on with")
+    depth: PushForce = Field(
+        default=0.08, description="Of the grating: half of ridge less groove"
+    )
+    period: Length = Field(default=2e-3, description="Of the grating")
+    file: str = Field(
+        default="",
+        description="CSV with columns position_m,force_N instead of the grating; it "
+        "repeats itself over its length",
+    )
+    speeds: tuple[Speed, ...] = Field(
+        default=(0.01, 0.02, 0.04), min_length=1, description="Of the scan"
+    )
+    passes: int = Field(default=6, ge=1, le=1000, description="Scans at each speed")
+    down: Duration = Field(default=0.1, description="Time down, and up again")
+    lasts: Duration = Field(default=0.8, description="Time of one scan")
+    rest: Pause = Field(default=0.5, description="Time at no force after each")
+
+    def presentations(self) -> Trials:
+        """All scans at one speed, then those at the next."""
+        for speed in self.speeds:
+            force, hold = on_indentation(
+                self.base,
+                partial(self._passing, speed),
+                down=self.down,
+                lasts=self.lasts,
+                rest=self.rest,
+                highest=speed / self._length * self._details,
+            )
+            for _ in range(self.passes):
+                label = f"{show(speed, 'm/s')}"
+                yield Trial(force=force, label=label, hold=hold)
+
+    def _passing(self, speed: float, time: FloatArray) -> FloatArray:
+        return self.profile(speed * time)
+
+    def profile(self, position: FloatArray) -> FloatArray:
+        """Force above the base, N, at positions, m."""
+        if not self.file:
+            return np.asarray(self.depth * np.sin(2 * np.pi * position / self.period))
+        at, force = read_profile(Path(self.file))
+        return np.asarray(np.interp(position % at[-1], at, force))
+
+    @property
+    def _length(self) -> float:
+        """After which the profile repeats itself, m."""
+        return float(read_profile(Path(self.file))[0][-1]) if self.file else self.period
+
+    @property
+    def _details(self) -> int:
+        """How often the profile changes in that length: a fourth of its rows."""
+        rows = read_profile(Path(self.file))[0].size if self.file else 4
+        return max(1, rows // 4)
+
+    def located(self, folder: Any) -> Texture:
+        """The same with `file` found relative to `folder`, and read once to check it.
+
+        Raises:
+            SceneError: the file is missing or not such a table.
+        """
+        if not self.file:
+            return self
+        path = (Path(folder) / self.file).resolve()
+        read_profile(path)
+        return self.model_copy(update={"file": str(path)})
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """The frequency in the spikes at each speed, and the period that it means."""
+        if not run.searched:
+            return Conclusion(missing=(NOT_SEARCHED,))
+        rows, values, periods, missing = [], [], [], []
+        for speed, trials in self._scans(run).items():
+            expected = speed / self._length
+            spikes = sum(self._spikes(t).size for t in trials)
+            try:
+                found = self.frequency(trials, expected)
+            except NotIdentifiableError as why:
+                missing.append(f"No period at {show(speed, 'm/s')}: {why}.")
+                continue
+            half = 0.5 / self._scanned(trials)
+            period = speed / found
+            periods.append(period)
+            rows.append(
+                (
+                    show(speed, "m/s"),
+                    str(spikes),
+                    f"{found:.3g} ± {half:.2g} Hz",
+                    f"{expected:.3g} Hz",
+                    f"{show(period, 'm', 3)} ± {show(period * half / found, 'm', 2)}",
+                )
+            )
+            values.append(
+                {
+                    "speed_m_per_s": speed,
+                    "spikes": spikes,
+                    "frequency_Hz": found,
+                    "frequency_half_width_Hz": half,
+                    "expected_Hz": expected,
+                    "period_m": period,
+                }
+            )
+        if not rows:
+            return Conclusion(missing=tuple(missing) or ("No scan was completed.",))
+        table = Table(
+            headings=("Speed", "Spikes", "In the spikes", "Profile", "Period"),
+            rows=tuple(rows),
+            note="In the spikes: the frequency at which they repeat themselves most, "
+            "looked for between half and 1.6 times the profile's; ± is the resolution "
+            "of one scan's length.",
+        )
+        said = (
+            f"The spikes tell periods of {show(min(periods), 'm', 3)} to "
+            f"{show(max(periods), 'm', 3)}; the profile's is "
+            f"{show(self._length, 'm', 3)}.",
+        )
+        return Conclusion(said, {"texture": values}, tuple(missing), (table,))
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Spikes of every scan against the position on the profile, by speed."""
+        scans = self._scans(run)
+        if not any(self._spikes(t).size for trials in scans.values() for t in trials):
+            return
+        panels = []
+        for speed, trials in scans.items():
+            x, y = [], []
+            for number, trial in enumerate(trials, start=1):
+                assert trial.hold is not None
+                times = self._spikes(trial)
+                x += ((times - self.down) * speed).tolist()
+                y += [float(number)] * times.size
+            panels.append(
+                Panel(
+                    label="Scan",
+                    series=(Series(x=x, y=y, mark="dots"),),
+                    limits=(0.5, len(trials) + 0.5),
+                    note=show(speed, "m/s"),
+                    height=1.3,
+                )
+            )
+        yield Plot(
+            name="summary",
+            title="spikes along the profile",
+            caption="Every spike of every scan, at the position that the sensor would "
+            f"be over; the profile repeats itself every {show(self._length, 'm', 3)}.",
+            x_label="Position",
+            x_unit="m",
+            panels=tuple(panels),
+        )
+
+    def frequency(self, trials: list[MeasuredTrial], expected: float) -> float:
+        """At which the spikes of some scans repeat themselves most, Hz.
+
+        Raises:
+            NotIdentifiableError: too few spikes.
+        """
+        low, high = (part * expected for part in SEARCHED)
+        spikes = [self._spikes(trial) for trial in trials]
+        return strongest_frequency(spikes, low, high, self._scanned(trials))
+
+    def _scans(self, run: Measurement) -> dict[float, list[MeasuredTrial]]:
+        """Completed scans by speed."""
+        found: dict[float, list[MeasuredTrial]] = {}
+        known = {show(speed, "m/s"): speed for speed in self.speeds}
+        for trial in run.results:
+            if trial.label in known and trial.hold is not None and trial.complete:
+                found.setdefault(known[trial.label], []).append(trial)
+        return found
+
+    def _spikes(self, trial: MeasuredTrial) -> FloatArray:
+        """Spikes while the profile acts in full, s from the trial's start."""
+        assert trial.hold is not None
+        return within(trial.spike_times, trial.hold)
+
+    def _scanned(self, trials: list[MeasuredTrial]) -> float:
+        """Time for which the profile acts in full, s."""
+        hold = trials[0].hold
+        assert hold is not None
+        return hold[1] - hold[0]
+
+
+def read_profile(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Positions, m from 0, and forces, N, of a CSV with ``position_m,force_N``.
+
+    Raises:
+        SceneError: not such a table, or positions that do not rise; the line is named.
+    """
+    _, rows, lines = read_columns(path, (("position_m", "force_N"),))
+    if len(rows) < 2:
+        raise SceneError(f"{path}: a profile needs two rows or more.")
+    back = np.flatnonzero(np.diff(rows[:, 0]) <= 0)
+    if back.size:
+        i = int(back[0]) + 1
+        raise SceneError(
+            f"{path}, line {lines[i]}: position {rows[i, 0]:g} m follows "
+            f"{rows[i - 1, 0]:g} m; positions must rise."
+        )
+    return rows[:, 0] - rows[0, 0], rows[:, 1]

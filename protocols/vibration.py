@@ -1,0 +1,217 @@
+"""A vibration on an indentation at each of some frequencies: do spikes lock to it?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from tactile_lab.analysis.phase_locking import (
+    PhaseLocking,
+    phase_locking,
+    phases_of,
+)
+from tactile_lab.analysis.spike_train import within
+from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
+from tactile_lab.errors import NotIdentifiableError, QuantityError
+from tactile_lab.measurement import Measurement
+from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.stimulus.indentation import on_indentation
+from tactile_lab.trial import Trial, Trials
+
+FloatArray = NDArray[np.float64]
+Frequency = Annotated[float, Unit("Hz", above=0.0)]
+PushForce = Annotated[float, Unit("N", above=0.0)]
+
+
+class Vibration(ForceProtocol):
+    """A sine on top of a constant force, at each of some frequencies (as for RA, PC).
+
+    Only a source that keeps time by itself follows it: see `[coil] way`.
+    """
+
+    name: ClassVar[str] = "vibration"
+    title: ClassVar[str] = "Vibration"
+    accuracy: ClassVar[float] = 0.02
+
+    base: Force = Field(default=0.15, description="Force the vibration stands on")
+    amplitude: PushForce = Field(default=0.08, description="Of the sine")
+    lowest: Frequency = Field(default=10.0, description="First frequency")
+    highest: Frequency = Field(default=100.0, description="Last frequency")
+    count: int = Field(default=4, ge=1, le=200, description="Frequencies")
+    presentations_each: int = Field(
+        default=6, ge=1, le=1000, description="Presentations of each frequency"
+    )
+    down: Duration = Field(default=0.1, description="Time down, and up again")
+    lasts: Duration = Field(default=0.4, description="Time of the vibration")
+    rest: Pause = Field(default=0.5, description="Time at no force after each")
+
+    @model_validator(mode="after")
+    def _rising(self) -> Vibration:
+        if self.highest < self.lowest:
+            raise ValueError(
+                f"highest {self.highest:g} Hz must not be below lowest "
+                f"{self.lowest:g} Hz"
+            )
+        if self.lasts * self.lowest < 2.5:
+            raise ValueError(
+                f"lasts = {self.lasts:g} s holds fewer than 2.5 cycles of "
+                f"{self.lowest:g} Hz; make it longer or the lowest frequency higher"
+            )
+        return self
+
+    def frequencies(self) -> list[float]:
+        """The frequencies, evenly spaced on a logarithmic scale, Hz."""
+        return [float(f) for f in np.geomspace(self.lowest, self.highest, self.count)]
+
+    def presentations(self) -> Trials:
+        """All presentations of one frequency, then those of the next."""
+        for frequency in self.frequencies():
+            force, hold = on_indentation(
+                self.base,
+                partial(self._sine, frequency),
+                down=self.down,
+                lasts=self.lasts,
+                rest=self.rest,
+                highest=frequency,
+            )
+            for _ in range(self.presentations_each):
+                yield Trial(force=force, label=f"{frequency:.4g} Hz", hold=hold)
+
+    def _sine(self, frequency: float, time: FloatArray) -> FloatArray:
+        return np.asarray(self.amplitude * np.sin(2 * np.pi * frequency * time))
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """Vector strength and phase at each frequency."""
+        if not run.searched:
+            return Conclusion(missing=(NOT_SEARCHED,))
+        found, missing = locking_by_label(run)
+        if not found:
+            return Conclusion(missing=tuple(missing))
+        locked = [f for f, one in found.items() if one.locked]
+        said = (
+            "Spikes are not locked to the vibration at any frequency."
+            if not locked
+            else "Spikes are locked to the vibration at "
+            + ", ".join(f"{f:.4g} Hz" for f in locked)
+            + " (Rayleigh, p < 0.01)."
+        )
+        values = [
+            {
+                "frequency_Hz": f,
+                "vector_strength": one.strength,
+                "phase_rad": one.phase,
+                "spikes": one.spikes,
+                "chance": one.chance,
+            }
+            for f, one in found.items()
+        ]
+        table = Table(
+            headings=("Frequency", "Spikes", "Vector strength (95 %)", "Phase", "p"),
+            rows=tuple(_row(f, one) for f, one in found.items()),
+            note=timing_note(run),
+        )
+        return Conclusion(
+            (said,), {"phase_locking": values}, tuple(missing), tables=(table,)
+        )
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Vector strength and phase against frequency."""
+        found, _ = locking_by_label(run)
+        if len(found) < 2:
+            return
+        at = tuple(found)
+        known = list(found.values())
+        least = [np.sqrt(3 / one.spikes) for one in known]
+        yield Plot(
+            name="summary",
+            title="phase locking",
+            caption="Vector strength of the spikes against the force's own cycle, with "
+            "its 95 % interval, and the phase of their mean: 0 is where the force is "
+            "largest. Dotted: what chance alone exceeds in 5 % of cases (Rayleigh).",
+            x_label="Frequency",
+            x_unit="Hz",
+            x_prefix="",
+            x_log=True,
+            x_ticks=at,
+            panels=(
+                Panel(
+                    label="Vector strength",
+                    series=(
+                        Series(
+                            x=at, y=[one.strength.value for one in known],
+                            y_error=[one.strength.half for one in known], mark="points",
+                        ),
+                        Series(x=at, y=least, mark="dotted", colour="quiet"),
+                    ),
+                    limits=(0, 1),
+                    height=1.8,
+                ),
+                Panel(
+                    label="Phase",
+                    unit="°",
+                    series=(
+                        Series(
+                            x=at, y=[float(np.degrees(one.phase)) for one in known],
+                            mark="points",
+                        ),
+                    ),
+                    guides=(Guide(at=0.0, along="x"),),
+                    limits=(-180, 180),
+                    height=1.55,
+                ),
+            ),
+        )  # fmt: skip
+
+
+def locking_by_label(run: Measurement) -> tuple[dict[float, PhaseLocking], list[str]]:
+    """Phase locking at each frequency that a trial is named by; and what is missing."""
+    phases: dict[float, list[FloatArray]] = {}
+    for trial in run.results:
+        if trial.held is None or trial.hold is None or not trial.complete:
+            continue
+        try:
+            frequency = parse(trial.label, "Hz")
+            spikes = within(trial.spike_times, trial.hold) + trial.start
+            turns = phases_of(spikes, run.force.at, frequency, trial.held)
+        except (QuantityError, NotIdentifiableError):
+            continue
+        phases.setdefault(frequency, []).append(turns)
+    found, missing = {}, []
+    for frequency, each in phases.items():
+        try:
+            found[frequency] = phase_locking(each)
+        except NotIdentifiableError as why:
+            missing.append(f"No vector strength at {frequency:.4g} Hz: {why}.")
+    if not phases:
+        missing.append("No vector strength: no vibration was completed.")
+    return found, missing
+
+
+def _row(frequency: float, one: PhaseLocking) -> tuple[str, ...]:
+    strength = one.strength
+    return (
+        f"{frequency:.4g} Hz",
+        str(one.spikes),
+        f"{strength.value:.2f} ({strength.low:.2f} to {strength.high:.2f})",
+        printed(f"{np.degrees(one.phase):.0f}°"),
+        "< 0.001" if one.chance < 1e-3 else f"{one.chance:.2g}",
+    )
+
+
+def timing_note(run: Measurement) -> str:
+    """How well spikes are timed against the force, which is an error of each phase."""
+    known = [t.clock_uncertainty for t in run.results if t.clock_uncertainty]
+    if not known:
+        return "How well the sample clock is aligned with the coil is not known."
+    return (
+        f"Sample clock and coil are aligned to {1e3 * max(known):.2g} ms or better; at "
+        "100 Hz a millisecond is 36°. The force is that of the applied current behind "
+        "the lags that the bench file states."
+    )

@@ -1,0 +1,150 @@
+"""Phase locking of spikes to a periodic force: vector strength and mean phase.
+
+Vector strength (Goldberg and Brown 1969) is the length of the mean of exp(i phase): 1
+where every spike has the same phase, near 0 where phases are spread evenly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.errors import NotIdentifiableError
+
+FloatArray = NDArray[np.float64]
+
+FEWEST = 5
+"""Spikes, and presentations of which each is left out in turn for the interval."""
+
+LOCKED = 0.01
+"""Probability of chance below which spikes are called locked."""
+
+
+@dataclass(frozen=True)
+class PhaseLocking:
+    """How spikes lie in the cycles of a force.
+
+    Attributes:
+        strength: vector strength, 0 to 1.
+        phase: of the mean vector, rad, -pi to pi; 0 where the force is largest.
+        spikes: how many.
+        chance: probability of so large a strength from evenly spread phases
+            (Rayleigh; it takes spikes as independent).
+    """
+
+    strength: Estimate
+    phase: float
+    spikes: int
+    chance: float
+
+    @property
+    def locked(self) -> bool:
+        """Whether chance is an unlikely account."""
+        return self.chance < LOCKED
+
+
+def phase_locking(presentations: Sequence[FloatArray]) -> PhaseLocking:
+    """Vector strength of the phases (rad) in each of some equal presentations.
+
+    The interval is a jackknife's, on atanh of the strength: over presentations where
+    there are enough of them (the spikes of one are not independent), else over spikes.
+
+    Raises:
+        NotIdentifiableError: fewer than five spikes.
+    """
+    filled = [np.asarray(p, dtype=np.float64) for p in presentations if len(p)]
+    phases = np.concatenate(filled) if filled else np.empty(0)
+    if phases.size < FEWEST:
+        raise NotIdentifiableError(
+            f"{phases.size} spikes, {FEWEST} are needed for a vector strength"
+        )
+    sums = np.array([np.exp(1j * p).sum() for p in filled])
+    counts = np.array([p.size for p in filled])
+    if sums.size < FEWEST:
+        sums, counts = np.exp(1j * phases), np.ones(phases.size)
+    total = complex(sums.sum())
+    strength = min(abs(total) / phases.size, 1.0)
+    left_out = np.abs(total - sums) / (phases.size - counts)
+    known = np.arctanh(np.clip([strength, *left_out], 0.0, 1 - 1e-9))
+    n = sums.size
+    error = math.sqrt((n - 1) / n * float(np.sum((known[1:] - known[1:].mean()) ** 2)))
+    wide = Estimate.of(float(known[0]), error, n - 1)
+    low, high = math.tanh(max(wide.low, 0.0)), math.tanh(wide.high)
+    slope = 1 - strength**2
+    estimate = Estimate(strength, slope * error, low, high)
+    return PhaseLocking(
+        estimate, float(np.angle(total)), phases.size, rayleigh(strength, phases.size)
+    )
+
+
+def rayleigh(strength: float, spikes: int) -> float:
+    """Probability of at least that vector strength by chance (Zar 1999, Eq. 27.4)."""
+    n, length = spikes, spikes * strength
+    return min(1.0, math.exp(math.sqrt(1 + 4 * n + 4 * (n**2 - length**2)) - 1 - 2 * n))
+
+
+def phases_of(
+    spikes: FloatArray,
+    force: Callable[[FloatArray], FloatArray],
+    frequency: float,
+    window: tuple[float, float],
+) -> FloatArray:
+    """Phase of each spike in the force's own cycle, rad; 0 where it is largest.
+
+    Args:
+        spikes: times, s, within the window.
+        force: N at given times, s; a slow drift of it is allowed for.
+        frequency: Hz.
+        window: start and end, s: at least one cycle.
+
+    Raises:
+        NotIdentifiableError: the force has nothing of that frequency.
+    """
+    start, end = window
+    cycles = (end - start) * frequency
+    if cycles < 0.99:
+        raise NotIdentifiableError(f"less than one cycle of {frequency:g} Hz")
+    time = np.linspace(start, end, max(64, math.ceil(32 * cycles)))
+    turn = 2 * np.pi * frequency * (time - start)
+    slow = np.linspace(-1, 1, time.size)
+    design = np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(slow), slow])
+    found = np.linalg.lstsq(design, np.asarray(force(time)), rcond=None)[0]
+    if math.hypot(found[0], found[1]) < 1e-9:
+        raise NotIdentifiableError(f"the force has nothing of {frequency:g} Hz")
+    largest = math.atan2(found[1], found[0])
+    phase = 2 * np.pi * frequency * (spikes - start) - largest
+    return np.asarray((phase + np.pi) % (2 * np.pi) - np.pi)
+
+
+def strongest_frequency(
+    presentations: Sequence[FloatArray], low: float, high: float, length: float
+) -> float:
+    """Frequency between `low` and `high` Hz at which spikes repeat themselves most.
+
+    It is that of the largest sum, over presentations, of the squared vector strength
+    times spikes: of each by itself, since their cycles need not begin alike.
+
+    Args:
+        presentations: spike times of each, s.
+        low: Hz.
+        high: Hz.
+        length: of each presentation, s: its inverse is the resolution.
+
+    Raises:
+        NotIdentifiableError: too few spikes.
+    """
+    told = [np.asarray(p, dtype=np.float64) for p in presentations if len(p) > 1]
+    if sum(p.size for p in told) < FEWEST:
+        raise NotIdentifiableError(f"fewer than {FEWEST} spikes to compare")
+    count = max(64, math.ceil((high - low) * length * 16))
+    tried = np.linspace(low, high, count)
+    power = np.zeros(count)
+    for spikes in told:
+        turns = np.exp(2j * np.pi * np.outer(tried, spikes - spikes[0]))
+        power += np.abs(turns.sum(axis=1)) ** 2 / spikes.size
+    return float(tried[int(np.argmax(power))])

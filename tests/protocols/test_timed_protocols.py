@@ -1,0 +1,164 @@
+"""Protocols that only a source with a clock of its own can play."""
+
+import numpy as np
+import pytest
+
+from protocols.texture import Texture
+from protocols.touch import Touch
+from protocols.vibration import Vibration
+from tactile_lab.errors import SceneError
+from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.planning.way import drive_for
+from tactile_lab.scene.load import load
+from tactile_lab.waveform import Waveform
+
+
+def answered(protocol, *, searched=True, late=0.0) -> Measurement:
+    """What the model makes of a protocol; spikes dated `late` s too late."""
+    force, placed = Waveform.constant(0.0), []
+    for trial in protocol.presentations():
+        placed.append((force.end, trial))
+        force = force.then(trial.force)
+    spikes = simulate(Circuit(), force, keep=("spikes",)).spike_times
+    trials = tuple(
+        MeasuredTrial(
+            label=trial.label,
+            level=trial.level,
+            start=start,
+            duration=trial.length,
+            spike_times=spikes[(spikes >= start) & (spikes < start + trial.length)]
+            - start
+            + late,
+            hold=trial.hold,
+            clock_uncertainty=1e-3,
+        )
+        for start, trial in placed
+    )
+    return Measurement(
+        simulated=True,
+        bench="model",
+        duration=force.end,
+        trials=trials,
+        force=force,
+        searched=searched,
+    )
+
+
+def smooth(wave: Waveform) -> bool:
+    """No slope changes by more than a sixth of the steepest from piece to piece."""
+    slopes = np.diff(wave.value) / np.diff(wave.time)
+    return np.abs(np.diff(slopes)).max() < 0.17 * np.abs(slopes).max()
+
+
+@pytest.mark.parametrize("kind", [Vibration, Texture, Touch])
+def test_each_trial_begins_and_ends_at_no_force_and_has_no_kink(kind):
+    for trial in kind().presentations():
+        assert trial.force.value[0] == 0.0 and trial.force.value[-1] == 0.0
+        start, end = trial.hold
+        assert 0 < start < end <= trial.length
+        assert smooth(trial.force)
+
+
+def test_a_vibration_is_the_sine_asked_for_while_it_lasts():
+    found = Vibration(base=0.15, amplitude=0.05, lowest=50.0, highest=50.0, count=1)
+    trial = next(iter(found.presentations()))
+    start, end = trial.hold
+    time = np.linspace(start, end, 5000)
+    sine = 0.15 + 0.05 * np.sin(2 * np.pi * 50 * (time - found.down))
+    assert trial.force.at(time) == pytest.approx(sine, abs=0.05 * 1e-3)
+
+
+def test_spikes_of_the_model_lock_to_a_strong_vibration():
+    protocol = Vibration(count=2, highest=40.0, presentations_each=10)
+    found = protocol.conclude(answered(protocol))
+    slow, fast = found.plain["phase_locking"]
+    assert slow["frequency_Hz"] == pytest.approx(10.0)
+    assert slow["vector_strength"]["value"] > 0.5 and slow["chance"] < 0.01
+    assert fast["vector_strength"]["low_95"] > 0.2
+    assert "locked to the vibration at 10 Hz" in found.text
+    assert "aligned to 1 ms or better" in found.text
+
+
+def test_a_delay_turns_the_phase_and_leaves_the_strength():
+    protocol = Vibration(count=1, lowest=20.0, highest=20.0, presentations_each=10)
+    (at_once,) = protocol.conclude(answered(protocol)).plain["phase_locking"]
+    late = answered(protocol, late=5e-3)
+    (later,) = protocol.conclude(late).plain["phase_locking"]
+    turned = later["phase_rad"] - at_once["phase_rad"]
+    # 5 ms are a tenth of a cycle; a spike or two leave the window
+    assert turned == pytest.approx(2 * np.pi / 10, abs=0.15)
+    assert later["vector_strength"]["value"] == pytest.approx(
+        at_once["vector_strength"]["value"], abs=0.1
+    )
+
+
+def test_a_texture_s_period_is_told_at_every_speed():
+    protocol = Texture(passes=8)
+    found = protocol.conclude(answered(protocol)).plain["texture"]
+    assert len(found) == 3
+    for one in found:
+        near = abs(one["frequency_Hz"] - one["expected_Hz"])
+        assert near < 1.5 * one["frequency_half_width_Hz"]
+
+
+def test_a_profile_of_one_s_own(tmp_path):
+    file = tmp_path / "ridges.csv"
+    file.write_text("position_m,force_N\n0,0\n0.001,0.05\n0.002,0\n0.004,0\n")
+    protocol = Texture(file="ridges.csv", speeds=(0.04,)).located(tmp_path)
+    assert protocol.profile(np.array([0.0, 0.001, 0.005, 0.0055])) == pytest.approx(
+        [0, 0.05, 0.05, 0.025]
+    )
+    trial = next(iter(protocol.presentations()))
+    start, end = trial.hold
+    time = np.linspace(start, end, 400)
+    asked = 0.16 + protocol.profile(0.04 * (time - protocol.down))
+    assert trial.force.at(time) == pytest.approx(asked, abs=2e-3)
+    file.write_text("position_m,force_N\n0,0\n0,0.05\n")
+    with pytest.raises(SceneError, match=r"line 3: .* must rise"):
+        Texture(file="ridges.csv").located(tmp_path)
+
+
+def test_faster_touches_are_answered_sooner():
+    protocol = Touch(repeats=1)
+    found = protocol.conclude(answered(protocol))
+    touches = found.plain["touches"]
+    took = [one["onset_10_90_s"] for one in touches]
+    assert took == pytest.approx([0.59 * onset for onset in protocol.onsets], rel=0.06)
+    latencies = [one["latency_s"] for one in touches]
+    assert all(late is not None and late > 0 for late in latencies)
+    assert "The shortest latency" in found.text and "± 1 ms" in found.text
+
+
+@pytest.mark.parametrize("kind", [Vibration, Texture, Touch])
+def test_nothing_is_claimed_without_spikes_or_of_trials_cut_short(kind):
+    protocol = kind()
+    blind = protocol.conclude(answered(protocol, searched=False))
+    assert not blind.sentences and "spikes were not looked for" in blind.missing[0]
+    whole = answered(protocol)
+    nothing = Measurement(**{**vars(whole), "trials": ()})
+    assert protocol.conclude(nothing).missing
+    assert not list(protocol.plots(nothing))
+
+
+@pytest.mark.parametrize("kind", [Vibration, Texture, Touch])
+def test_each_is_drawn(kind):
+    protocol = kind()
+    (plot,) = protocol.plots(answered(protocol))
+    assert plot.panels and plot.caption
+
+
+@pytest.mark.parametrize("name", ["vibration", "texture", "touch"])
+def test_the_built_in_bench_follows_the_fastest_within_half_a_percent(name):
+    scene = load(name)
+    trials = list(scene.protocol.presentations())
+    fastest = max(trials, key=lambda trial: trial.force.steepest)
+    drive = drive_for(fastest, scene, 0.0)
+    assert drive.way == "list" and drive.warning is None
+    assert drive.error < 0.005 * fastest.force.peak
+
+
+def test_a_vibration_with_too_few_cycles_is_refused():
+    with pytest.raises(ValueError, match=r"fewer than 2.5 cycles"):
+        Vibration(lowest=2.0)
