@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tactile_lab.analysis.phase_locking import strongest_frequency
+from tactile_lab.analysis.phase_locking import LOCKED, strongest_frequency
 from tactile_lab.analysis.spike_train import within
 from tactile_lab.columns import read_columns
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
@@ -44,7 +44,7 @@ class Texture(ForceProtocol):
     title: ClassVar[str] = "Texture"
     accuracy: ClassVar[float] = 0.03
 
-    base: Force = Field(default=0.16, description="Force the sensor is pressed on with")
+    base: Force = Field(default=0.2, description="Force the sensor is pressed on with")
     depth: PushForce = Field(
         default=0.08, description="Of the grating: half of ridge less groove"
     )
@@ -60,7 +60,7 @@ class Texture(ForceProtocol):
     passes: int = Field(default=6, ge=1, le=1000, description="Scans at each speed")
     down: Duration = Field(default=0.1, description="Time down, and up again")
     lasts: Duration = Field(default=0.8, description="Time of one scan")
-    rest: Pause = Field(default=0.5, description="Time at no force after each")
+    rest: Pause = Field(default=2.0, description="Time at no force after each")
 
     def presentations(self) -> Trials:
         """All scans at one speed, then those at the next."""
@@ -114,18 +114,19 @@ class Texture(ForceProtocol):
         """The frequency in the spikes at each speed, and the period that it means."""
         if not run.searched:
             return Conclusion(missing=(NOT_SEARCHED,))
-        rows, values, periods, missing = [], [], [], []
+        rows, values, missing = [], [], []
+        told: dict[bool, list[str]] = {True: [], False: []}
         for speed, trials in self._scans(run).items():
             expected = speed / self._length
             spikes = sum(self._spikes(t).size for t in trials)
             try:
-                found = self.frequency(trials, expected)
+                found = self.frequency(run, trials, expected)
             except NotIdentifiableError as why:
                 missing.append(f"No period at {show(speed, 'm/s')}: {why}.")
                 continue
             half = 0.5 / self._scanned(trials)
             period = speed / found
-            periods.append(period)
+            told[abs(found - expected) <= half].append(show(speed, "m/s"))
             rows.append(
                 (
                     show(speed, "m/s"),
@@ -151,15 +152,22 @@ class Texture(ForceProtocol):
             headings=("Speed", "Spikes", "In the spikes", "Profile", "Period"),
             rows=tuple(rows),
             note="In the spikes: the frequency at which they repeat themselves most, "
-            "looked for between half and 1.6 times the profile's; ± is the resolution "
-            "of one scan's length.",
+            "looked for between half and 1.6 times the profile's (p < 0.01); ± is the "
+            "resolution of one scan's length.",
         )
-        said = (
-            f"The spikes tell periods of {show(min(periods), 'm', 3)} to "
-            f"{show(max(periods), 'm', 3)}; the profile's is "
-            f"{show(self._length, 'm', 3)}.",
-        )
-        return Conclusion(said, {"texture": values}, tuple(missing), (table,))
+        length = show(self._length, "m", 3)
+        said = []
+        if told[True]:
+            said.append(
+                f"The spikes tell the profile's period of {length} at "
+                f"{', '.join(told[True])}."
+            )
+        if told[False]:
+            said.append(
+                f"At {', '.join(told[False])} they repeat themselves otherwise than "
+                "the profile: the sensor's own rhythm begins with each scan, too."
+            )
+        return Conclusion(tuple(said), {"texture": values}, tuple(missing), (table,))
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Spikes of every scan against the position on the profile, by speed."""
@@ -193,15 +201,29 @@ class Texture(ForceProtocol):
             panels=tuple(panels),
         )
 
-    def frequency(self, trials: list[MeasuredTrial], expected: float) -> float:
+    def frequency(
+        self, run: Measurement, trials: list[MeasuredTrial], expected: float
+    ) -> float:
         """At which the spikes of some scans repeat themselves most, Hz.
 
         Raises:
-            NotIdentifiableError: too few spikes.
+            NotIdentifiableError: too few spikes, or none that chance does not give.
         """
         low, high = (part * expected for part in SEARCHED)
-        spikes = [self._spikes(trial) for trial in trials]
-        return strongest_frequency(spikes, low, high, self._scanned(trials))
+        spikes = [self._spikes(trial) - self._landed(run, trial) for trial in trials]
+        found, chance = strongest_frequency(spikes, low, high, self._scanned(trials))
+        if chance >= LOCKED:
+            raise NotIdentifiableError(
+                f"the spikes of all scans together repeat themselves at no frequency "
+                f"more than chance would have it (p = {chance:.2g})"
+            )
+        return found
+
+    def _landed(self, run: Measurement, trial: MeasuredTrial) -> float:
+        """When half the base was reached, s from the trial's start: scans begin so."""
+        time = trial.start + np.linspace(-0.05, self.down + 0.05, 4000)
+        past = np.abs(run.force.at(time)) >= abs(self.base) / 2
+        return float(time[np.argmax(past)] - trial.start) if past.any() else 0.0
 
     def _scans(self, run: Measurement) -> dict[float, list[MeasuredTrial]]:
         """Completed scans by speed."""

@@ -50,7 +50,7 @@ class Vibration(ForceProtocol):
     )
     down: Duration = Field(default=0.1, description="Time down, and up again")
     lasts: Duration = Field(default=0.4, description="Time of the vibration")
-    rest: Pause = Field(default=0.5, description="Time at no force after each")
+    rest: Pause = Field(default=2.0, description="Time at no force after each")
 
     @model_validator(mode="after")
     def _rising(self) -> Vibration:

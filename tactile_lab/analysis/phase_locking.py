@@ -123,28 +123,32 @@ def phases_of(
 
 def strongest_frequency(
     presentations: Sequence[FloatArray], low: float, high: float, length: float
-) -> float:
-    """Frequency between `low` and `high` Hz at which spikes repeat themselves most.
+) -> tuple[float, float]:
+    """Frequency at which the spikes of all presentations repeat themselves most.
 
-    It is that of the largest sum, over presentations, of the squared vector strength
-    times spikes: of each by itself, since their cycles need not begin alike.
+    All are taken together, so that a rhythm of the sensor's own, which begins at
+    another phase each time, is not taken for one of the stimulus.
 
     Args:
-        presentations: spike times of each, s.
+        presentations: spike times of each, s from the same instant of its stimulus.
         low: Hz.
         high: Hz.
         length: of each presentation, s: its inverse is the resolution.
 
+    Returns:
+        The frequency, Hz; and the probability of so strong a one by chance anywhere
+        between `low` and `high` (Rayleigh, for each of the frequencies resolved).
+
     Raises:
         NotIdentifiableError: too few spikes.
     """
-    told = [np.asarray(p, dtype=np.float64) for p in presentations if len(p) > 1]
-    if sum(p.size for p in told) < FEWEST:
-        raise NotIdentifiableError(f"fewer than {FEWEST} spikes to compare")
-    count = max(64, math.ceil((high - low) * length * 16))
-    tried = np.linspace(low, high, count)
-    power = np.zeros(count)
-    for spikes in told:
-        turns = np.exp(2j * np.pi * np.outer(tried, spikes - spikes[0]))
-        power += np.abs(turns.sum(axis=1)) ** 2 / spikes.size
-    return float(tried[int(np.argmax(power))])
+    spikes = np.concatenate([np.empty(0), *presentations])
+    if spikes.size < FEWEST:
+        raise NotIdentifiableError(f"{spikes.size} spikes, {FEWEST} are needed")
+    resolved = max(1.0, (high - low) * length)
+    tried = np.linspace(low, high, max(64, math.ceil(16 * resolved)))
+    turns = np.exp(2j * np.pi * np.outer(tried, spikes))
+    strength = np.abs(turns.mean(axis=1))
+    best = int(np.argmax(strength))
+    chance = resolved * rayleigh(min(float(strength[best]), 1.0), spikes.size)
+    return float(tried[best]), min(1.0, chance)

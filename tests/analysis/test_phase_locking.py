@@ -74,14 +74,25 @@ def test_too_few_spikes_claim_nothing():
     with pytest.raises(NotIdentifiableError, match="3 spikes"):
         phase_locking([np.zeros(2), np.zeros(1), np.empty(0)])
     with pytest.raises(NotIdentifiableError):
-        strongest_frequency([np.zeros(1)] * 9, 1.0, 2.0, 1.0)
+        strongest_frequency([np.zeros(1)] * 4, 1.0, 2.0, 1.0)
 
 
-def test_the_strongest_frequency_is_that_of_the_spikes_whenever_scans_begin():
+def test_the_strongest_frequency_is_the_stimulus_not_the_sensor_s_own():
+    """Each scan fires at 31 Hz by itself, and at 23 Hz with all others."""
     rng = np.random.default_rng(3)
     scans = []
-    for _ in range(6):
-        cycles = rng.uniform() + np.sort(rng.choice(np.arange(20), 8, replace=False))
-        scans.append(cycles / 23.0 + rng.normal(0, 2e-3, 8))
-    found = strongest_frequency(scans, 12.0, 35.0, 0.9)
-    assert found == pytest.approx(23.0, abs=0.6)
+    for _ in range(8):
+        locked = np.sort(rng.choice(np.arange(20), 8, replace=False)) / 23.0
+        own = (rng.uniform() + np.arange(8)) / 31.0
+        scans.append(np.concatenate([locked + rng.normal(0, 2e-3, 8), own]))
+    found, chance = strongest_frequency(scans, 12.0, 35.0, 0.9)
+    assert found == pytest.approx(23.0, abs=0.6) and chance < 0.01
+
+
+def test_a_frequency_of_chance_is_called_chance():
+    rng = np.random.default_rng(11)
+    chances = [
+        strongest_frequency([rng.uniform(0, 0.9, 40)], 12.0, 35.0, 0.9)[1]
+        for _ in range(200)
+    ]
+    assert np.mean(np.array(chances) < 0.05) < 0.08

@@ -95,9 +95,11 @@ def test_a_delay_turns_the_phase_and_leaves_the_strength():
 
 
 def test_a_texture_s_period_is_told_at_every_speed():
-    protocol = Texture(passes=8)
-    found = protocol.conclude(answered(protocol)).plain["texture"]
+    protocol = Texture()
+    conclusion = protocol.conclude(answered(protocol))
+    found = conclusion.plain["texture"]
     assert len(found) == 3
+    assert "period of 2 mm at 10 mm/s, 20 mm/s, 40 mm/s" in conclusion.text
     for one in found:
         near = abs(one["frequency_Hz"] - one["expected_Hz"])
         assert near < 1.5 * one["frequency_half_width_Hz"]
@@ -113,7 +115,7 @@ def test_a_profile_of_one_s_own(tmp_path):
     trial = next(iter(protocol.presentations()))
     start, end = trial.hold
     time = np.linspace(start, end, 400)
-    asked = 0.16 + protocol.profile(0.04 * (time - protocol.down))
+    asked = 0.2 + protocol.profile(0.04 * (time - protocol.down))
     assert trial.force.at(time) == pytest.approx(asked, abs=2e-3)
     file.write_text("position_m,force_N\n0,0\n0,0.05\n")
     with pytest.raises(SceneError, match=r"line 3: .* must rise"):
