@@ -23,13 +23,13 @@ from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.store.applied import held
 from tactile_lab.store.overrange import overrange
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import Records
+from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
     return Belief(
         circuit=scene.circuit,
         magnet=scene.bench.magnet,
-        setpoint=held(applied.steps, run.duration),
+        setpoint=Waveform.stairs(applied.steps, run.duration),
         followers=scene.bench.followers,
         clock=clock,
     )
