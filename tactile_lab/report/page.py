@@ -1,24 +1,18 @@
 """One self-contained report.html: numbers, figures, settings, certificate, warnings.
 
 No scripts and nothing to fetch; it follows the reader's light or dark system and prints
-on white paper. How it looks stands in page.html and page.css.
+on white paper. What stands where is page.html's; how it looks, page.css's.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup, escape
 
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import show
-from tactile_lab.report import palette
-from tactile_lab.report.canvas import HEAD_HEIGHT
 from tactile_lab.report.drift import drift_sentence
 from tactile_lab.report.findings import Findings
+from tactile_lab.report.html import picture, rendered
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.table import (
     NONE,
@@ -32,14 +26,6 @@ LONG = 12
 """Rows of a table one reads before anything else; a longer one follows the figures."""
 
 
-@dataclass(frozen=True)
-class _Picture:
-    """One figure of the page: SVG without a size of its own, and its caption."""
-
-    svg: Markup
-    caption: str
-
-
 def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
     """The report as one HTML page.
 
@@ -49,20 +35,12 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
             palette.
     """
     run, beside = findings.run, findings.beside
-    drawn = {plot.name: _picture(run, plot, svg) for plot, svg in pictures}
-    kept = Environment(
-        loader=PackageLoader("tactile_lab", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    style = kept.loader.get_source(kept, "page.css")[0] if kept.loader else ""
+    drawn = {plot.name: picture(run.title, plot, svg) for plot, svg in pictures}
     said = drift_sentence(run)
-    text = kept.get_template("page.html").render(
+    return rendered(
+        "page.html",
         run=run,
         findings=findings,
-        style=Markup(_colours() + style),
         none=NONE,
         key=_key_numbers(run),
         trials=trials_table(run),
@@ -78,7 +56,6 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
         certificate=_certificate(run),
         settings=_settings(run),
     )
-    return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
 
 
 def _key_numbers(run: RunData) -> dict[str, str]:
@@ -132,32 +109,3 @@ def _settings(run: RunData) -> list[tuple[str, Mapping[str, str]]]:
         ("Environment", run.environment),
     )
     return [(name, values) for name, values in groups if values]
-
-
-def _picture(run: RunData, plot: Plot, svg: str) -> _Picture:
-    """The figure with the page's colours, without the heading the page has itself."""
-    names = {colour.light: colour.name for colour in palette.ALL}
-    inline = re.sub(
-        r"#[0-9a-f]{6}\b",
-        lambda m: f"var(--{names[m[0]]}, {m[0]})" if m[0] in names else m[0],
-        svg[svg.index("<svg") :],
-    )
-    top = HEAD_HEIGHT * 72 - 14
-    inline = re.sub(
-        r'(<svg[^>]*?) width="[^"]*" height="[^"]*" viewBox="0 0 (\S+) ([^"]+)"',
-        lambda m: f'{m[1]} viewBox="0 {top:g} {m[2]} {float(m[3]) - top:g}"',
-        inline,
-        count=1,
-    )
-    described = escape(f"{run.title}: {plot.caption}")
-    inline = inline.replace("<svg", f'<svg role="img" aria-label="{described}"', 1)
-    return _Picture(Markup(inline), plot.caption)
-
-
-def _colours() -> str:
-    light = "".join(f"--{c.name}:{c.light};" for c in palette.ALL)
-    dark = "".join(f"--{c.name}:{c.dark};" for c in palette.ALL)
-    return (
-        f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark)"
-        f"{{:root{{{dark}}}}}\n"
-    )

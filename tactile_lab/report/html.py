@@ -1,0 +1,73 @@
+"""What all pages share: one file, figures inside, light or dark as the reader has it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from tactile_lab.plot import Plot
+from tactile_lab.report import palette
+from tactile_lab.report.canvas import HEAD_HEIGHT
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure of a page: SVG without a size of its own, and its caption."""
+
+    svg: Markup
+    caption: str
+
+
+def rendered(template: str, **names: Any) -> str:
+    """A page: the template in this folder with these names, and the house style."""
+    kept = Environment(
+        loader=PackageLoader("tactile_lab", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    style = kept.loader.get_source(kept, "page.css")[0] if kept.loader else ""
+    text = kept.get_template(template).render(
+        style=Markup(_colours() + style), **names
+    )
+    return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
+
+
+def picture(title: str, plot: Plot, svg: str) -> Picture:
+    """The figure with the page's colours, without the heading the page has itself.
+
+    Args:
+        title: of the page.
+        plot: what is drawn.
+        svg: as matplotlib wrote it in the light palette.
+    """
+    names = {colour.light: colour.name for colour in palette.ALL}
+    inline = re.sub(
+        r"#[0-9a-f]{6}\b",
+        lambda m: f"var(--{names[m[0]]}, {m[0]})" if m[0] in names else m[0],
+        svg[svg.index("<svg") :],
+    )
+    top = HEAD_HEIGHT * 72 - 14
+    inline = re.sub(
+        r'(<svg[^>]*?) width="[^"]*" height="[^"]*" viewBox="0 0 (\S+) ([^"]+)"',
+        lambda m: f'{m[1]} viewBox="0 {top:g} {m[2]} {float(m[3]) - top:g}"',
+        inline,
+        count=1,
+    )
+    described = escape(f"{title}: {plot.caption}")
+    inline = inline.replace("<svg", f'<svg role="img" aria-label="{described}"', 1)
+    return Picture(Markup(inline), plot.caption)
+
+
+def _colours() -> str:
+    light = "".join(f"--{c.name}:{c.light};" for c in palette.ALL)
+    dark = "".join(f"--{c.name}:{c.dark};" for c in palette.ALL)
+    return (
+        f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark)"
+        f"{{:root{{{dark}}}}}\n"
+    )
