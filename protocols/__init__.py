@@ -1,1 +1,1 @@
-"""One file per protocol, its trials, meaning and plots; scenes/ are ready to run."""
+"""One file per protocol; scenes/ and studies/ that are ready to run."""

@@ -35,6 +35,9 @@ report show themselves.
     >>> len(found.spike_times)
     46
 
+A study varies a scene: `study` computes what is missing of it on every core and gives
+one labelled data set (docs/studies.md).
+
 A protocol of your own is a subclass of `Protocol` that yields one `Trial` after
 another, in a file that `load` takes. Whatever is refused or fails is a
 `TactileLabError`, and also the builtin it resembles.
@@ -60,6 +63,7 @@ if TYPE_CHECKING:
         run,
         runs,
         simulate,
+        study,
         write_report,
     )
     from tactile_lab.store.run import Run
@@ -84,6 +88,7 @@ __all__ = [
     "run",
     "runs",
     "simulate",
+    "study",
     "write_report",
 ]
 
@@ -103,6 +108,7 @@ _HOMES = {
     "run": "scripting",
     "runs": "scripting",
     "simulate": "scripting",
+    "study": "scripting",
     "write_report": "scripting",
 }
 """Where each name is defined: a module is imported when its name is asked for."""

@@ -19,6 +19,7 @@ VERBS = {
     "monitor": "Watch the sensor, coil off; keep the last minute on demand.",
     "plan": "What a scene needs and leaves out, its cost and limits; opens nothing.",
     "simulate": "The model alone, no bench: spikes, error estimate, run time.",
+    "study": "One scene at many points, on every core; goes on where it was.",
     "validate": "The model's solver: error against run time, honesty, stability.",
     "devices": "What is attached, what answers there, which dialect row fits.",
     "doctor": "Environment, drivers, permissions, timing, disk; each with its remedy.",

@@ -92,12 +92,22 @@ def protocol_names() -> tuple[str, ...]:
 
 def scene_names() -> tuple[str, ...]:
     """Names of the scenes that ship, sorted."""
-    return tuple(sorted(_scenes()))
+    return tuple(sorted(_shipped("scenes")))
 
 
 def scene_path(name: str) -> Path:
     """Where the shipped scene `name` lies."""
-    return Path(str(_scenes()[name]))
+    return Path(str(_shipped("scenes")[name]))
+
+
+def study_names() -> tuple[str, ...]:
+    """Names of the studies that ship, sorted."""
+    return tuple(sorted(_shipped("studies")))
+
+
+def study_path(name: str) -> Path:
+    """Where the shipped study `name` lies."""
+    return Path(str(_shipped("studies")[name]))
 
 
 def protocol_class(name: str) -> type[Protocol]:
@@ -156,12 +166,14 @@ def _protocols() -> dict[str, str]:
 
 
 @cache
-def _scenes() -> dict[str, Traversable]:
-    """File of each scene by its name."""
+def _shipped(what: str) -> dict[str, Traversable]:
+    """File of each scene, or each study, by its name."""
+    folders = (resources.files(package) / what for package in _packages())
     return {
         name: file
-        for package in _packages()
-        for name, file in _inside(resources.files(package) / "scenes", ".toml").items()
+        for folder in folders
+        if folder.is_dir()
+        for name, file in _inside(folder, ".toml").items()
     }
 
 

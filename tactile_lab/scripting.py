@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from tactile_lab.acquisition import events
 from tactile_lab.engine.execution import Execution
@@ -21,6 +21,8 @@ from tactile_lab.store.run import Run
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
+    import xarray
+
     from tactile_lab.model.simulate import Result
     from tactile_lab.report.write import Report
 
@@ -170,6 +172,38 @@ def simulate(
     drive = timeline(scene, through_coil=False)
     wanted = keep or modelled(scene)
     return model(scene, drive.force, drive.duration, wanted, tolerance)
+
+
+def study(
+    what: str | Path | Mapping[str, Any],
+    *,
+    name: str = "study",
+    out: str | Path = "studies",
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> xarray.Dataset:
+    """Carry a study out: one scene at many points, labelled in one data set.
+
+    ``study({"scene": "demo", "axis": [{"key": "sensor.R1", "normal": "1 %"}]})``
+
+    Args:
+        what: a study file, or what one would hold (docs/studies.md).
+        name: of its folder, for one that is no file.
+        out: holds the studies' folders and the points that were computed before.
+        workers: processes on this machine; as many as cores unless given.
+        scheduler: address of a Dask scheduler whose workers compute instead.
+
+    Raises:
+        SceneError: the study cannot be used as written.
+        RecordingError: the folder cannot be written.
+        NotFoundError: the scheduler does not answer.
+    """
+    from tactile_lab.studies.carry_out import carry_out
+    from tactile_lab.studies.study import load_study
+
+    asked = load_study(what, name)
+    found = carry_out(asked, Path(out), count=workers, scheduler=scheduler)
+    return found.to_xarray()
 
 
 def runs(out: str | Path = "runs", *, protocol: str | None = None) -> list[RunSummary]:

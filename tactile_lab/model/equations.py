@@ -38,6 +38,20 @@ def V_C1_slope(circuit: Circuit, V_P: ArrayLike, V_C1: ArrayLike) -> FloatArray:
     return slope
 
 
+def critical_force(circuit: Circuit) -> float:
+    """The least force at which a film that does not leak would keep it firing, N.
+
+    Held from rest, it moves node A to where T1's current just keeps V_C2 at V_fire:
+    there I_DS, Eq. (8), draws what R1 and R2 give, Eq. (16). NaN where no force does.
+    """
+    c, V = circuit, circuit.critical_V_C1
+    drawn = (c.V_S - V) / c.R1 - V / c.R2
+    if not (math.isfinite(V) and V > 0 and drawn > 0 and c.k_F):
+        return math.nan
+    gate = c.m * c.V_T * math.log(drawn / (c.I_S * -math.expm1(-V / c.V_T)))
+    return (gate - c.V_GS) / c.k_F
+
+
 def I_C(circuit: Circuit, V_C1: ArrayLike) -> FloatArray:
     """Collector current of T1, Eq. (17), A.
 

@@ -55,12 +55,15 @@ class ModelOutcome(Outcome):
             ("_scene", scene),
             ("_step", step),
             ("_steps", steps),
+            ("looked_at", False),
         ):
             object.__setattr__(self, name, value)
 
     _scene: Scene
     _step: Step
     _steps: Sequence[Step]
+    looked_at: bool
+    """Whether anything of the model was asked for: what follows may depend on it."""
 
     @property
     def spike_times(self) -> NDArray[np.float64]:
@@ -109,6 +112,7 @@ class ModelOutcome(Outcome):
     def _model(self, *keep: str) -> Result:
         from tactile_lab.planning.preview import model
 
+        object.__setattr__(self, "looked_at", True)
         force = joined(
             [(step.start, step.force) for step in self._steps[: self.index + 1]]
         )

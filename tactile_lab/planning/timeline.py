@@ -33,12 +33,15 @@ class Timeline:
         force: of the whole run, N against s from 0.
         duration: s, planned pauses included.
         warnings: where the coil cannot follow.
+        adaptive: the protocol looked at what the sensor did, so that another sensor
+            may get other trials.
     """
 
     steps: tuple[Step, ...]
     force: Waveform
     duration: float
     warnings: tuple[str, ...]
+    adaptive: bool
 
     @property
     def streamed(self) -> float:
@@ -129,6 +132,7 @@ class _Driver:
         self.scene = scene
         self.through_coil = through_coil
         self.steps: list[Step] = []
+        self._outcomes: list[ModelOutcome] = []
         self._limited: list[tuple[str, str]] = []
         self._time = 0.0
         self._amperes = 0.0
@@ -159,7 +163,9 @@ class _Driver:
         step = Step(trial, self._time, force, current, drive)
         self.steps.append(step)
         self._time += length
-        return ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)
+        outcome = ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)
+        self._outcomes.append(outcome)
+        return outcome
 
     def _wait_for_load(self, drive: Drive) -> None:
         """The time that a list takes to load goes by, unless it is there already."""
@@ -198,7 +204,13 @@ class _Driver:
 
     def timeline(self) -> Timeline:
         force = joined([(step.start, step.force) for step in self.steps])
-        return Timeline(tuple(self.steps), force, self._time, tuple(self._told()))
+        return Timeline(
+            tuple(self.steps),
+            force,
+            self._time,
+            tuple(self._told()),
+            any(outcome.looked_at for outcome in self._outcomes),
+        )
 
     def _told(self) -> Iterator[str]:
         if self._limited:

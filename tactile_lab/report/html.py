@@ -1,4 +1,4 @@
-"""What all pages share: one file, figures inside, light or dark as the reader has it."""
+"""What all pages share: one file, figures inside, light or dark as one reads."""
 
 from __future__ import annotations
 
@@ -32,9 +32,7 @@ def rendered(template: str, **names: Any) -> str:
         lstrip_blocks=True,
     )
     style = kept.loader.get_source(kept, "page.css")[0] if kept.loader else ""
-    text = kept.get_template(template).render(
-        style=Markup(_colours() + style), **names
-    )
+    text = kept.get_template(template).render(style=Markup(_colours() + style), **names)
     return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
 
 

@@ -1,0 +1,164 @@
+"""``tactile-lab study``: one scene at many points, on every core."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import (
+    ProgressLine,
+    fail,
+    print_json,
+    refusing,
+    say,
+    warn,
+    working,
+)
+
+if TYPE_CHECKING:
+    from tactile_lab.studies.carry_out import Forecast, Progress
+    from tactile_lab.studies.study import Study
+
+
+@click.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--plan", "only_plan", is_flag=True, help="Say what it will cost.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes on this machine; as many as cores unless given.",
+)
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="A Dask scheduler whose workers compute instead.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("studies"),
+    show_default=True,
+    metavar="DIR",
+    help="Where studies and finished points are put.",
+)
+@json_option
+def command(
+    study: Path,
+    only_plan: bool,
+    workers: int | None,
+    scheduler: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Carry out STUDY, a TOML file that says what of a scene varies.
+
+    Interrupt it whenever you like: what was finished is kept, and the same command
+    goes on. Points that were computed before are not computed again.
+    """
+    with refusing():
+        from tactile_lab.studies.carry_out import forecast
+        from tactile_lab.studies.study import load_study
+
+        asked = load_study(study)
+        if only_plan:
+            with working("trying three points"):
+                cost = forecast(asked, out)
+            if as_json:
+                print_json(_planned(asked, cost))
+            else:
+                _print_plan(asked, cost)
+            return
+        carry_out_attended(asked, out, workers, scheduler, as_json=as_json)
+
+
+def carry_out_attended(
+    study: Study,
+    out: Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    *,
+    as_json: bool = False,
+) -> None:
+    """Carry a study out, telling how far it is, and print what it says.
+
+    Raises:
+        TactileLabError: it cannot be carried out, or not to its end.
+    """
+    from tactile_lab.studies.carry_out import carry_out
+    from tactile_lab.studies.page import write_page
+
+    with ProgressLine(study.design.size, study.name) as line:
+
+        def tell(progress: Progress) -> None:
+            line.update(progress.done, _now(progress))
+
+        try:
+            found = carry_out(study, out, count=workers, scheduler=scheduler, tell=tell)
+        except KeyboardInterrupt:
+            line.close()
+            fail("interrupted; the same command goes on where it was.", 130)
+            return
+    with working("writing the report"):
+        html, said = write_page(found, out / study.name)
+    for text in said.missing:
+        warn(text)
+    if as_json:
+        print_json({"study": str(out / study.name), **said.plain})
+        return
+    say(said.text)
+    say()
+    say(f"data    {out / study.name / 'data.zarr'}")
+    say(f"report  {html}")
+
+
+def _now(progress: Progress) -> str:
+    parts = [f"{progress.done:,} of {progress.total:,} points"]
+    if progress.there:
+        parts.append(f"{progress.there:,} known before")
+    if progress.failed:
+        parts.append(f"{progress.failed:,} failed")
+    if progress.workers > 1:
+        parts.append(f"{progress.workers} workers")
+    return ", ".join(parts)
+
+
+def _print_plan(study: Study, cost: Forecast) -> None:
+    from tactile_lab.studies.page import described
+
+    design = study.design
+    say(f"{study.title}: {study.scene.name} on {study.on}")
+    say()
+    for axis in design.axes:
+        say(f"  {axis.key:<28} {described(axis)}")
+    say(f"  {'kept':<28} {', '.join(one.name for one in study.kept)}")
+    say()
+    shape = " × ".join(map(str, design.shape)) or "1"
+    say(f"points    {shape} = {design.size:,}, {cost.there:,} of them known")
+    if cost.seconds is not None:
+        left = cost.points - cost.there
+        say(f"time      {_time(cost.seconds)} a point, {_time(cost.seconds * left)} on "
+            "one core")  # fmt: skip
+    if cost.reason:
+        warn(f"a point that was tried failed: {cost.reason}")
+
+
+def _planned(study: Study, cost: Forecast) -> dict[str, Any]:
+    left = cost.points - cost.there
+    return {
+        "study": study.name,
+        "points": cost.points,
+        "known": cost.there,
+        "seconds_a_point": cost.seconds,
+        "seconds_on_one_core": None if cost.seconds is None else cost.seconds * left,
+        "failed": cost.reason or None,
+    }
+
+
+def _time(seconds: float) -> str:
+    from tactile_lab.quantity import show
+
+    return show(seconds, "s", 2) if seconds < 120 else f"{seconds / 60:.0f} min"

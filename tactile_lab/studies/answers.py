@@ -1,0 +1,279 @@
+"""What a study says: response, tornado, Sobol indices, spread, yield."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.analysis.estimate import Estimate, student_95
+from tactile_lab.conclusion import Conclusion, Table
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.quantity import count, printed, show
+from tactile_lab.studies.axes import Axis
+from tactile_lab.studies.dataset import Gathered
+
+FloatArray = NDArray[np.float64]
+
+CURVES = 8
+"""Most curves in one panel."""
+RESAMPLES = 200
+"""Of the bootstrap behind the intervals of Sobol indices."""
+Z = 1.959963984540054
+"""Half-width of a 95 % interval in standard deviations of a normal distribution."""
+
+
+def conclude(found: Gathered) -> Conclusion:
+    """Sentences, tables and numbers of a study."""
+    study, design = found.study, found.study.design
+    failed = found.failed
+    sentences = [
+        f"{count(design.size, 'point')} of {study.scene.name} on {study.on}"
+        + (f", {failed} of them refused or failed." if failed else ".")
+    ]
+    missing = _reasons(found)
+    tables: list[Table] = []
+    values: dict[str, Any] = {"points": design.size, "failed": failed}
+    for name, column in found.numbers().items():
+        known = column[np.isfinite(column)]
+        if known.size and design.drawn and design.method not in ("indices", "tornado"):
+            low, high = np.quantile(known, (0.025, 0.975))
+            sentences.append(
+                f"{name}: median {_told(found, name, np.median(known))}, 95 % of the "
+                f"points from {_told(found, name, low)} to {_told(found, name, high)}."
+            )
+            values[name] = {
+                "median": float(np.median(known)),
+                "low": float(low),
+                "high": float(high),
+            }
+    if study.require:
+        good, share = _yield(found)
+        told = ", ".join(f"{name} {limit}" for name, limit in study.require.items())
+        sentences.append(
+            f"{good} of {design.size} points are good ({told}): {share.value:.1%} "
+            f"({share.low:.1%} to {share.high:.1%}, Wilson's 95 % interval)."
+        )
+        values["yield"] = share
+    if design.method == "indices" and design.drawn:
+        tables += _indices(found, values)
+    if design.method == "tornado" and design.drawn:
+        tables += _tornado(found)
+    return Conclusion(tuple(sentences), values, tuple(missing), tuple(tables))
+
+
+def _told(found: Gathered, name: str, value: float, *, signed: bool = False) -> str:
+    text = show(float(value), found.unit(name))
+    return f"+{text}" if signed and value > 0 else text
+
+
+def plots(found: Gathered) -> Iterator[Plot]:
+    """Figures of a study: what is kept against what varies."""
+    design = found.study.design
+    numbers = found.numbers()
+    if not numbers:
+        return
+    for number, (key, dimension, axis, values) in enumerate(design.coordinates()):
+        if not axis.numeric or dimension != key:
+            continue
+        yield _response(found, axis, number, np.array(values, dtype=np.float64))
+    if design.drawn and design.method not in ("indices", "tornado"):
+        for number, axis in enumerate(design.drawn):
+            yield _scatter(found, axis, number)
+
+
+def _response(found: Gathered, axis: Axis, number: int, at: FloatArray) -> Plot:
+    """Every number against one axis of values; a curve for each of another."""
+    design = found.study.design
+    dimensions = list(design.dimensions)
+    along = dimensions.index(axis.key)
+    others = [g[0] for g in design.groups if g[0].key != axis.key]
+    by = min(others, key=lambda one: len(one.values)) if others else None
+    panels = []
+    for name, column in found.numbers().items():
+        if by is None or len(by.values) > CURVES:
+            series = _mean(np.moveaxis(column, along, 0), at, "")
+            panels.append(Panel(label=name, unit=found.unit(name), series=series))
+            continue
+        moved = np.moveaxis(column, (along, dimensions.index(by.key)), (0, 1))
+        curves: list[Series] = []
+        for i, value in enumerate(by.values):
+            curves += _mean(moved[:, i], at, by.shown(value), i)
+        panels.append(Panel(label=name, unit=found.unit(name), series=tuple(curves)))
+    return Plot(
+        name=f"response_{number}",
+        title=f"response to {axis.key}",
+        caption=f"Means over all other axes and repeats against {axis.key}; bars are "
+        "95 % intervals of the mean where there are several.",
+        x_label=axis.key,
+        x_unit=axis.unit,
+        panels=tuple(panels),
+    )
+
+
+COLOURS = ("V_C1", "V_C2", "V_K", "force", "rate", "model", "ink", "quiet")
+
+
+def _mean(
+    column: FloatArray, at: FloatArray, name: str, number: int = 0
+) -> tuple[Series, ...]:
+    """Mean of everything but the first axis, with its 95 % interval."""
+    rows = column.reshape(at.size, -1)
+    known = np.isfinite(rows)
+    size = known.sum(axis=1)
+    total = np.where(known, rows, 0.0).sum(axis=1)
+    mean = np.divide(total, size, out=np.full(at.size, np.nan), where=size > 0)
+    error = None
+    if np.max(size, initial=0) > 1:
+        off = np.where(known, rows - mean[:, None], 0.0)
+        variance = (off**2).sum(axis=1) / np.maximum(size - 1, 1)
+        wide = np.array([student_95(int(max(n - 1, 1))) for n in size])
+        error = wide * np.sqrt(variance / np.maximum(size, 1))
+    return (
+        Series(
+            x=at,
+            y=mean,
+            y_error=error,
+            name=name,
+            mark="joined",
+            colour=COLOURS[number % len(COLOURS)],
+        ),
+    )
+
+
+def _scatter(found: Gathered, axis: Axis, number: int) -> Plot:
+    """Every number against one drawn axis."""
+    design = found.study.design
+    _, _, _, drawn = next(c for c in design.coordinates() if c[2] is axis)
+    along = design.dimensions.index("draw")
+    panels = []
+    for name, column in found.numbers().items():
+        moved = np.moveaxis(column, along, -1)
+        x = np.broadcast_to(np.array(drawn), moved.shape).ravel()
+        dots = Series(x=x, y=moved.ravel(), mark="dots")
+        panels.append(Panel(label=name, unit=found.unit(name), series=(dots,)))
+    return Plot(
+        name=f"draws_{number}",
+        title=f"draws of {axis.key}",
+        caption=f"Each point against its {axis.key}; all other axes vary as well.",
+        x_label=axis.key,
+        x_unit=axis.unit,
+        panels=tuple(panels),
+    )
+
+
+def _yield(found: Gathered) -> tuple[int, Estimate]:
+    """How many points meet every requirement; one that failed does not."""
+    numbers, size = found.numbers(), found.study.design.size
+    good = np.ones(found.study.design.shape, dtype=bool)
+    for name, limit in found.study.require.items():
+        column = numbers[name]
+        good &= np.isfinite(column)
+        if limit.least is not None:
+            good &= column >= limit.least
+        if limit.most is not None:
+            good &= column <= limit.most
+    number = int(good.sum())
+    share = number / size
+    error = math.sqrt(share * (1 - share) / size)
+    centre = (share + Z * Z / (2 * size)) / (1 + Z * Z / size)
+    half = (
+        Z / (1 + Z * Z / size)
+        * math.hypot(error, Z / (2 * size))
+    )  # fmt: skip
+    low, high = max(centre - half, 0.0), min(centre + half, 1.0)
+    return number, Estimate(share, error, low, high)
+
+
+def _indices(found: Gathered, values: dict[str, Any]) -> Iterator[Table]:
+    """Sobol indices of each number, with bootstrapped 95 % intervals."""
+    from scipy.stats import sobol_indices
+
+    design = found.study.design
+    k, n = len(design.drawn), design.draws
+    along = design.dimensions.index("draw")
+    for name, column in found.numbers().items():
+        flat = np.moveaxis(column, along, -1).reshape(-1, n * (k + 2)).mean(axis=0)
+        if not np.all(np.isfinite(flat)) or np.ptp(flat) == 0:
+            continue
+        parts: Any = {  # the stubs know no function of one output
+            "f_A": flat[:n].reshape(1, n),
+            "f_B": flat[n : 2 * n].reshape(1, n),
+            "f_AB": flat[2 * n :].reshape(k, 1, n),
+        }
+        index = sobol_indices(func=parts, n=n, rng=design.seed)
+        with warnings.catch_warnings():  # an axis that does nothing has no spread
+            warnings.simplefilter("ignore", RuntimeWarning)
+            spread = index.bootstrap(n_resamples=RESAMPLES)
+        rows = []
+        for i, axis in enumerate(design.drawn):
+            one = _index(index.first_order, spread.first_order, i)
+            whole = _index(index.total_order, spread.total_order, i)
+            values[f"sobol_{name}_{axis.key}"] = {"first": one, "total": whole}
+            rows.append((axis.key, _shown(one), _shown(whole)))
+        yield Table(
+            title=f"Sobol indices of {name}",
+            headings=("axis", "first order", "total"),
+            rows=tuple(rows),
+            note=f"Saltelli's estimator on {n} pairs; 95 % intervals by bootstrap over "
+            f"{RESAMPLES} resamples.",
+        )
+
+
+def _index(values: FloatArray, spread: Any, number: int) -> Estimate:
+    interval = spread.confidence_interval
+    value, low, high = (
+        float(one[number]) for one in (values, interval.low, interval.high)
+    )
+    if math.isnan(low):  # the same in every resample
+        low = high = value
+    return Estimate(value, float(spread.standard_error[number]), low, high)
+
+
+def _shown(one: Estimate) -> str:
+    return printed(f"{one.value:.3f} ({one.low:.3f} to {one.high:.3f})")
+
+
+def _tornado(found: Gathered) -> Iterator[Table]:
+    """How each number changes where one axis alone is moved by one deviation."""
+    design = found.study.design
+    along = design.dimensions.index("draw")
+    for name, column in found.numbers().items():
+        flat = np.moveaxis(column, along, -1).reshape(-1, design.shape[along])
+        middle = flat.mean(axis=0)
+        rows = []
+        for i, axis in enumerate(design.drawn):
+            low, high = middle[1 + 2 * i], middle[2 + 2 * i]
+            half = axis.spread.width if axis.spread is not None else 0.0
+            rows.append(
+                (
+                    abs(high - low),
+                    (
+                        axis.key,
+                        f"±{show(half, axis.unit)}",
+                        _told(found, name, low - middle[0], signed=True),
+                        _told(found, name, high - middle[0], signed=True),
+                    ),
+                )
+            )
+        rows.sort(key=lambda row: -row[0])
+        yield Table(
+            title=f"{name}, {_told(found, name, middle[0])} at the centre",
+            headings=("axis", "spread", "low", "high"),
+            rows=tuple(row for _, row in rows),
+            note="Change of it where one axis alone lies one standard deviation low "
+            "or high (of a uniform spread: where a normal one has its deviation).",
+        )
+
+
+def _reasons(found: Gathered) -> list[str]:
+    """Each reason once, with how often."""
+    reasons, counts = np.unique(found.reasons[found.reasons != ""], return_counts=True)
+    return [
+        f"{count(int(number), 'point')}: {reason}"
+        for reason, number in zip(reasons.tolist(), counts, strict=True)
+    ][:20]

@@ -1,0 +1,197 @@
+"""Carry a study out: compute what is missing, keep it, gather the data set."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.planning.plan import plan
+from tactile_lab.studies.dataset import Gathered, gathered, write
+from tactile_lab.studies.points import Points
+from tactile_lab.studies.shelf import NAME, Shelf
+from tactile_lab.studies.study import Study
+from tactile_lab.studies.workers import Task, batch_of, workers
+
+LONG = 1.0
+"""Seconds a batch should take: little to lose, enough to be worth sending."""
+MOST = 20_000
+"""Points of one batch."""
+FIRST = 3
+"""Points whose time tells what the others will take."""
+AT_ONCE = 50_000
+"""Points whose addresses are made at a time."""
+SHELF = "points"
+"""Folder of finished points, shared by all studies beside it."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a study is.
+
+    Attributes:
+        done, total: points, those that were there already among the done.
+        there: points that were computed before, by this study or another.
+        failed: points refused or failed since it began.
+        workers: how many compute.
+    """
+
+    done: int
+    total: int
+    there: int
+    failed: int
+    workers: int
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a study will cost, from points that were tried.
+
+    Attributes:
+        points: in all.
+        there: computed before.
+        seconds: a point takes one worker, s; None where nothing is left to compute.
+        reason: why a tried point failed, if one did.
+    """
+
+    points: int
+    there: int
+    seconds: float | None
+    reason: str = ""
+
+
+def study_points(study: Study, out: Path) -> Points:
+    """What computes the study's points in this process."""
+    kept = out / study.name / "runs" if study.on == "bench" else None
+    return Points(study, kept)
+
+
+def forecast(study: Study, out: Path) -> Forecast:
+    """What carrying a study out under `out` will cost; tries up to three points.
+
+    On real instruments nothing is tried: the plan of a run tells its time.
+    """
+    points = study_points(study, out)
+    missing = _missing(study, addresses(study, points), Shelf(out / SHELF))
+    size = study.design.size
+    seconds, reason = None, ""
+    if missing.size and study.on == "bench":
+        seconds = plan(study.scene, preview=False).estimate.duration
+    elif missing.size:
+        tried = []
+        for number in missing[:FIRST]:
+            began = time.perf_counter()
+            batch = batch_of(points, _task(study, np.array([number]), [b""]))
+            tried.append(time.perf_counter() - began)
+            reason = reason or batch.reasons[0]
+        seconds = min(tried)  # the first one compiles
+    return Forecast(size, size - missing.size, seconds, reason)
+
+
+def carry_out(
+    study: Study,
+    out: Path,
+    *,
+    count: int | None = None,
+    scheduler: str | None = None,
+    tell: Callable[[Progress], None] = lambda progress: None,
+) -> Gathered:
+    """Compute all points that are missing, and write the data set.
+
+    It can be interrupted at any moment: what was finished is kept, and the next call
+    goes on. The result does not depend on who computed what.
+
+    Args:
+        study: what to compute.
+        out: holds the studies' folders and the finished points.
+        count: processes; as many as cores unless given.
+        scheduler: address of a Dask scheduler.
+        tell: told of each finished batch.
+
+    Raises:
+        RecordingError: the folder cannot be written.
+        UnsafeError: a coil's state could not be verified: nothing goes on.
+        NotFoundError, SceneError: the scheduler cannot be used.
+    """
+    points, shelf = study_points(study, out), Shelf(out / SHELF)
+    named = addresses(study, points)
+    missing = _missing(study, named, shelf)
+    if missing.size:
+        with workers(study, points, count, scheduler) as crew:
+            done, failed = study.design.size - missing.size, 0
+            there, pace = done, _Pace(crew.count)
+            tell(Progress(done, study.design.size, there, failed, crew.count))
+            for batch in crew.batches(_tasks(study, missing, named, pace)):
+                shelf.put(batch)
+                pace.tell(len(batch.addresses))
+                done += len(batch.addresses)
+                failed += sum(map(bool, batch.reasons))
+                tell(Progress(done, study.design.size, there, failed, crew.count))
+    found = gathered(study, shelf, shelf.find(named))
+    write(found, out / study.name)
+    return found
+
+
+def addresses(study: Study, points: Points) -> NDArray[np.bytes_]:
+    """The address of each point, in the order of their numbers."""
+    design = study.design
+    found = np.empty(design.size, dtype=NAME)
+    for first in range(0, design.size, AT_ONCE):
+        numbers = np.arange(first, min(first + AT_ONCE, design.size))
+        at = zip(design.values(numbers), design.repeats(numbers), strict=True)
+        found[numbers] = [points.address(values, repeat) for values, repeat in at]
+    return found
+
+
+def _missing(study: Study, named: NDArray[np.bytes_], shelf: Shelf) -> NDArray[np.intp]:
+    """Numbers of the points to compute, in the order in which they are."""
+    _, first = np.unique(named, return_index=True)  # two points may be one
+    first = np.sort(first)
+    missing: NDArray[np.intp] = first[shelf.find(named[first]).file < 0]
+    if study.on == "bench" and study.order == "random":
+        np.random.default_rng(study.design.seed).shuffle(missing)
+    return missing
+
+
+def _tasks(
+    study: Study,
+    missing: NDArray[np.intp],
+    named: NDArray[np.bytes_],
+    pace: _Pace,
+) -> Iterator[Task]:
+    at = 0
+    while at < missing.size:
+        numbers = missing[at : at + (1 if study.on == "bench" else pace.points())]
+        at += numbers.size
+        yield _task(study, numbers, named[numbers].tolist())
+
+
+def _task(study: Study, numbers: NDArray[np.intp], named: list[bytes]) -> Task:
+    design = study.design
+    return named, design.values(numbers), design.repeats(numbers)
+
+
+class _Pace:
+    """How many points a batch should have, from the time the others took."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._began = 0.0
+        self._done = 0
+
+    def points(self) -> int:
+        """Of the next batch; at first one, then at most twice what is done."""
+        if not self._done:
+            return 1
+        each = (time.perf_counter() - self._began) * self._count / self._done
+        return int(min(max(LONG / max(each, 1e-9), 1), 2 * self._done, MOST))
+
+    def tell(self, points: int) -> None:
+        """So many more are done; the first one compiled, and is not counted."""
+        if not self._began:
+            self._began = time.perf_counter()
+        self._done += points

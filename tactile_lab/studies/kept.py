@@ -1,0 +1,140 @@
+"""What a study keeps of each point: an expression of its run, or a user's function."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import ParameterError, SceneError, choices, fault_in
+
+NAMED = {
+    "spike_count": ("len(spikes)", ""),
+    "spike_times": ("spikes", "s"),
+    "first_spike": ("spikes[0] if len(spikes) else nan", "s"),
+    "last_spike": ("spikes[-1] if len(spikes) else nan", "s"),
+    "mean_rate": (
+        "(len(spikes) - 1) / (spikes[-1] - spikes[0]) if len(spikes) > 1 else nan",
+        "Hz",
+    ),
+    "critical_force": ("critical_force(circuit)", "N"),
+}
+"""Names that stand for an expression, and its unit."""
+_FUNCTION = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]*)")
+
+Value = float | NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Kept:
+    """One thing that is kept of each point.
+
+    Attributes:
+        name: of its column.
+        expression: Python, with the names that `seen` gives a point; or
+            ``file.py:function``, called with the point's run (or the model's result).
+        source: the text of the function's file; "" for an expression.
+        unit: SI; "" where it has none, or only its author knows it.
+    """
+
+    name: str
+    expression: str
+    source: str = ""
+    unit: str = ""
+
+    def of(self, names: Mapping[str, Any]) -> Value:
+        """The value at a point: a number, or a row of numbers (shape (n,)).
+
+        Raises:
+            ParameterError: the expression or function fails, or gives something else.
+        """
+        try:
+            if self.source:
+                value = _function(self)(names.get("run", names.get("result")))
+            else:
+                # the study's author wrote it, as they write protocols in Python
+                code = _compiled(self.name, self.expression)
+                value = eval(code, {"__builtins__": _BUILTINS, **names})
+            array = np.asarray(value, dtype=np.float64)
+        except Exception as error:  # whatever a user's expression raises
+            where = self.expression.rpartition(":")[0] if self.source else ""
+            raise ParameterError(f"{self.name}: {fault_in(where, error)}") from error
+        if array.ndim > 1:
+            raise ParameterError(
+                f"{self.name} = {self.expression} has the shape {array.shape}; a "
+                "number or one row of numbers can be kept."
+            )
+        return float(array) if array.ndim == 0 else array
+
+
+@cache
+def _compiled(name: str, expression: str) -> CodeType:
+    return compile(expression, f"keep.{name}", "eval")
+
+
+@cache
+def _function(kept: Kept) -> Callable[[Any], Any]:
+    path, _, name = kept.expression.rpartition(":")
+    module: dict[str, Any] = {"__name__": Path(path).stem, "__file__": path}
+    exec(compile(kept.source, path, "exec"), module)
+    found = module.get(name)
+    if not callable(found):
+        raise SceneError(f"{path} has no function {name}.")
+    called: Callable[[Any], Any] = found
+    return called
+
+
+_BUILTINS = {
+    name: value
+    for name, value in vars(__import__("builtins")).items()
+    if name in ("abs", "bool", "float", "int", "len", "max", "min", "range", "round",
+                "sorted", "sum", "zip", "any", "all")
+}  # fmt: skip
+
+
+def kept(asked: tuple[str, ...] | Mapping[str, str], folder: Path) -> tuple[Kept, ...]:
+    """What a study asks to keep: names of `NAMED`, or expressions by name.
+
+    Args:
+        asked: names, or expression (or ``file.py:function``) by name.
+        folder: what files are relative to.
+
+    Raises:
+        SceneError: no such name, an expression that is not Python, no such file.
+    """
+    if not asked:
+        raise SceneError("keep is empty: a study that keeps nothing computes nothing.")
+    pairs = asked if isinstance(asked, Mapping) else {name: name for name in asked}
+    return tuple(_kept(name, text, folder) for name, text in pairs.items())
+
+
+def _kept(name: str, text: str, folder: Path) -> Kept:
+    if not name.isidentifier():
+        raise SceneError(f'keep: "{name}" is no name; use letters, digits and _.')
+    function = _FUNCTION.fullmatch(text)
+    if function is not None:
+        path = (folder / function["file"]).resolve()
+        try:
+            source = path.read_text(encoding="utf-8")
+        except (OSError, ValueError) as reason:
+            raise SceneError(
+                f"keep.{name}: {path} cannot be read: {reason}."
+            ) from reason
+        return Kept(name, f"{path}:{function['function']}", source)
+    if text.isidentifier() and text not in NAMED:
+        raise SceneError(f'keep has no "{text}"; {choices(text, NAMED)}')
+    expression, unit = NAMED.get(text, (text, ""))
+    try:
+        _compiled(name, expression)
+    except (SyntaxError, ValueError) as reason:
+        raise SceneError(
+            f'keep.{name} = "{text}" is no Python expression: {reason}.'
+        ) from reason
+    return Kept(name, expression, unit=unit)

@@ -1,0 +1,73 @@
+"""The files of a finished study: data set, results.json, figures, report.html."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tactile_lab.conclusion import Conclusion
+from tactile_lab.quantity import show
+from tactile_lab.report.canvas import draw, save
+from tactile_lab.report.html import picture, rendered
+from tactile_lab.studies.answers import conclude, plots
+from tactile_lab.studies.axes import Axis
+from tactile_lab.studies.dataset import Gathered
+
+MARKS = {"model": "Circuit model", "simulated": "Simulated bench", "bench": "Measured"}
+
+
+def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
+    """Write results.json, the figures and report.html of a study into `folder`.
+
+    Returns:
+        The page, and what it concludes.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    study, said = found.study, conclude(found)
+    results = json.dumps(said.plain, indent=2, allow_nan=False)
+    (folder / "results.json").write_text(results + "\n", encoding="utf-8")
+    subtitle = f"{study.scene.name} · {' × '.join(map(str, study.design.shape)) or 1}"
+    pictures = []
+    for plot in plots(found):
+        title = f"{study.title}: {plot.title}"
+        figure = draw(plot, title, subtitle, simulated=study.on != "bench")
+        pictures.append(picture(title, plot, save(figure, folder / plot.name)[1]))
+    design = study.design
+    text = rendered(
+        "study.html",
+        title=study.title,
+        subtitle=subtitle,
+        mark=MARKS[study.on],
+        measured=study.on == "bench",
+        key={
+            "Points": f"{design.size:,}",
+            "Refused or failed": f"{found.failed:,}",
+            "Repeats": str(design.repeat),
+            "Seed": str(design.seed),
+        },
+        conclusion=said,
+        pictures=pictures,
+        axes={axis.key: described(axis) for axis in design.axes},
+        kept={one.name: one.expression for one in study.kept},
+        none="none",
+        made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
+    )
+    html = folder / "report.html"
+    html.write_text(text, encoding="utf-8")
+    return html, said
+
+
+def described(axis: Axis) -> str:
+    """What an axis takes, for a person."""
+    if axis.spread is not None:
+        centre, width = (
+            show(value, axis.unit) for value in (axis.spread.centre, axis.spread.width)
+        )
+        return f"{axis.spread.kind}, {centre} ± {width}"
+    shown = [axis.shown(value) for value in axis.values]
+    if len(shown) > 6:
+        return f"{shown[0]}, {shown[1]}, ... {shown[-1]} ({len(shown)} values)"
+    return ", ".join(shown)

@@ -1,0 +1,284 @@
+"""A study: a base scene, what varies in it, what is kept of each point."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from tactile_lab.columns import read_text
+from tactile_lab.complaint import validated
+from tactile_lab.errors import SceneError, choices, nearest
+from tactile_lab.plugins import study_names, study_path
+from tactile_lab.scene.load import load
+from tactile_lab.scene.scene import Scene
+from tactile_lab.studies.axes import axis
+from tactile_lab.studies.design import Design, Method, checked
+from tactile_lab.studies.kept import NAMED, Kept, kept
+from tactile_lab.table import SceneTable
+
+On = Literal["model", "simulated", "bench"]
+Order = Literal["random", "as written"]
+ALWAYS = ("spike_count", "first_spike", "mean_rate")
+"""Kept unless the study says what."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisTable(SceneTable):
+    """``[[axis]]``: one of `values`, `normal` and `uniform` says what the key takes.
+
+    Attributes:
+        key: ``table.key`` of the scene.
+        values: a list, or a text ``from : to : step``.
+        normal: standard deviation about the scene's value ("1 %", "2 mV"), or
+            [centre, deviation].
+        uniform: half-width about the scene's value, or [least, most].
+        zip: axes with the same text go through their values together.
+    """
+
+    key: str
+    values: Any = None
+    normal: Any = None
+    uniform: Any = None
+    zip: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draw(SceneTable):
+    """``[draw]``: how the axes with `normal` or `uniform` are drawn.
+
+    Attributes:
+        points: how often; of "indices" the number of pairs.
+        method: see `Design`.
+    """
+
+    points: Annotated[int, Field(ge=1)] = 256
+    method: Method = "latin hypercube"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement(SceneTable):
+    """``[require.NAME]``: what a kept number must be for a point to be good.
+
+    Attributes:
+        least, most: inclusive, SI; None for no limit.
+    """
+
+    least: float | None = None
+    most: float | None = None
+
+    def __str__(self) -> str:
+        parts = [
+            f"{word} {limit:g}"
+            for word, limit in (("at least", self.least), ("at most", self.most))
+            if limit is not None
+        ]
+        return " and ".join(parts) or "any number"
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyFile(SceneTable):
+    """What a study's TOML file holds; see docs/studies.md."""
+
+    scene: str
+    title: str = ""
+    on: On = "model"
+    bench: str | None = None
+    repeat: Annotated[int, Field(ge=1)] = 1
+    seed: Annotated[int, Field(ge=0)] = 1
+    order: Order = "random"
+    keep: tuple[str, ...] | dict[str, str] = ALWAYS
+    set: dict[str, Any] = field(default_factory=dict)
+    axis: tuple[AxisTable, ...] = ()
+    draw: Draw = field(default_factory=Draw)
+    require: dict[str, Requirement] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Study:
+    """What one study computes.
+
+    Attributes:
+        name: of its folder.
+        title: for people.
+        scene: what varies.
+        on: the circuit alone ("model"), the whole simulated bench ("simulated"), or
+            real instruments ("bench").
+        design: its points.
+        kept: what is kept of each.
+        require: what makes a point good, by the name of what is kept.
+        order: in which a bench plays the points.
+        source: the file's contents, kept with the results.
+    """
+
+    name: str
+    title: str
+    scene: Scene
+    on: On
+    design: Design
+    kept: tuple[Kept, ...]
+    require: Mapping[str, Requirement]
+    order: Order
+    source: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        shape = " × ".join(map(str, self.design.shape)) or "1"
+        return f"<Study {self.name}: {shape} points of {self.scene.name} on {self.on}>"
+
+
+def load_study(study: str | Path | Mapping[str, Any], name: str = "study") -> Study:
+    """A study, validated; computes nothing.
+
+    Args:
+        study: a study file (TOML), the name of a study that ships, or what one would
+            hold.
+        name: of a study that is no file.
+
+    Raises:
+        SceneError: something cannot be used as written.
+    """
+    if isinstance(study, Mapping):
+        return _study(dict(study), name, Path.cwd(), f"study {name}")
+    path = Path(study)
+    if str(study) in study_names() and not path.is_file():
+        path = study_path(str(study))
+    elif not path.is_file():
+        told = choices(str(study), study_names(), "Studies that ship")
+        raise SceneError(f"Study {study} does not exist; {told}")
+    try:
+        data = tomllib.loads(read_text(path, "Study"))
+    except SceneError:
+        raise
+    except ValueError as reason:
+        raise SceneError(f"{path} is not TOML: {reason}.") from reason
+    return _study(data, path.stem, path.parent, str(path))
+
+
+def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
+    table = validated(StudyFile, _tuples(data), (), lambda at: origin, None)
+    scene = _scene(table, folder)
+    axes = []
+    for one in table.axis:
+        given = {
+            word: value
+            for word in ("values", "normal", "uniform")
+            if (value := getattr(one, word)) is not None
+        }
+        if len(given) != 1:
+            raise SceneError(
+                f"{origin}: axis {one.key} has {' and '.join(given) or 'no values'}; "
+                "write one of values, normal, uniform."
+            )
+        axes.append(axis(one.key, {**given, "zip": one.zip}, scene))
+    axes.sort(key=lambda one: one.spread is not None)
+    if table.on == "model" and table.repeat > 1:
+        raise SceneError(
+            f"{origin}: repeat = {table.repeat}, but the model gives the same each "
+            'time; leave repeat out, or say on = "simulated".'
+        )
+    drawn = any(one.spread is not None for one in axes)
+    if not drawn and "draw" in data:
+        raise SceneError(f"{origin}: [draw] draws no axis; give one normal or uniform.")
+    design = Design(
+        axes=tuple(axes),
+        draws=table.draw.points if drawn else 1,
+        method=table.draw.method,
+        repeat=table.repeat,
+        seed=table.seed,
+    )
+    study = Study(
+        name=name,
+        title=table.title or name,
+        scene=scene,
+        on=table.on,
+        design=checked(design),
+        kept=kept(table.keep, folder),
+        require=dict(table.require),
+        order=table.order,
+        source=data,
+    )
+    _check(study, origin)
+    return study
+
+
+def _scene(table: StudyFile, folder: Path) -> Scene:
+    beside = folder / table.scene
+    base = load(beside if beside.is_file() else table.scene, table.set, table.bench)
+    if table.on == "bench" and base.bench.simulated:
+        raise SceneError(
+            'on = "bench" needs real instruments: name the bench file, bench = "...", '
+            'or say on = "simulated".'
+        )
+    if table.on != "bench" and not base.bench.simulated:
+        base = load(base, (), "sim")  # nothing may reach an instrument
+    return base.sensor_alone if table.on == "model" else base
+
+
+def _check(study: Study, origin: str) -> None:
+    """Refuse keys and requirements that no point could use."""
+    from tactile_lab.studies.axes import changed
+
+    names = [one.name for one in study.kept]
+    for name in study.require:
+        if name not in names:
+            hint = nearest(name, names)
+            raise SceneError(
+                f"{origin}: [require.{name}]: nothing of that name is kept"
+                f"{'; ' + hint if hint else '.'} Kept: {', '.join(names)}."
+            )
+    for one in study.design.axes:  # each key alone, so that the message names it
+        first = one.values[0] if one.values else one.spread and one.spread.centre
+        load(study.scene, changed([one], [first]))
+
+
+def _tuples(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {key: _tuples(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return tuple(_tuples(value) for value in data)
+    return data
+
+
+def short(
+    scene: Scene, sweeps: tuple[str, ...], repeat: int, name: str | None = None
+) -> Study:
+    """The study that ``run --sweep KEY=VALUES --repeat N`` asks for.
+
+    Raises:
+        SceneError: a sweep cannot be read.
+    """
+    axes = []
+    for text in sweeps:
+        key, equals, values = text.partition("=")
+        if not (equals and values.strip()):
+            raise SceneError(
+                f'--sweep "{text}": write KEY=FROM:TO:STEP, such as '
+                'protocol.hold="1 s:3 s:0.5 s", or KEY=VALUE,VALUE.'
+            )
+        listed = values if values.count(":") == 2 else values.split(",")
+        axes.append(axis(key.strip(), {"values": listed}, scene))
+    study = Study(
+        name=name or f"{scene.name}_sweep",
+        title=f"{scene.name}: {', '.join(one.key for one in axes) or 'repeats'}",
+        scene=scene,
+        on="simulated" if scene.bench.simulated else "bench",
+        design=checked(Design(axes=tuple(axes), repeat=repeat)),
+        kept=kept(ALWAYS, Path.cwd()),
+        require={},
+        order="random",
+        source={"scene": scene.name, "sweep": list(sweeps), "repeat": repeat},
+    )
+    _check(study, "--sweep")
+    return study
+
+
+def with_design(study: Study, design: Design) -> Study:
+    """The same study of other points."""
+    return replace(study, design=checked(design))
+
+
+__all__ = ["NAMED", "Study", "load_study", "short", "with_design"]

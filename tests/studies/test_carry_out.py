@@ -1,0 +1,230 @@
+"""A study on disk: the same whoever computes it, and never twice."""
+
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_lab import simulate, study
+from tactile_lab.errors import NotFoundError, SceneError
+from tactile_lab.studies.carry_out import Progress, carry_out, forecast
+from tactile_lab.studies.dataset import Gathered
+from tactile_lab.studies.study import Study, load_study
+
+SHORT = {
+    "scene": "demo",
+    "set": {
+        "protocol.levels": ["200 mN"],
+        "protocol.hold": "300 ms",
+        "protocol.rest": "50 ms",
+    },
+    "keep": ["spike_count", "first_spike", "spike_times", "critical_force"],
+}
+LEVELS = {
+    **SHORT,
+    "axis": [
+        {"key": "sensor.V_GS", "values": "1.38 V : 1.42 V : 20 mV"},
+        {"key": "sensor.R1", "normal": "1 %"},
+    ],
+    "draw": {"points": 5},
+}
+
+
+def done(asked: Study, out: Path, **how) -> tuple[Gathered, list[Progress]]:
+    told: list[Progress] = []
+    return carry_out(asked, out, tell=told.append, **{"count": 1, **how}), told
+
+
+def same(one: Gathered, other: Gathered) -> bool:
+    return one.to_xarray().identical(other.to_xarray())
+
+
+def test_a_point_is_what_simulate_gives(tmp_path: Path) -> None:
+    found = done(load_study(LEVELS), tmp_path)[0].to_xarray()
+    R1 = float(found["sensor.R1"][3])
+    changes = {"sensor.V_GS": 1.4, "sensor.R1": R1, **SHORT["set"]}
+    alone = simulate("demo", changes, keep=("spikes",)).spike_times
+    at = found.isel({"sensor.V_GS": 1, "draw": 3})
+    assert int(at["spike_count"]) == len(alone) > 0
+    assert float(at["first_spike"]) == alone[0]
+    before = int(found["spike_times_size"].values.ravel()[: 5 + 3].sum())
+    rows = found["spike_times"].values[before : before + len(alone)]
+    assert np.array_equal(rows, alone)
+    assert found["sensor.V_GS"].attrs["units"] == "V"
+
+
+def test_workers_and_batches_change_nothing(tmp_path: Path) -> None:
+    asked = load_study(LEVELS)
+    alone, _ = done(asked, tmp_path / "alone")
+    pool, told = done(asked, tmp_path / "pool", count=2)
+    assert same(alone, pool)
+    assert told[-1].workers == 2
+
+
+def test_what_is_known_is_not_computed_again(tmp_path: Path) -> None:
+    first, told = done(load_study(LEVELS), tmp_path)
+    assert told[-1].done == 15
+    again, told = done(load_study(LEVELS), tmp_path)
+    assert not told
+    assert same(first, again)
+    wider = {"key": "sensor.V_GS", "values": "1.36 V : 1.42 V : 20 mV"}
+    more = {**LEVELS, "axis": [wider, LEVELS["axis"][1]]}
+    _, told = done(load_study(more, "another"), tmp_path)
+    assert (told[0].there, told[-1].done) == (15, 20)
+
+
+def test_points_are_shared_whichever_key_varies(tmp_path: Path) -> None:
+    one = {**SHORT, "axis": [{"key": "sensor.V_GS", "values": ["1.4 V", "1.41 V"]}]}
+    other = {**SHORT, "axis": [{"key": "sensor.R1", "values": ["9.58 MOhm", "9 MOhm"]}]}
+    done(load_study(one), tmp_path)
+    assert done(load_study(other), tmp_path)[1][0].there == 1
+
+
+def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
+    asked = load_study(LEVELS)
+
+    def stop(progress: Progress) -> None:
+        if progress.done >= 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(asked, tmp_path, count=1, tell=stop)
+    found, told = done(asked, tmp_path)
+    assert told[0].there >= 3
+    assert same(found, done(asked, tmp_path / "whole")[0])
+
+
+def test_killed_in_the_midst_it_loses_no_finished_batch(tmp_path: Path) -> None:
+    """SIGKILL of the client as a batch has just been told of."""
+    script = textwrap.dedent(f"""
+        import os, signal
+        from pathlib import Path
+        from tactile_lab.studies.carry_out import carry_out
+        from tactile_lab.studies.study import load_study
+
+        def tell(progress):
+            if progress.done >= 4:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        carry_out(load_study({LEVELS!r}), Path({str(tmp_path)!r}), count=1, tell=tell)
+    """)
+    killed = subprocess.run([sys.executable, "-c", script], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    found, told = done(load_study(LEVELS), tmp_path)
+    assert told[0].there >= 4
+    assert same(found, done(load_study(LEVELS), tmp_path / "whole")[0])
+
+
+def test_a_damaged_batch_is_computed_again(tmp_path: Path) -> None:
+    first, _ = done(load_study(LEVELS), tmp_path)
+    files = (tmp_path / "points").glob("*.npz")
+    file = max(files, key=lambda path: path.stat().st_size)
+    file.write_bytes(file.read_bytes()[:100])
+    again, told = done(load_study(LEVELS), tmp_path)
+    assert told[0].there < 15
+    assert same(first, again)
+
+
+def test_a_point_that_is_refused_keeps_its_reason(tmp_path: Path) -> None:
+    asked = {**SHORT, "axis": [{"key": "sensor.d", "values": ["1 mm", "9 mm"]}]}
+    found, told = done(load_study(asked), tmp_path)
+    assert told[-1].failed == 1
+    assert found.reasons[0] == ""
+    assert "must lie between 0 and L" in found.reasons[1]
+    assert np.isnan(found.numbers()["spike_count"][1])
+    assert found.numbers()["spike_count"][0] > 0
+
+
+def test_expressions_and_functions_of_a_user(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def last(result):\n    return result.end.V_C1\n")
+    own = tmp_path / "own.toml"
+    kept = (
+        'scene = "demo"\n[keep]\nrest = "result.sample(\'V_C1\', np.array(0.0))"\n'
+        'last = "mine.py:last"\n'
+    )
+    own.write_text(kept + 'wrong = "1 / 0"\n')
+    found, _ = done(load_study(own), tmp_path)
+    assert "wrong: ZeroDivisionError" in found.reasons[0]
+    own.write_text(kept)
+    found, _ = done(load_study(own), tmp_path)
+    assert 3.5 < found.numbers()["rest"] < 5.0
+    assert 3.5 < found.numbers()["last"] < 5.0
+
+
+def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
+    asked = {
+        **SHORT,
+        "on": "simulated",
+        "repeat": 2,
+        "keep": {"count": "len(spikes)", "noise": "run.signal('V_C1')[:200].std()"},
+    }
+    found, _ = done(load_study(asked), tmp_path)
+    numbers = found.numbers()
+    assert found.failed == 0, found.reasons
+    assert numbers["count"].shape == (2,) and np.all(numbers["count"] > 0)
+    assert numbers["noise"][0] != numbers["noise"][1]
+
+
+BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"axis": [{"key": "sensor.R11", "values": [1]}]}, 'did you mean "R1"'),
+        ({"axis": [{"key": "sensor.R1"}]}, "no values"),
+        ({"axis": [BOTH]}, "values and normal"),
+        ({"keep": ["spike_cuont"]}, 'did you mean "spike_count"'),
+        ({"keep": {"a": "len("}}, "no Python expression"),
+        ({"keep": {"a": "no.py:f"}}, "cannot be read"),
+        ({"keep": []}, "keeps nothing"),
+        ({"repeat": 2}, "the model gives the same"),
+        ({"on": "bench"}, "needs real instruments"),
+        ({"require": {"spikes": {"least": 1}}}, "nothing of that name is kept"),
+        ({"draw": {"points": 4}}, "draws no axis"),
+        ({"axes": []}, 'did you mean "axis"'),
+        ({"scene": "dmeo"}, 'did you mean "demo"'),
+    ],
+)
+def test_what_cannot_be_used_is_refused(change: dict, told: str) -> None:
+    with pytest.raises(SceneError, match=told):
+        load_study({**SHORT, **change})
+
+
+def test_a_study_that_is_not_there_is_named_with_those_that_are() -> None:
+    with pytest.raises(SceneError, match=r'did you mean "spread"\? Studies that ship'):
+        load_study("spraed")
+
+
+def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match=r"tcp://127\.0\.0\.1:9 does not answer"):
+        done(load_study(LEVELS), tmp_path, count=None, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_dask_cluster_gives_the_same(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        found, _ = done(load_study(LEVELS), tmp_path, count=None, scheduler=address)
+    assert same(found, done(load_study(LEVELS), tmp_path / "alone")[0])
+
+
+def test_the_forecast_opens_nothing_and_keeps_nothing(tmp_path: Path) -> None:
+    cost = forecast(load_study(LEVELS), tmp_path)
+    assert (cost.points, cost.there) == (15, 0)
+    assert cost.seconds is not None and cost.seconds > 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_script_gets_one_labelled_data_set(tmp_path: Path) -> None:
+    import xarray
+
+    found = study(LEVELS, out=tmp_path, workers=1)
+    kept = xarray.open_zarr(tmp_path / "study" / "data.zarr", consolidated=False)
+    assert kept.load().equals(found)
