@@ -29,8 +29,11 @@ from tactile_lab.trial import Protocol
 
 ADDRESS = 16
 """Bytes of an address."""
-REGISTERED = tuple(
-    f"tactile_lab.{group}" for group in ("drivers", "far_ends", "benches", "protocols")
+REGISTERED = (
+    "tactile_lab.drivers",
+    "tactile_lab.far_ends",
+    "tactile_lab.benches",
+    "tactile_lab.protocols",
 )
 """Groups of entry points whose packages a point may depend on."""
 
