@@ -97,6 +97,7 @@ class Actions(QObject):
     def _all(self) -> list[Shortcut]:
         panels = self._panels
         tools, view = panels.centre.tools, panels.centre.view
+        cross = panels.centre.stack.scene.toggle_crosshair
         form = panels.setup.form
         return [
             Shortcut(("Ctrl+R",), "Run", panels.setup.start),
@@ -119,6 +120,9 @@ class Actions(QObject):
             Shortcut(("Shift+M",), "Residual", tools.residual.toggle, single=True),
             Shortcut(("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True),
             Shortcut(("-",), "Zoom out", lambda: view.zoom(1 / 1.5), single=True),
+            Shortcut(("Backspace",), "The view before", view.back, single=True),
+            Shortcut(("Shift+Backspace",), "Forward again", view.forward, single=True),
+            Shortcut(("X",), "Crosshair", cross, single=True),
             Shortcut(("Left",), "Earlier", lambda: self._nudge(-1), single=True),
             Shortcut(("Right",), "Later", lambda: self._nudge(1), single=True),
             Shortcut(("Home",), "Start of the run", self._home, single=True),

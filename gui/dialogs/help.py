@@ -42,7 +42,10 @@ PANELS = (
         "Colour: measured, thin grey: what the model expects, also ahead of now. V_C1, "
         "V_C2 and V_K show the mean of each pixel column over a tint of its extremes, "
         "so that nothing is hidden. Wheel zooms, Shift+wheel or dragging pans, double "
-        "click shows all. What the scene does not record has no lane. The residual is "
+        "click shows all. On its axis, or with Ctrl, the wheel zooms the values of a "
+        "lane; a drag there moves them, a double click makes it automatic again. "
+        "A right click has what else a lane can do, Backspace goes back to the view "
+        "before. What the scene does not record has no lane. The residual is "
         "measured V_C1 less the model's; the green band is ±50 mV.",
     ),
     (

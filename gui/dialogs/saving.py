@@ -120,9 +120,8 @@ def _svg(stack: LaneStack, title: str, path: Path) -> None:
 
 
 def _size(stack: LaneStack) -> QSize:
-    rows = stack.visible_rows()
-    height = sum(row.height() for row in rows) + TITLE
-    return QSize(max(stack.width(), 700), max(height, 200))
+    scene = stack.scene
+    return QSize(CARD + scene.width(), TITLE + scene.height())
 
 
 def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
@@ -132,17 +131,14 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
     painter.drawText(QRectF(12, 6, size.width() - 24, 22), title)
     if len(stack.source.members) > 1:
         _legend(painter, stack.source, tokens, size.width() - 12)
-    top = TITLE
+    scene = stack.scene
+    lanes = QRectF(CARD, TITLE, scene.width(), scene.height())
+    scene.draw_onto(painter, lanes, tokens)
     for row in stack.visible_rows():
         painter.save()
-        painter.translate(0, top)
-        _card(painter, row, tokens)
-        painter.translate(CARD, 0)
-        painter.setClipRect(QRectF(0, 0, size.width() - CARD, row.height()))
-        inner = QSize(size.width() - CARD, row.height())
-        row.plot.painter.paint(painter, inner, stack.source, tokens)
+        painter.translate(0, TITLE + row.card.y())
+        _card(painter, row, len(stack.source.members) > 1, tokens)
         painter.restore()
-        top += row.height()
 
 
 def _legend(painter: QPainter, source: Source, tokens: Tokens, right: int) -> None:
@@ -158,10 +154,9 @@ def _legend(painter: QPainter, source: Source, tokens: Tokens, right: int) -> No
         right -= 16
 
 
-def _card(painter: QPainter, row: LaneRow, tokens: Tokens) -> None:
+def _card(painter: QPainter, row: LaneRow, grey: bool, tokens: Tokens) -> None:
+    """A lane's name and colour; grey in a comparison, where colour means run."""
     lane = row.lane
-    # in a comparison colour means run
-    grey = len(row.plot.source.members) > 1
     swatch = QColor(tokens.border_strong if grey else tokens.trace(lane.key))
     painter.fillRect(QRectF(12, 9, 10, 10), swatch)
     painter.setPen(QColor(tokens.text))

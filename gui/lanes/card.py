@@ -8,11 +8,11 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel
 
-from gui.lanes.axis import number, signed
 from gui.lanes.compare import MARKS
 from gui.lanes.lane import Lane
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, row
+from gui.plots.numbers import number, signed
 
 CARD = 164
 """Width, px."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gui.lanes.axis import number
 from gui.lanes.expected import starts
 from gui.lanes.lane import Lane
 from gui.lanes.source import Source
+from gui.plots.numbers import number
 from tactile_lab.spikes.rate import LEAST_SILENCE, NEVER, SILENCE, begins, rate_at
 from tactile_lab.trace import FloatArray, Trace
 

@@ -3,72 +3,81 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame
+from PySide6.QtCore import QPoint, Signal
+from PySide6.QtWidgets import QFrame, QMenu
 
+from gui.lanes.box import LaneBox
+from gui.lanes.floor import Stage
 from gui.lanes.lane import Lane
 from gui.lanes.navigator import Navigator
-from gui.lanes.plot import Options
 from gui.lanes.readings import Painted
 from gui.lanes.row import LaneRow
+from gui.lanes.scene import LaneScene
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
-from gui.parts import column, empty, line
+from gui.parts import column, empty, lines, row
+
+STEPS = 40
+"""Most steps that the menu offers to jump to."""
 
 
 class LaneStack(QFrame):
-    """The lanes of one source."""
+    """The lanes of one source: cards, and beside them their plots in one scene."""
 
-    box_zoomed = Signal(float, float)
+    export_asked = Signal()
 
     def __init__(self, view: TimeView, theme: Theme) -> None:
         super().__init__()
         self.view = view
-        self.options = Options()
-        self.source = Source()
+        self.stage = Stage(view, tokens=theme.tokens)
+        self.scene = LaneScene(self.stage, self._places)
         self.rows: list[LaneRow] = []
         self.navigator = Navigator(view, theme)
         self.show_residual = True
         self._hidden: set[str] = {"coil_current"}  # the force lane says the same
         self._theme = theme
-        self._layout = column(self, spacing=0)
+        self._cards = lines(spacing=0)
+        lanes = row(self._cards, spacing=0)
+        lanes.addWidget(self.scene, 1)
+        column(self, (lanes, 1), self.navigator, spacing=0)
         view.changed.connect(self.refresh)
         view.cursors_changed.connect(self.show_values)
-        theme.changed.connect(self.refresh)
+        self.scene.drawn.connect(self._follow_picture)
+        self.scene.menu_asked.connect(self._ask)
+        theme.changed.connect(self._tint)
+
+    @property
+    def source(self) -> Source:
+        """What is shown."""
+        return self.stage.source
 
     def show_lanes(self, lanes: Sequence[Lane]) -> None:
-        """Show these lanes; those of the same name keep their range."""
-        if [row.lane for row in self.rows] == list(lanes):
+        """Show these lanes."""
+        if [one.lane for one in self.rows] == list(lanes):
             return
-        self._layout.removeWidget(self.navigator)
-        empty(self._layout)
-        self.rows = []
-        for lane in lanes:
-            row = LaneRow(lane, self.view, self.options, self._theme)
-            row.plot.source = self.source
-            row.plot.box_zoomed.connect(self.box_zoomed)
-            self.rows.append(row)
-            self._layout.addWidget(row, round(lane.weight * 100))
-            self._layout.addWidget(line())
-        self._layout.addWidget(self.navigator)
+        empty(self._cards)
+        self.rows = [LaneRow(lane, self.stage, self._theme) for lane in lanes]
+        for one in self.rows:
+            self._cards.addWidget(one.card, round(one.lane.weight * 100))
+            self._cards.addWidget(one.rule)
+        self.scene.show_boxes([one.box for one in self.rows])
         self.arrange()
 
     def show_source(self, source: Source) -> None:
         """Show another source in the same lanes."""
-        for row in self.rows:
-            row.plot.painter.forget()
+        for one in self.rows:
+            one.box.forget()
         self.exchange_source(source)
 
     def exchange_source(self, source: Source) -> None:
         """Show another source of the same data: ranges stay."""
-        self.source = source
-        self.navigator.source = source
-        for row in self.rows:
-            row.plot.source = source
-            row.plot.painter.painted = Painted()
-            row.tint()
+        self.stage.source = self.navigator.source = source
+        for one in self.rows:
+            one.box.painted = Painted()
+            one.tint()
         self.refresh()
         self.show_values()
 
@@ -79,41 +88,83 @@ class LaneStack(QFrame):
 
     def arrange(self) -> None:
         """Show what is wanted; the lowest visible lane carries the time axis."""
-        shown = []
-        for row in self.rows:
-            wanted = row.lane.key not in self._hidden
-            if row.lane.key == "residual":
+        for one in self.rows:
+            wanted = one.lane.key not in self._hidden
+            if one.lane.key == "residual":
                 wanted = wanted and self.show_residual
-            row.setVisible(wanted)
-            if wanted:
-                shown.append(row)
-        for row in self.rows:
-            painter = row.plot.painter
-            painter.top = bool(shown) and row is shown[0]
-            painter.bottom = bool(shown) and row is shown[-1]
+            one.card.setVisible(wanted)
+            one.rule.setVisible(wanted)
         self.refresh()
+
+    def _places(self) -> list[tuple[LaneBox, float, float]]:
+        """Visible lanes with their top and bottom, px: beside their cards."""
+        cards = [(one.box, one.card.geometry()) for one in self.visible_rows()]
+        return [(box, float(g.top()), float(g.top() + g.height())) for box, g in cards]
 
     def refresh(self) -> None:
         """Repaint what is visible."""
-        for row in self.rows:
-            if row.isVisible():
-                row.plot.update()
-        self.navigator.update()
+        self.scene.refresh()
+        self.navigator.refresh()
 
     def show_values(self) -> None:
         """Update the numbers on the cards."""
-        for row in self.rows:
-            if row.isVisible():
-                row.show_numbers(self.source)
+        for one in self.visible_rows():
+            one.show_numbers(self.source)
 
     def row(self, key: str) -> LaneRow | None:
         """The lane of that key, if the scene has it."""
-        return next((row for row in self.rows if row.lane.key == key), None)
+        return next((one for one in self.rows if one.lane.key == key), None)
 
     def visible_rows(self) -> list[LaneRow]:
         """Lanes on screen, from the top."""
-        return [row for row in self.rows if row.isVisibleTo(self)]
+        return [one for one in self.rows if one.card.isVisibleTo(self)]
 
     def is_hidden(self, key: str) -> bool:
         """Whether the user folded this lane away."""
         return key in self._hidden
+
+    def _follow_picture(self) -> None:
+        """What is at the right edge has moved with the picture."""
+        if not self.source.running:
+            self.show_values()
+
+    def _tint(self) -> None:
+        self.stage.tokens = self._theme.tokens
+        for one in self.rows:
+            one.tint()
+        self.refresh()
+
+    def _ask(self, box: LaneBox, time: float, at: QPoint) -> None:
+        """The menu of a lane, at a time, s."""
+        menu, view, lane = QMenu(self), self.view, box.lane
+        menu.setAccessibleName(lane.plain)
+
+        def lock(on: bool) -> None:
+            box.locked = on
+            self.refresh()
+
+        locked = menu.addAction("Keep this range", lambda: lock(not box.locked))
+        locked.setCheckable(True)
+        locked.setChecked(box.locked)
+        automatic = menu.addAction("Automatic range", lambda: lock(False))
+        automatic.setEnabled(box.locked)
+        menu.addAction(f"Hide {lane.plain}", lambda: self.hide_lane(lane.key, True))
+        menu.addSeparator()
+        menu.addAction("Back to the view before", view.back)
+        menu.addAction("Forward again", view.forward)
+        steps = menu.addMenu("Jump to step")
+        for hold in [one for one in self.source.holds if not one.pause][:STEPS]:
+            span = hold.start, hold.end - hold.start
+            steps.addAction(hold.label, partial(view.show_span, *span))
+        steps.setEnabled(not steps.isEmpty())
+        menu.addSeparator()
+        for which, name in enumerate("AB"):
+            put = partial(view.put_cursor, which, time)
+            menu.addAction(f"Cursor {name} here", put)
+        cross = menu.addAction("Crosshair", self.scene.toggle_crosshair)
+        cross.setCheckable(True)
+        cross.setChecked(self.scene.crosshair)
+        menu.addSeparator()
+        menu.addAction("Copy picture", self.scene.copy)
+        menu.addAction("Export this view …", self.export_asked.emit)
+        menu.popup(at)

@@ -7,12 +7,12 @@ from PySide6.QtCore import QPoint, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QWidget
 
-from gui.lanes.axis import decimals
 from gui.lanes.compare import MARKS
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, bar
+from gui.plots.numbers import decimals
 from tactile_lab.quantity import show
 
 WIDTHS = (1.0, 5.0, 10.0)
@@ -90,12 +90,13 @@ class Tools(QWidget):
         self.widths.group.idClicked.connect(self._width_chosen)
         self.fit.clicked.connect(self._view.show_all)
         self.zoom.toggled.connect(self._box)
-        self._stack.box_zoomed.connect(self._boxed)
+        self._stack.scene.box_zoomed.connect(self._boxed)
         self.cursors.clicked.connect(self.toggle_cursors)
         self.twin.toggled.connect(self._twin)
         self.residual.toggled.connect(self._residual)
         self.lanes.clicked.connect(self._choose_lanes)
         self.export.clicked.connect(self.export_asked)
+        self._stack.export_asked.connect(self.export_asked)
         self._view.cursors_changed.connect(self.show_cursors)
         self.follow.setChecked(True)
         self.widths.choose(1)
@@ -121,14 +122,14 @@ class Tools(QWidget):
             self.widths.choose(marked)
 
     def _box(self, on: bool) -> None:
-        self._stack.options.zoom_box = on
+        self._stack.stage.zoom_box = on
 
     def _boxed(self, start: float, end: float) -> None:
         self.zoom.setChecked(False)
         self._view.show_span(start, end - start)
 
     def _twin(self, on: bool) -> None:
-        self._stack.options.twin = on
+        self._stack.stage.twin = on
         self._stack.refresh()
 
     def _residual(self, on: bool) -> None:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import time
+from typing import Any
+
 from PySide6.QtCore import QObject, Signal
 
 HEAD = 0.9
 """Where "now" stays while following, as a share of the width."""
+
+PAUSE, KEPT = 0.6, 50
+"""Seconds without a change after which a view is kept for the way back; how many."""
 
 SHORTEST = 1e-5
 """Shortest visible time, s."""
@@ -26,6 +32,10 @@ class TimeView(QObject):
         self.length = 5.0
         self.follow = True
         self.cursors: tuple[float, float] | None = None
+        self._before: list[tuple[float, float]] = []
+        self._after: list[tuple[float, float]] = []
+        self._noted = -PAUSE
+        self.clock = time.monotonic
 
     @property
     def end(self) -> float:
@@ -49,6 +59,7 @@ class TimeView(QObject):
 
     def show_span(self, start: float, width: float) -> None:
         """Show a window; following ends."""
+        self._note()
         longest = max(self.length, self.now) * 1.25 + 1.0
         self.width = min(max(width, SHORTEST), longest)
         self.start = min(max(start, -0.2 * self.width), longest)
@@ -56,6 +67,30 @@ class TimeView(QObject):
             self.follow = False
             self.follow_changed.emit(False)
         self.changed.emit()
+
+    def _note(self) -> None:
+        """Keep where we are for the way back; one drag or turn of the wheel is one."""
+        now = self.clock()
+        if now - self._noted > PAUSE:
+            self._before = [*self._before[-KEPT:], (self.start, self.width)]
+            self._after = []
+        self._noted = now
+
+    def back(self) -> None:
+        """Show what was seen before the last change."""
+        self._return(self._before, self._after)
+
+    def forward(self) -> None:
+        """Undo going back."""
+        self._return(self._after, self._before)
+
+    def _return(self, here: list[tuple[float, float]], there: list[Any]) -> None:
+        if here:
+            there.append((self.start, self.width))
+            kept = self._before, self._after
+            self.show_span(*here.pop())
+            self._before, self._after = kept
+            self._noted = -PAUSE
 
     def set_width(self, width: float) -> None:
         """Show `width` s, keeping the head (following) or the middle in place."""
@@ -89,6 +124,13 @@ class TimeView(QObject):
         self.cursors = (a, b)
         self.cursors_changed.emit()
         self.changed.emit()
+
+    def put_cursor(self, which: int, at: float) -> None:
+        """Put cursor A (0) or B (1) at a time, s; the other, if new, near the edge."""
+        if self.cursors is None:
+            far = self.start + (0.9 if which == 0 else 0.1) * self.width
+            self.cursors = (at, far) if which == 0 else (far, at)
+        self.move_cursor(which, at)
 
     def clear_cursors(self) -> None:
         """Take the cursors away."""

@@ -10,9 +10,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import QRectF, Qt, QTimer
 from PySide6.QtGui import QColor, QPen
 
-from gui.lanes.axis import decimals, number, step_of, ticks
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
+from gui.plots.numbers import decimals, number, step_of, ticks
 
 # at exit it would look through every object there is; the window closes its own
 pg.setConfigOption("exitCleanup", False)

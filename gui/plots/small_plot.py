@@ -15,11 +15,11 @@ from PySide6.QtCore import QSizeF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QWheelEvent
 from PySide6.QtWidgets import QMenu
 
-from gui.lanes.axis import nice_range
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.look.tokens import Tokens
 from gui.plots.axis import RoundAxis, stroke
+from gui.plots.numbers import nice_range
 from tactile_lab.plot import FloatArray, Guide, Panel, Plot, Series, y_scale
 
 PANEL, SMALL = 200, 130

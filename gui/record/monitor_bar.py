@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy
 
-from gui.lanes.axis import number
 from gui.parts import STRETCH, bar, column, filled, label, push, set_role
+from gui.plots.numbers import number
 from tactile_lab.engine.sensor import SensorState
 
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gui.lanes.axis import number
 from gui.lanes.lane import BAND
 from gui.lanes.source import Source
+from gui.plots.numbers import number
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import mean_slope, onset
 from tactile_lab.analysis.spike_pairs import match

@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from gui.lanes.axis import number
+from gui.plots.numbers import number
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.quantity import show
 from tactile_lab.trial import Outcome

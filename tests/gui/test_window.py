@@ -379,7 +379,7 @@ def test_themes_repaint_everything(lab) -> None:
     theme = lab.window.theme
 
     def dark() -> bool:
-        image = lab.window.centre.stack.rows[0].plot.grab().toImage()
+        image = lab.window.centre.stack.scene.grab().toImage()
         return image.pixelColor(image.width() - 3, 3).lightness() < 80
 
     theme.choose("dark")

@@ -1,24 +1,26 @@
-"""The plot of one lane, painted directly: traces, now, cursors, value tag."""
+"""One lane's plot: its traces, its value axis, and what the mouse does to its range."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+import pyqtgraph as pg
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from gui.lanes import paint
-from gui.lanes.axis import nice_range, number
 from gui.lanes.compare import MARKS
-from gui.lanes.ground import AXIS, GUTTER, TIME_AXIS, Place, ground, row_names, rows_of
+from gui.lanes.floor import AXIS, GUTTER, Stage, row_names, rows_of
 from gui.lanes.lane import BAND, Lane
 from gui.lanes.paint import Frame
 from gui.lanes.readings import Painted, values_at
 from gui.lanes.source import Source
-from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
+from gui.plots.axis import guarded
+from gui.plots.numbers import nice_range, number, numbers
 from tactile_lab.trace import Trace
 
 DOTS = 160
@@ -30,18 +32,8 @@ APART = 5
 NAMES = 14
 """Height at the top lane's top that is left free for the names of holds, px."""
 
-
-@dataclass
-class Options:
-    """What all lanes have in common.
-
-    Attributes:
-        twin: draw what the model expects, too.
-        zoom_box: drag a box to zoom to, instead of the view.
-    """
-
-    twin: bool = True
-    zoom_box: bool = False
+LINE = 13
+"""Height that a number on the axis needs, px."""
 
 
 @dataclass(frozen=True)
@@ -54,56 +46,140 @@ class Drawing:
     tokens: Tokens
 
 
-class LanePainter:
-    """Paints one lane onto anything that paints: a widget, a picture, an SVG."""
+class ValueAxis(pg.AxisItem):  # type: ignore[misc]
+    """Numbers and grid of a lane; a drag moves its range, the wheel zooms it."""
 
-    def __init__(self, lane: Lane, view: TimeView, options: Options) -> None:
-        self.lane = lane
-        self.view = view
-        self.options = options
-        self.range = (0.0, 1.0)
-        self.manual: tuple[float, float] | None = None
-        self.bottom = False
-        self.top = False
-        self.painted = Painted()
+    def __init__(self, stage: Stage, box: LaneBox) -> None:
+        self._stage, self._box = stage, box
+        super().__init__("left", linkView=box)
+        self.setZValue(-200)
+
+    @guarded
+    def paint(self, painter: QPainter, *__: Any) -> None:
+        """Grid, numbers and axis, from texts that are laid out once."""
+        if not self._box.valued:
+            return
+        tokens, box = self._stage.tokens, self._box
+        width, height = box.width(), box.height()
+        low, high = box.shown
+        frame = Frame(AXIS, AXIS + width, 0.0, height, 0.0, 1.0, low, high)
+        found = numbers(low, high, max(2, int(height / 21)))
+        if len(found) < 2:  # one number alone says nothing of the scale
+            found = numbers(low, high, 5)
+        heights = [round(frame.y1(value)) + 0.5 for value, _ in found]
+        if len(found) > 2 and heights[0] - heights[1] < LINE:
+            # told beside each other, they would overlap: both ends
+            found, heights = [found[0], found[-1]], [heights[0], heights[-1]]
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        painter.setPen(paint.pen(tokens.grid))
+        painter.drawLines([QLineF(frame.left, y, frame.right, y) for y in heights])
+        for (_, words), y in zip(found, heights, strict=True):
+            if 1 <= y <= height + 1:
+                at = QPointF(AXIS - 8, y)
+                paint.write(painter, at, words, tokens.muted, align=1.0)
+        painter.setPen(paint.pen(tokens.border_strong))
+        painter.drawLine(QPointF(AXIS - 0.5, -1), QPointF(AXIS - 0.5, height))
+
+
+class LaneBox(pg.ViewBox):  # type: ignore[misc]
+    """The plot of one lane. Its range is automatic until a hand changes or locks it.
+
+    Attributes:
+        painted: what is shown, as the numbers on the card want it.
+        locked: whether the range stays as it is.
+        top: whether it is the highest, where the names of holds are.
+    """
+
+    def __init__(self, lane: Lane, stage: Stage) -> None:
+        super().__init__(enableMenu=False, defaultPadding=0.0)
+        self.setMouseEnabled(x=False, y=True)
+        self.lane, self._stage = lane, stage
+        self.painted, self._twin = Painted(), Trace.nothing()
+        self.locked = self.top = False
+        self.axis = ValueAxis(stage, self)
+        self.sigRangeChangedManually.connect(self._lock)
+        self.forget()
+
+    @property
+    def shown(self) -> tuple[float, float]:
+        """The range of values, in shown units."""
+        low, high = self.viewRange()[1]
+        return low, high
+
+    @property
+    def valued(self) -> bool:
+        """Whether it has a value axis; rows of runs or spikes have none."""
+        return not (self.lane.raster or self._stage.source.stacks(self.lane))
 
     def forget(self) -> None:
-        """Choose a new range."""
-        self.range, self.manual = (0.0, 1.0), None
+        """Choose a new range, and go on choosing."""
+        self.locked, self.painted = False, Painted()
+        self.setRange(xRange=(0, 1), yRange=(0, 1))
 
-    def paint(
-        self, painter: QPainter, size: QSize, source: Source, tokens: Tokens
-    ) -> None:
-        """Draw the lane at `size`."""
-        below = TIME_AXIS if self.bottom else 0
-        right = max(size.width() - GUTTER, AXIS + 20)
-        bottom = max(size.height() - below - 5, 12)
-        lane, view = self.lane, self.view
-        count = max(50, int(right - AXIS))
-        runs = source.shown(lane, view.start, view.end, count)
-        twin = Trace.nothing()
-        if self.options.twin:
-            twin = source.twin(lane.key, view.start, view.end, count)
-            twin = twin.scaled(lane.scale, lane.unit)
+    def _lock(self) -> None:
+        self.locked = True
+
+    def place(self, top: float, bottom: float, right: float) -> None:
+        """Take the plot's place in the scene, px."""
+        self.setGeometry(QRectF(AXIS, top, right - AXIS, max(bottom - top, 7.0)))
+        self.axis.setGeometry(QRectF(0, top, AXIS, max(bottom - top, 7.0)))
+
+    def prepare(self) -> None:
+        """Read what is to be shown, and choose the range."""
+        stage, lane, view = self._stage, self.lane, self._stage.view
+        count = max(50, int(self.width()))
+        runs = stage.source.shown(lane, view.start, view.end, count)
+        self._twin = Trace.nothing()
+        if stage.twin:
+            twin = stage.source.twin(lane.key, view.start, view.end, count)
+            self._twin = twin.scaled(lane.scale, lane.unit)
         self.painted = Painted(view.start, view.end, tuple(runs))
-        room = min(NAMES / max(bottom - 5 - NAMES, NAMES), 1.0) if self.top else 0.0
-        self._fit([*runs, twin], source, room)
-        low, high = self.range
-        frame = Frame(AXIS, right, 5, bottom, view.start, view.end, low, high)
-        painter.fillRect(QRectF(0, 0, size.width(), size.height()), QColor(tokens.plot))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        rows = lane.raster or source.stacks(lane)
-        ground(painter, frame, source, tokens, Place(self.top, self.bottom, not rows))
-        on = Drawing(painter, frame, source, tokens)
+        high = self.height()
+        room = min(NAMES / max(high - NAMES, NAMES), 1.0) if self.top else 0.0
+        if not self.locked:
+            self._fit([*runs, self._twin], stage.source, room)
+
+    def zoom(self, factor: float, y: float) -> None:
+        """Zoom the values by `factor` (above 1: in) about a height in the scene, px."""
+        low, high = self.shown
+        about = low + (self.geometry().bottom() - y) / self.height() * (high - low)
+        self._lock()
+        self.setYRange(
+            about - (about - low) / factor, about + (high - about) / factor, padding=0
+        )
+
+    def show_between(self, bottom: float, top: float) -> None:
+        """Show the values between two heights in the scene, px."""
+        low, high = self.shown
+        each, foot = (high - low) / self.height(), self.geometry().bottom()
+        self._lock()
+        self.setYRange(
+            low + each * (foot - bottom), low + each * (foot - top), padding=0
+        )
+
+    def boundingRect(self) -> QRectF:
+        """The plot with its axis and its tag."""
+        inner: QRectF = self.rect()
+        return inner.adjusted(-AXIS, -6, GUTTER, 6)
+
+    @guarded
+    def paint(self, painter: QPainter, *__: Any) -> None:
+        """Draw the traces as they were prepared."""
+        stage, runs = self._stage, list(self.painted.runs)
+        if not runs:
+            return
+        view, (low, high) = stage.view, self.shown
+        wide, tall = self.width(), self.height()
+        frame = Frame(0.0, wide, 0.0, tall, view.start, view.end, low, high)
+        on = Drawing(painter, frame, stage.source, stage.tokens)
         painter.save()
-        painter.setClipRect(QRectF(frame.left, 0, right - frame.left, bottom + 4))
+        painter.setClipRect(QRectF(0, -5, wide, tall + 9))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
         if len(runs) > 1:
             self._runs(on, runs)
         else:
-            self._traces(on, runs[0], twin)
+            self._traces(on, runs[0], self._twin)
         painter.restore()
-        self._cursors(on)
         if len(runs) == 1:
             self._tag(on)
 
@@ -112,14 +188,11 @@ class LanePainter:
 
         `room` is left free above the data, as a share of its range.
         """
-        if self.manual is not None:
-            self.range = self.manual
-            return
         lane = self.lane
         least = 0.1 * lane.least if source.subtracts(lane) else lane.least
         extents = [one.extent for one in traces if one.extent is not None]
         if lane.key == "force":
-            _, force = source.planned(self.view.start, self.view.end)
+            _, force = source.planned(self._stage.view.start, self._stage.view.end)
             if force.size:
                 extents.append((float(force.min()) * 1e3, float(force.max()) * 1e3))
         if lane.zero:
@@ -132,13 +205,13 @@ class LanePainter:
         low, high = min(e[0] for e in extents), max(e[1] for e in extents)
         high += room * (high - low)
         if low == high == 0.0:
-            self.range = (0.0, least)
+            self.setYRange(0.0, least, padding=0)
             return
         wanted = nice_range(low, high, least)
-        now = self.range
+        now = self.shown
         roomy = (now[1] - now[0]) > 1.6 * (wanted[1] - wanted[0])
         if low < now[0] or high > now[1] or roomy or now == (0.0, 1.0):
-            self.range = wanted
+            self.setYRange(*wanted, padding=0)
 
     def _runs(self, on: Drawing, runs: list[Trace]) -> None:
         """Several runs, each in its colour; stacked ones in rows of their own."""
@@ -164,7 +237,7 @@ class LanePainter:
             paint.trace(painter, own, shown, line)
 
     def _traces(self, on: Drawing, measured: Trace, twin: Trace) -> None:
-        painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
+        painter, frame, tokens = on.painter, on.frame, on.tokens
         lane, force = self.lane, self.lane.key == "force"
         colour = tokens.trace(lane.key)
         if lane.raster:
@@ -192,11 +265,6 @@ class LanePainter:
             paint.trace(painter, frame, measured, paint.pen(colour))
         if lane.valued and not force:
             self._dots(on, measured, colour)
-        if source.running and frame.start <= source.reach <= frame.end:
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-            at = round(frame.x1(source.reach)) + 0.5
-            painter.setPen(paint.pen(tokens.border_strong))
-            painter.drawLine(QPointF(at, 0), QPointF(at, frame.bottom + 3))
 
     def _dots(self, on: Drawing, measured: Trace, colour: str) -> None:
         """Mark rates, and samples where they lie apart: between them nobody looked."""
@@ -235,7 +303,7 @@ class LanePainter:
     def _raster(self, on: Drawing) -> None:
         painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        two = self.options.twin and source.twin_spikes.size > 0
+        two = self._stage.twin and source.twin_spikes.size > 0
         names = ("meas.", "model") if two else ("meas.",)
         rows = rows_of(frame, len(names))
         painter.setClipping(False)
@@ -246,31 +314,12 @@ class LanePainter:
             first, last = np.searchsorted(times, [frame.start, frame.end])
             paint.bars(painter, frame, times[first:last], span, paint.pen(colour))
 
-    def _cursors(self, on: Drawing) -> None:
-        if self.view.cursors is None:
-            return
-        painter, frame, tokens = on.painter, on.frame, on.tokens
-        colours = tokens.accent, tokens.V_C1
-        for name, time, colour in zip("AB", self.view.cursors, colours, strict=True):
-            x = frame.x1(time)
-            if not frame.left <= x <= frame.right:
-                continue
-            painter.setPen(QPen(QColor(colour), 1, Qt.PenStyle.DashLine))
-            x = round(x) + 0.5
-            painter.drawLine(QPointF(x, 0), QPointF(x, frame.bottom + 4))
-            if self.top:
-                box = QRectF(x - 8, frame.bottom - 14, 16, 17)
-                painter.fillRect(box, QColor(colour))
-                painter.setPen(QColor(tokens.on_accent))
-                painter.setFont(sized(11, QFont.Weight.Bold))
-                painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
-
     def _tag(self, on: Drawing) -> None:
         """The value at the right edge of the data in view, beside where it is."""
         painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         if not self.lane.valued:
             return
-        edge = source.right_edge(self.view)
+        edge = source.right_edge(self._stage.view)
         value = values_at(self.lane, source, edge, self.painted)[0]
         if value is None or edge < frame.start:
             return

@@ -1,0 +1,179 @@
+"""What lies below the traces of all lanes: bands of holds, the future, time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import QLineF, QPointF, QRectF
+from PySide6.QtGui import QColor, QPainter
+
+from gui.lanes import paint
+from gui.lanes.expected import Stretch
+from gui.lanes.paint import Frame
+from gui.lanes.source import Source
+from gui.lanes.view import TimeView
+from gui.look.tokens import LIGHT, Tokens
+from gui.plots.axis import guarded
+from gui.plots.numbers import numbers
+
+AXIS = 52
+"""Width of the value axis, px; the same in every lane so that time lines up."""
+
+GUTTER = 56
+"""Width right of the plot for the value tag, px."""
+
+CLOSE = 3
+"""Pixels for each hold below which they are painted as one."""
+
+TIME_AXIS = 22
+"""Height of the time axis below the last lane, px."""
+
+
+@dataclass
+class Stage:
+    """What all lanes have in common.
+
+    Attributes:
+        view: the visible time.
+        source: what is shown.
+        tokens: its colours.
+        width, height: of all lanes together, px.
+        lanes: (top, bottom) of each visible lane, px; the last has the time axis.
+        twin: draw what the model expects, too.
+        zoom_box: drag a box to zoom to, instead of the view.
+    """
+
+    view: TimeView
+    source: Source = field(default_factory=Source)
+    tokens: Tokens = LIGHT
+    width: float = 0.0
+    height: float = 0.0
+    lanes: list[tuple[float, float]] = field(default_factory=list)
+    twin: bool = True
+    zoom_box: bool = False
+
+    @property
+    def right(self) -> float:
+        """Right end of the plots, px."""
+        return max(self.width - GUTTER, AXIS + 20.0)
+
+    def frame(self, top: float, bottom: float) -> Frame:
+        """The map from the visible time to pixels, between two heights."""
+        view = self.view
+        return Frame(AXIS, self.right, top, bottom, view.start, view.end, 0.0, 1.0)
+
+    def whole(self) -> Frame:
+        """That of all lanes together."""
+        tops, bottoms = zip(*self.lanes or [(0.0, 1.0)], strict=True)
+        return self.frame(min(tops), max(bottoms) - TIME_AXIS - 2)
+
+
+class Floor(pg.GraphicsObject):  # type: ignore[misc]
+    """Painted once for all lanes."""
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__()
+        self._stage = stage
+        self.setZValue(-300)
+
+    def boundingRect(self) -> QRectF:
+        """All lanes."""
+        return QRectF(0, 0, self._stage.width, self._stage.height)
+
+    @guarded
+    def paint(self, painter: QPainter, *__: Any) -> None:
+        """Bands of holds, the future, the grid of time, names, borders of lanes."""
+        stage, tokens = self._stage, self._stage.tokens
+        frame, source = stage.whole(), stage.source
+        painter.fillRect(self.boundingRect(), QColor(tokens.plot))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        holds = _visible(source, frame)
+        for hold, left, right in holds:
+            band = QRectF(left, frame.top, right - left, frame.bottom - frame.top)
+            painter.fillRect(band, QColor(tokens.sunken if hold.pause else tokens.band))
+        if source.running and source.reach < frame.end:
+            x = max(frame.x1(source.reach), frame.left)
+            ahead = QRectF(x, frame.top, frame.right - x, frame.bottom - frame.top)
+            painter.fillRect(ahead, QColor(tokens.ahead))
+        _time_grid(painter, frame, tokens)
+        _names(painter, holds, tokens)
+        for _, bottom in stage.lanes:
+            # above it as much is left free as between a lane and the next
+            painter.fillRect(QRectF(0, bottom - 2, stage.width, 2), QColor(tokens.plot))
+            border = QRectF(0, bottom, stage.width, 1)
+            painter.fillRect(border, QColor(tokens.border))
+
+
+def _visible(source: Source, frame: Frame) -> list[tuple[Stretch, float, float]]:
+    """Holds in view with their left and right ends, px.
+
+    Where they are too many to be told apart, one that spans them all.
+    """
+    holds = [h for h in source.holds if h.end > frame.start and h.start < frame.end]
+    if len(holds) * CLOSE > frame.right - frame.left:
+        holds = [Stretch(holds[0].start, holds[-1].end, "")]
+    return [
+        (
+            hold,
+            max(frame.x1(hold.start), frame.left),
+            min(frame.x1(hold.end), frame.right),
+        )
+        for hold in holds
+    ]
+
+
+def _names(
+    painter: QPainter, holds: list[tuple[Stretch, float, float]], tokens: Tokens
+) -> None:
+    """Names of the holds, over the grid."""
+    for hold, left, right in holds:
+        if right - left > 34:
+            text = "recovery" if hold.pause else hold.label
+            painter.save()
+            painter.setClipRect(QRectF(left, 0, right - left - 3, 20))
+            paint.write(painter, QPointF(left + 5, 10), text, tokens.muted)
+            painter.restore()
+
+
+def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
+    most = max(2, int((frame.right - frame.left) / 90))
+    found = numbers(frame.start, frame.end, most)
+    across = [round(frame.x1(value)) + 0.5 for value, _ in found]
+    painter.setPen(paint.pen(tokens.grid))
+    painter.drawLines([QLineF(x, frame.top, x, frame.bottom) for x in across])
+    for (value, words), x in zip(found, across, strict=True):
+        if value >= -1e-12 and x < frame.right - 14:
+            at = QPointF(x, frame.bottom + 11)
+            paint.write(painter, at, words, tokens.muted, align=0.5)
+    painter.setPen(paint.pen(tokens.border_strong))
+    y = frame.bottom + 0.5
+    painter.drawLine(QPointF(frame.left, y), QPointF(frame.right, y))
+    at = QPointF(frame.right + 4, frame.bottom + 11)
+    paint.write(painter, at, "time / s", tokens.muted)
+
+
+def row_names(
+    painter: QPainter,
+    frame: Frame,
+    tokens: Tokens,
+    names: Sequence[str],
+    colours: Sequence[str] = (),
+) -> None:
+    """Write the names of the rows of a raster or a stack beside them."""
+    for number_, (a, b) in enumerate(rows_of(frame, len(names))):
+        colour = colours[number_] if colours else tokens.muted
+        at = QPointF(frame.left - 8, (a + b) / 2)
+        paint.write(painter, at, names[number_], colour, align=1.0)
+
+
+def rows_of(frame: Frame, count: int) -> list[tuple[float, float]]:
+    """Top and bottom of `count` rows of a raster or a stack, px."""
+    each = (frame.bottom - frame.top) / count
+    air = 0.2 * each if count == 1 else 2.5
+    return [
+        (frame.top + k * each + air, frame.top + (k + 1) * each - air)
+        for k in range(count)
+    ]

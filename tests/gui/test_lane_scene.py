@@ -1,0 +1,311 @@
+"""The lanes under the hand: values, time, cursors, zoom, menu, export."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, QRectF, Qt
+from PySide6.QtGui import QImage, QMouseEvent, QPainter, QWheelEvent
+from PySide6.QtSvg import QSvgGenerator, QSvgRenderer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QMenu
+
+from gui.lanes.box import LaneBox
+from gui.lanes.expected import Stretch
+from gui.lanes.floor import AXIS
+from gui.lanes.lane import lanes_for
+from gui.lanes.source import LiveSource
+from gui.lanes.stack import LaneStack
+from gui.lanes.view import TimeView
+from gui.look.theme import Theme
+from gui.look.tokens import DARK, LIGHT
+from tactile_lab.trace import Trace
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def stack(app) -> Iterator[LaneStack]:
+    """Four lanes with 20 s of a slow sine, two steps and a spike each second."""
+    made = LaneStack(TimeView(), Theme("light"))
+    made.show_lanes(lanes_for(("force", "V_C1", "V_K", "spikes"), twin=False))
+    made.resize(900, 600)
+    made.show()
+    source = LiveSource(None, 0.2)
+    time = 1e-3 * np.arange(20_000)
+    for signal in ("V_C1", "V_K"):
+        mean = np.sin(time).astype(np.float32)
+        bins = Trace.bins(time, mean - 0.01, mean + 0.01, mean, 1e-3)
+        source.add_bins({signal: bins})
+    source.add_spikes(tuple(np.arange(1.0, 20.0).tolist()))
+    source.begin_trial(0, Stretch(0.0, 10.0, "50 mN"))
+    source.begin_trial(1, Stretch(10.0, 20.0, "80 mN"))
+    made.show_source(source)
+    made.view.set_now(source.reach, source.length)
+    made.view.show_span(5.0, 10.0)
+    settle(app)
+    yield made
+    made.close()
+    made.deleteLater()
+    settle(app)
+
+
+def settle(app: QApplication) -> None:
+    for _ in range(3):
+        app.processEvents()
+
+
+def box(stack: LaneStack, key: str) -> LaneBox:
+    row = stack.row(key)
+    assert row is not None
+    return row.box
+
+
+def middle(stack: LaneStack, key: str, x: float | None = None) -> QPoint:
+    place = box(stack, key).geometry()
+    return QPoint(
+        round(place.center().x() if x is None else x), round(place.center().y())
+    )
+
+
+def wheel(stack: LaneStack, at: QPoint, held: str = "NoModifier") -> None:
+    where, view = QPointF(at), stack.scene.viewport()
+    event = QWheelEvent(
+        where, view.mapToGlobal(where), QPoint(), QPoint(0, 120),
+        Qt.MouseButton.NoButton, Qt.KeyboardModifier[held],
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(view, event)
+
+
+def drag(stack: LaneStack, a: QPoint, b: QPoint) -> None:
+    """With the button held in between, as a hand does it."""
+    view = stack.scene.viewport()
+    QTest.mousePress(view, LEFT, pos=a)
+    for share in (0.3, 0.6, 1.0):
+        at = QPointF(a) + share * QPointF(b - a)
+        event = QMouseEvent(
+            QEvent.Type.MouseMove, at, view.mapToGlobal(at), Qt.MouseButton.NoButton,
+            LEFT, Qt.KeyboardModifier.NoModifier,
+        )  # fmt: skip
+        QApplication.sendEvent(view, event)
+    QTest.mouseRelease(view, LEFT, pos=b)
+
+
+def span(lane: LaneBox) -> float:
+    low, high = lane.shown
+    return high - low
+
+
+def test_plots_lie_beside_their_cards(app, stack):
+    stack.hide_lane("V_K", True)
+    settle(app)
+    for row in stack.visible_rows():
+        place, card = row.box.geometry(), row.card.geometry()
+        assert card.top() <= place.top() < place.bottom() <= card.top() + card.height()
+    assert not box(stack, "V_K").isVisible()
+
+
+@pytest.mark.parametrize("how", ["axis", "Ctrl"])
+def test_the_wheel_zooms_values_of_one_lane_and_its_range_stays(app, stack, how):
+    lane, other = box(stack, "V_C1"), box(stack, "V_K")
+    before, beside, time = span(lane), other.shown, stack.view.width
+    if how == "axis":
+        wheel(stack, middle(stack, "V_C1", AXIS / 2))
+    else:
+        wheel(stack, middle(stack, "V_C1"), "ControlModifier")
+    settle(app)
+    assert np.isclose(span(lane), before / 1.25)
+    assert other.shown == beside and stack.view.width == time
+    kept = lane.shown
+    stack.view.show_span(0.0, 20.0)
+    settle(app)
+    assert lane.shown == kept
+
+
+def test_a_drag_on_the_axis_moves_the_values_and_a_double_click_ends_it(app, stack):
+    lane = box(stack, "V_C1")
+    before = lane.shown
+    at = middle(stack, "V_C1", AXIS / 2)
+    drag(stack, at, at + QPoint(0, 20))
+    settle(app)
+    assert np.isclose(span(lane), before[1] - before[0]) and lane.shown[0] > before[0]
+    assert lane.locked
+    QTest.mouseDClick(stack.scene.viewport(), LEFT, pos=at)
+    settle(app)
+    assert lane.shown == before and not lane.locked
+
+
+def test_a_drag_pans_and_the_wheel_zooms_time(app, stack):
+    at = middle(stack, "V_K")
+    under = stack.scene.time_at(at.x())
+    wheel(stack, at)
+    assert np.isclose(stack.view.width, 8.0)
+    assert np.isclose(stack.scene.time_at(at.x()), under)
+    drag(stack, at, at + QPoint(100, 0))
+    assert np.isclose(stack.scene.time_at(at.x() + 100), under)
+    assert np.isclose(stack.view.width, 8.0)
+
+
+def test_a_zoom_box_zooms_time_and_values_and_shows_the_data_in_it(app, stack):
+    lane = box(stack, "V_C1")
+    stack.stage.zoom_box = True
+    stack.scene.box_zoomed.connect(lambda a, b: stack.view.show_span(a, b - a))
+    place = lane.geometry()
+    a = place.topLeft().toPoint() + QPoint(100, 10)
+    b = a + QPoint(200, 30)
+    before, times = span(lane), (stack.scene.time_at(a.x()), stack.scene.time_at(b.x()))
+    QTest.mousePress(stack.scene.viewport(), LEFT, pos=a)
+    QTest.mouseMove(stack.scene.viewport(), b)
+    image = stack.scene.grab().toImage()
+    inside = {image.pixelColor(x, a.y() + 15).name() for x in range(a.x(), b.x())}
+    QTest.mouseRelease(stack.scene.viewport(), LEFT, pos=b)
+    settle(app)
+    assert np.isclose(stack.view.start, times[0]) and np.isclose(
+        stack.view.end, times[1]
+    )
+    assert np.isclose(span(lane), before * 30 / place.height())
+    assert len(inside) > 1, "the box covers what is in it"
+
+
+def test_a_cursor_is_dragged_through_all_lanes(app, stack):
+    stack.view.place_cursors(8.0, 12.0)
+    settle(app)
+    x = round(stack.stage.whole().x1(8.0))
+    drag(stack, middle(stack, "V_K", x), middle(stack, "V_C1", x + 60))
+    a, b = stack.view.cursors
+    assert np.isclose(a, stack.scene.time_at(x + 60)) and b == 12.0
+    assert stack.view.start == 5.0, "the view stays"
+
+
+def menu_of(app, stack: LaneStack, at: QPoint) -> QMenu:
+    QTest.mousePress(stack.scene.viewport(), Qt.MouseButton.RightButton, pos=at)
+    QTest.mouseRelease(stack.scene.viewport(), Qt.MouseButton.RightButton, pos=at)
+    (menu,) = (m for m in stack.findChildren(QMenu) if m.isVisible())
+    return menu
+
+
+def choose(app, stack: LaneStack, key: str, words: str) -> None:
+    menu = menu_of(app, stack, middle(stack, key))
+    found = [a for a in menu.actions() if a.text() == words]
+    for one in (a.menu() for a in menu.actions() if a.menu()):
+        found += [a for a in one.actions() if a.text() == words]
+    (action,) = found
+    action.trigger()
+    menu.close()
+    menu.deleteLater()
+    settle(app)
+
+
+def test_the_menu_of_a_lane(app, stack):
+    lane = box(stack, "V_C1")
+    under = stack.scene.time_at(middle(stack, "V_C1").x())
+    choose(app, stack, "V_C1", "Keep this range")
+    assert lane.locked
+    choose(app, stack, "V_C1", "Automatic range")
+    assert not lane.locked
+    choose(app, stack, "V_C1", "Cursor B here")
+    assert stack.view.cursors[1] == pytest.approx(under)
+    assert stack.view.start < stack.view.cursors[0] < stack.view.end
+    choose(app, stack, "V_C1", "80 mN")
+    assert (stack.view.start, stack.view.width) == (10.0, 10.0)
+    asked = []
+    stack.export_asked.connect(lambda: asked.append(True))
+    choose(app, stack, "V_C1", "Export this view …")
+    assert asked == [True]
+    choose(app, stack, "V_C1", "Hide V_C1")
+    assert stack.is_hidden("V_C1")
+
+
+def test_the_crosshair_tells_time_and_values_and_goes_with_the_pointer(app, stack):
+    bare = stack.scene.grab().toImage()
+    choose(app, stack, "V_C1", "Crosshair")
+    at = middle(stack, "V_C1")
+    QTest.mouseMove(stack.scene.viewport(), at)
+    settle(app)
+    crossed = stack.scene.grab().toImage()
+    for key in ("V_C1", "V_K"):
+        place = box(stack, key).geometry()
+        part = QRect(at.x() + 4, round(place.top()) + 2, 60, 14)
+        assert crossed.copy(part) != bare.copy(part), key
+    QApplication.sendEvent(stack.scene, QEvent(QEvent.Type.Leave))
+    settle(app)
+    assert stack.scene.grab().toImage() == bare
+
+
+def test_back_and_forward_through_what_was_seen():
+    view = TimeView()
+    clock = iter(np.arange(0.0, 100.0, 10.0).tolist())
+    view.clock = lambda: next(clock)
+    view.set_now(100.0, 100.0)
+    for start in (0.0, 20.0, 40.0):
+        view.show_span(start, 5.0)
+    view.back()
+    assert view.start == 20.0
+    view.back()
+    assert view.start == 0.0
+    view.forward()
+    assert view.start == 20.0
+    view.show_span(60.0, 5.0)
+    view.forward()
+    assert view.start == 60.0, "a new way has no forward"
+    view.back()
+    assert view.start == 20.0
+
+
+def test_one_drag_is_one_step_back():
+    view = TimeView()
+    view.clock = lambda: 1.0
+    view.set_now(100.0, 100.0)
+    view.show_span(10.0, 5.0)
+    for start in range(11, 30):
+        view.show_span(float(start), 5.0)
+    view.back()
+    assert view.start == 95.5, "where it was before: following the newest data"
+
+
+@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
+def test_the_same_picture_on_screen_in_png_and_in_svg(app, stack, tokens, tmp_path):
+    stack.stage.tokens = tokens
+    target = QRectF(stack.scene.rect())
+    size = stack.scene.size()
+    pictures = {"screen": stack.scene.grab().toImage()}
+    pictures["png"] = QImage(size, QImage.Format.Format_RGB32)
+    painter = QPainter(pictures["png"])
+    stack.scene.draw_onto(painter, target, tokens)
+    painter.end()
+    generator = QSvgGenerator()
+    generator.setFileName(str(tmp_path / "lanes.svg"))
+    generator.setSize(size)
+    generator.setViewBox(target)
+    painter = QPainter(generator)
+    stack.scene.draw_onto(painter, target, tokens)
+    painter.end()
+    pictures["svg"] = QImage(size, QImage.Format.Format_RGB32)
+    painter = QPainter(pictures["svg"])
+    QSvgRenderer(str(tmp_path / "lanes.svg")).render(painter, target)
+    painter.end()
+    grey = {name: pixels(image) for name, image in pictures.items()}
+    assert np.array_equal(grey["screen"], grey["png"])
+    assert np.mean(np.abs(grey["svg"] - grey["screen"]) > 40) < 0.02
+    assert grey["screen"].std() > 3
+
+
+def pixels(image: QImage) -> np.ndarray:
+    grey = image.convertToFormat(QImage.Format.Format_Grayscale8)
+    rows = np.frombuffer(grey.constBits(), np.uint8).reshape(grey.height(), -1)
+    return rows[:, : grey.width()].astype(int)
+
+
+def test_lanes_that_cannot_be_painted_leave_the_window_alive(app, stack, qtbot):
+    lane = box(stack, "V_C1")
+    with qtbot.captureExceptions() as told:
+        for one in (lane, box(stack, "V_K")):
+            one._traces = lambda *_: 1 / 0
+        stack.scene.grab()
+        stack.scene.grab()
+        for one in (lane, box(stack, "V_K")):
+            del one._traces
+        settle(app)
+    assert len(told) >= 4 and {one[0] for one in told} == {ZeroDivisionError}
+    assert not stack.scene.grab().isNull()
