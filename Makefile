@@ -49,6 +49,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/python docs/make_fit_recovery.py
 	if command -v ngspice >/dev/null; then $(BIN)/python docs/make_saturation.py; fi
 	$(BIN)/python docs/make_paper.py
+	$(BIN)/python tests/benchmarks/surprises.py --out docs/surprise-figures.md
 	$(BIN)/python tests/benchmarks/protocol_speed.py --out docs/protocol-figures.md
 	$(BIN)/python tests/benchmarks/spike_detection.py --out docs/detection-figures.md
 	$(BIN)/python tests/benchmarks/store_speed.py --out docs/store-figures.md

@@ -1,25 +1,27 @@
 """Which single thing that is other than believed explains a run's misfit.
 
 Each suspect is fitted alone, by a deviation of one size, to V_C1 and to the intervals
-between spikes; an offset of V_C1's channel is allowed to each. The one that leaves only
-the noise is named, if every other leaves clearly more.
+between spikes. Whatever the bench states a band for (offset of V_C1's channel, clocks,
+follower, lag, force, temperature) may take any value in its band, to first order. The
+suspect that leaves only the noise is named, if every other leaves clearly more.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from tactile_lab.analysis.belief import PART, Belief
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.evidence import FloatArray, Residuals
 from tactile_lab.analysis.spike_pairs import irregularity
 from tactile_lab.analysis.twin import Measured
-from tactile_lab.deviation import Deviation
-from tactile_lab.errors import NotIdentifiableError, TactileLabError
+from tactile_lab.deviation import Deviation, DrivenCircuit
+from tactile_lab.errors import TactileLabError
 from tactile_lab.quantity import show
 
 SUSPECTS: Mapping[str, float] = {
@@ -46,6 +48,10 @@ SYSTEMATIC = 0.03
 """Of one code: what the mean of dithered codes is off by."""
 LEAST = 0.5e-3
 """What V_C2 at firing is known to at best, V."""
+FEWEST = 3
+"""Fewer data than this tell nothing."""
+BAND = 1.25
+"""Of its 95 % band that each stated uncertainty may take."""
 EXPLAINED = 3.0
 """Times the noise that a misfit may have and still count as explained."""
 CLEARLY = 1.5
@@ -87,7 +93,8 @@ class Explanation:
     """What the usual suspects make of a run's misfit.
 
     Attributes:
-        misfit: without any deviation, in multiples of the noise (root mean square).
+        misfit: of what is believed, within its bands, in multiples of the noise (root
+            mean square).
         suspects: best first.
     """
 
@@ -123,7 +130,7 @@ class Explanation:
     @property
     def cause(self) -> Suspect | None:
         """The one that explains the misfit; None: it cannot be told."""
-        if not self.suspects or self.misfit < EXPLAINED:
+        if not self.suspects:
             return None
         best, *others = self.suspects
         if best.misfit > EXPLAINED:
@@ -139,105 +146,98 @@ def explain(
     *,
     V_C1: Measured | None = None,
     spike_times: FloatArray | None = None,
-) -> Explanation:
-    """Try the usual suspects on a run.
+) -> Explanation | None:
+    """Try the usual suspects on a run; None where there is nothing to explain.
 
     Args:
         belief: sensor and bench as they are believed to be.
         duration: of the run, s.
         V_C1: measured, decimated.
         spike_times: detected spikes, s.
-
-    Raises:
-        NotIdentifiableError: there is neither V_C1 nor a pair of spikes.
     """
     problem = Residuals(belief.circuit, (), belief.force, duration, V_C1, spike_times)
-    if problem.size < 3:
-        raise NotIdentifiableError("neither V_C1 nor enough spikes tell of a cause")
+    if problem.size < FEWEST:
+        return None
     trial = _Trial(belief, problem, 0.0 if V_C1 is None else V_C1.resolution)
-    moved = [
-        (name, (trial.weighted(problem.under(driven)) - trial.without) / PART)
-        for name, driven in belief.displaced()
-    ]
-    found = [s for name in SUSPECTS if (s := trial.fitted(name, moved)) is not None]
+    misfit = trial.misfit(trial.freed(trial.plain))
+    if misfit < EXPLAINED:
+        return None
+    found = [s for name in SUSPECTS if (s := trial.fitted(name)) is not None]
     found.sort(key=lambda suspect: suspect.misfit)
-    return Explanation(trial.misfit(trial.without), tuple(found))
+    return Explanation(misfit, tuple(found))
 
 
 class _Trial:
-    """Residuals over their noise, with an offset of V_C1 taken out."""
+    """Residuals in multiples of their noise, freed of what the bench's bands allow."""
 
     def __init__(self, belief: Belief, problem: Residuals, code: float) -> None:
         self._belief, self._problem = belief, problem
-        plain = problem.under(belief.deviating(Deviation()))
-        bins, one = problem.bins, 1.96
+        plain, bins = problem.under(belief.deviating(Deviation())), problem.bins
         self._noise = np.empty(problem.size)
-        self._noise[:bins] = max(
-            irregularity(plain[:bins]) / one if bins > 2 else 0.0,
-            SYSTEMATIC * code,
-            1e-5,
-        )
-        firing = irregularity(plain[bins:]) / one
-        self._noise[bins:] = max(firing if np.isfinite(firing) else 0.0, LEAST)
-        self.without = self.weighted(plain)
+        for part, least in (
+            (slice(0, bins), max(SYSTEMATIC * code, 1e-5)),
+            (slice(bins, problem.size), LEAST),
+        ):
+            found = irregularity(plain[part]) / 1.96
+            self._noise[part] = max(found, least) if np.isfinite(found) else least
+        self.plain = plain / self._noise
+        self._bands = [
+            (cause, (self._under(driven) - self.plain) / PART)
+            for cause, driven in belief.displaced()
+        ]
+        if bins and problem.offset > 0:
+            shifted = np.zeros(problem.size)
+            shifted[:bins] = problem.offset / self._noise[:bins]
+            self._bands.append(("offset", shifted))
 
-    def weighted(self, residual: FloatArray) -> FloatArray:
-        """Residuals in multiples of the noise, and the offset taken out of V_C1."""
-        bins, half = self._problem.bins, self._problem.offset
-        scaled = residual / self._noise
-        if not bins or half == 0:
+    def _under(self, driven: DrivenCircuit) -> FloatArray:
+        return self._problem.under(driven) / self._noise
+
+    def freed(self, scaled: FloatArray, but: str = "") -> FloatArray:
+        """Residuals less what the bands explain best, all `but` one cause's."""
+        bands = [change for cause, change in self._bands if cause != but]
+        if not bands:
             return scaled
-        one, prior = 1 / self._noise[:bins], 1.96 / half
-        offset = float(one @ scaled[:bins] / (one @ one + prior**2))
-        scaled[:bins] -= offset * one
-        return np.append(scaled, offset * prior)
+        bent, reduced = np.linalg.qr(np.column_stack(bands))
+        taken = lsq_linear(reduced, -bent.T @ scaled, (-BAND, BAND)).x
+        return np.asarray(scaled + bent @ (reduced @ taken))
 
     def misfit(self, scaled: FloatArray) -> float:
         """Root mean square of each kind of evidence, the larger."""
         bins = self._problem.bins
-        parts = [scaled[:bins], scaled[bins : self._problem.size]]
-        return max(float(np.sqrt(np.mean(p**2))) for p in parts if p.size)
+        parts = [part for part in (scaled[:bins], scaled[bins:]) if part.size]
+        return max(float(np.sqrt(np.mean(part**2))) for part in parts)
 
-    def fitted(
-        self, name: str, moved: Sequence[tuple[str, FloatArray]]
-    ) -> Suspect | None:
-        """The suspect's best size; None where the model cannot follow it.
-
-        Args:
-            name: of the suspect.
-            moved: by each cause of uncertainty, what its band changes in the residuals;
-                what a suspect itself is the cause of is not counted against it.
-        """
-        step = SUSPECTS[name]
+    def fitted(self, name: str) -> Suspect | None:
+        """The suspect's best size; None where the model cannot follow it."""
+        step, own = SUSPECTS[name], OWN.get(name, name)
 
         def residual(x: float) -> FloatArray:
-            driven = self._belief.deviating(Deviation(**{name: step * x}))
-            return self.weighted(self._problem.under(driven))
+            return self._under(self._belief.deviating(Deviation(**{name: step * x})))
 
         try:
-            x, left, slope = _least(residual)
+            x, left = _least(lambda x: self.freed(residual(x), own))
+            slope = (residual(x + DIFFERENCE) - residual(x)) / DIFFERENCE
         except TactileLabError:
             return None
-        misfit = self.misfit(left)
-        length = float(np.linalg.norm(slope)) or math.inf
-        size = Estimate.of(step * x, step * max(misfit, 1.0) / length, left.size - 1)
-        own = OWN.get(name, name)
-        shifts = (slope @ change / length**2 for cause, change in moved if cause != own)
+        misfit, square = self.misfit(left), float(slope @ slope) or math.inf
+        error = step * max(misfit, 1.0) / math.sqrt(square)
+        size = Estimate.of(step * x, error, left.size - 1)
+        # what the estimate would be off by were each band's edge the truth
+        shifts = (slope @ band / square for cause, band in self._bands if cause != own)
         size = size.widened(*(step * abs(float(shift)) for shift in shifts))
         return Suspect(name, size, misfit)
 
 
-def _least(
-    residual: Callable[[float], FloatArray],
-) -> tuple[float, FloatArray, FloatArray]:
-    """Where a residual is least, what it is there, and its slope.
+def _least(residual: Callable[[float], FloatArray]) -> tuple[float, FloatArray]:
+    """Where a residual is least, and what it is there.
 
     By Gauss and Newton from 0, at most `LONGEST` at once, halved where that leads up.
     """
     x, left = 0.0, residual(0.0)
     for _ in range(ROUNDS):
         slope = (residual(x + DIFFERENCE) - left) / DIFFERENCE
-        square = float(slope @ slope) or np.inf
+        square = float(slope @ slope) or math.inf
         way = float(np.clip(-(slope @ left) / square, -LONGEST, LONGEST))
         for _ in range(4):
             there = residual(x + way)
@@ -247,4 +247,4 @@ def _least(
             way /= 2
         if abs(way) < CLOSE:
             break
-    return x, left, slope
+    return x, left

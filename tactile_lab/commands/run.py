@@ -307,7 +307,7 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
         if beside is not None:
             say(beside.budget_line)
             if beside.explanation is not None:
-                say(f"The model misses by more than that. {beside.explanation.text}")
+                say(f"The model misses by more. {beside.explanation.text}")
         if run.accuracy:
             say(run.accuracy)
         if run.loss is not None:

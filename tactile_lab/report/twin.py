@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -17,15 +17,11 @@ from tactile_lab.analysis.error_budget import (
 from tactile_lab.analysis.spike_pairs import Matched
 from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
-from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import printed
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
-
-ENOUGH = 0.95
-"""Part of spikes and of V_C1 that a tolerance of 95 % should hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +82,14 @@ def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
     beside = BesideModel(
         found,
         {what: budget for what, budget in budgets.items() if budget is not None},
-        _explained(run, believed, found, voltages),
+        None
+        if believed.circuit.saturation
+        else explain(
+            believed,
+            run.duration,
+            V_C1=next((v for v in voltages if v.signal == "V_C1"), None),
+            spike_times=run.spike_times if run.searched else None,
+        ),
     )
     node_a = found.residual("V_C1")
     if node_a is None:
@@ -102,27 +105,6 @@ def measured(run: RunData, believed: Belief, trace: RecordedSignal) -> Measured:
     inside = (trace.time >= 0) & (trace.time <= run.duration) & trace.within_range
     time, mean = trace.time[inside], trace.mean[inside]
     return Measured(trace.signal, time, mean, trace.code or 0.0, believed.offset)
-
-
-def _explained(
-    run: RunData, believed: Belief, found: Twin, voltages: Sequence[Measured]
-) -> Explanation | None:
-    """What explains a model that misses by more than its tolerance."""
-    node_a, spikes = found.residual("V_C1"), found.spikes
-    misses = node_a is not None and node_a.within < ENOUGH
-    if spikes is not None:
-        misses |= spikes.missed + spikes.extra > 0 or spikes.within < ENOUGH
-    if not misses or believed.circuit.saturation:
-        return None
-    try:
-        return explain(
-            believed,
-            run.duration,
-            V_C1=next((v for v in voltages if v.signal == "V_C1"), None),
-            spike_times=run.spike_times if run.searched else None,
-        )
-    except NotIdentifiableError:
-        return None
 
 
 def to_dict(beside: BesideModel) -> dict[str, Any]:
@@ -152,7 +134,9 @@ def sentences(beside: BesideModel) -> tuple[str, ...]:
     found = beside.twin
     said = [beside.budget_line] if beside.budgets else []
     if beside.explanation is not None:
-        said.append(f"It misses by more than that. {beside.explanation.text}")
+        said.append(
+            f"It misses by more than what is stated allows. {beside.explanation.text}"
+        )
     for residual in found.residuals:
         shifted = (
             "; while it fires, spikes that come early or late make volts of difference"

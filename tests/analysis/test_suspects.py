@@ -73,7 +73,14 @@ def test_what_no_single_suspect_explains_is_pinned_on_none(deviation, other):
     assert "cannot be told" in found.text
 
 
-def test_where_nothing_is_wrong_nothing_is_named():
-    found = explained(Deviation())
-    assert found.misfit < 2
-    assert found.cause is None
+@pytest.mark.parametrize(
+    "within", [{}, {"input_bias": 18e-12}, {"lag": -8e-4}, {"offset": 0.0}]
+)
+def test_what_the_bench_s_bands_allow_needs_no_explanation(within):
+    assert explained(Deviation(**within)) is None
+
+
+def test_a_cause_is_named_though_the_follower_is_not_quite_as_stated():
+    found = explained(Deviation(V_GS=4e-3, input_bias=15e-12))
+    assert found.cause.name == "V_GS"
+    assert found.cause.size.low <= 4e-3 <= found.cause.size.high
