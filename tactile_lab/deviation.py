@@ -6,7 +6,7 @@ what the bench leaves open, and the search for what explains a misfit as its sus
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, NamedTuple
 
 from tactile_lab.magnetics import Magnet
@@ -49,6 +49,15 @@ class Deviation(SceneTable):
     temperature: Warmer = 0.0
     force: Part = 0.0
     lag: Later = 0.0
+
+    def __add__(self, other: Deviation) -> Deviation:
+        """Both at once; parts of themselves simply add."""
+        return Deviation(
+            **{
+                f.name: getattr(self, f.name) + getattr(other, f.name)
+                for f in fields(self)
+            }
+        )
 
     def circuit(self, believed: Circuit) -> Circuit:
         """The circuit as it really is."""

@@ -17,6 +17,8 @@ from tactile_lab.waveform import Waveform
 PART = 0.05
 """Of a cause's 95 % band by which it is moved: so little that each spike is known
 again; what it does is taken to grow in proportion."""
+NOWHERE = Deviation()
+"""Nothing is other than believed."""
 STEADY = 1e-9
 """A force below this is none, N."""
 
@@ -32,6 +34,7 @@ class Belief:
         followers: and how well they are known; None: there are none.
         temperature: half of the 95 % band of the sensor's, K; None: not stated.
         clock: how far measured times may lie from the current's, s.
+        deviation: of all that, to be tried.
     """
 
     circuit: Circuit
@@ -40,15 +43,22 @@ class Belief:
     followers: Followers | None = None
     temperature: float | None = None
     clock: float = 0.0
+    deviation: Deviation = NOWHERE
 
     @cached_property
+    def driven(self) -> DrivenCircuit:
+        """The sensor and its force, N on the run's time axis."""
+        return self.deviating(NOWHERE)
+
+    @property
     def force(self) -> Waveform:
         """Force on the sensor, N on the run's time axis."""
-        return self.magnet.lagged_force(self.setpoint)[0]
+        return self.driven.force
 
     def deviating(self, deviation: Deviation) -> DrivenCircuit:
-        """The sensor and its force if what is believed is off by `deviation`."""
-        return deviation.driven(self.circuit, self.magnet, self.setpoint)
+        """The sensor and its force if what is believed is off by `deviation` more."""
+        off = self.deviation + deviation
+        return off.driven(self.circuit, self.magnet, self.setpoint)
 
     @property
     def offset(self) -> float:
@@ -70,7 +80,7 @@ class Belief:
         """By each independent cause of uncertainty: moved by `PART` of its band."""
         if self.clock > 0:
             later = self.force.shifted(PART * self.clock)
-            yield "clocks", DrivenCircuit(self.circuit, later)
+            yield "clocks", DrivenCircuit(self.driven.circuit, later)
         followers = self.followers
         if followers is not None and followers.input_bias_uncertainty > 0:
             bias = PART * followers.input_bias_uncertainty
@@ -84,7 +94,7 @@ class Belief:
             rest = np.abs(self.force.value) < STEADY
             pushed = np.where(rest, 0.0, PART * known.absolute)
             moved = Waveform(self.force.time, self.force.value + pushed)
-            yield "force", DrivenCircuit(self.circuit, moved)
+            yield "force", DrivenCircuit(self.driven.circuit, moved)
         if known is not None and known.relative > 0:
             yield "force", self.deviating(Deviation(force=PART * known.relative))
         if self.temperature:

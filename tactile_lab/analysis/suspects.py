@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from tactile_lab.analysis.belief import PART, Belief
 from tactile_lab.analysis.estimate import Estimate
@@ -45,16 +44,16 @@ TITLES = {
 OWN = {"input_bias": "follower"}
 """Name of the cause of uncertainty where it is not the suspect's own."""
 SYSTEMATIC = 0.03
-"""Of one code: what the mean of dithered codes is off by."""
-LEAST = 0.5e-3
+"""Of one code: what the mean of dithered codes is off by, alike at each level."""
+LEAST = 0.15e-3
 """What V_C2 at firing is known to at best, V."""
 FEWEST = 3
 """Fewer data than this tell nothing."""
 BAND = 1.25
-"""Of its 95 % band that each stated uncertainty may take."""
+"""Of its 95 % band that a stated uncertainty may take to explain a misfit."""
 EXPLAINED = 3.0
 """Times the noise that a misfit may have and still count as explained."""
-CLEARLY = 1.5
+CLEARLY = 1.35
 """Times the misfit of the best that every other suspect must leave at least."""
 
 ROUNDS, DIFFERENCE, LONGEST, CLOSE = 8, 0.03, 3.0, 3e-3
@@ -158,58 +157,115 @@ def explain(
     problem = Residuals(belief.circuit, (), belief.force, duration, V_C1, spike_times)
     if problem.size < FEWEST:
         return None
-    trial = _Trial(belief, problem, 0.0 if V_C1 is None else V_C1.resolution)
+    plain = problem.under(belief.driven)
+    code = 0.0 if V_C1 is None else V_C1.resolution
+    noise = _noise(plain, problem.bins, code)
+    weight = np.ones(problem.size)
+    if V_C1 is not None and code > 0:
+        weight[: problem.bins] = math.sqrt(_levels(V_C1) / problem.bins)
+    trial = _Trial(belief, problem, noise, weight)
     misfit = trial.misfit(trial.freed(trial.plain))
     if misfit < EXPLAINED:
         return None
     found = [s for name in SUSPECTS if (s := trial.fitted(name)) is not None]
     found.sort(key=lambda suspect: suspect.misfit)
+    # what the bands allow was taken where all is as believed: again where it is not
+    for i, first in enumerate(found):
+        there = Deviation(**{first.name: first.size.value})
+        again = _Trial(replace(belief, deviation=there), problem, noise, weight)
+        found[i] = again.fitted(first.name, first.size.value) or first
+    found.sort(key=lambda suspect: suspect.misfit)
     return Explanation(misfit, tuple(found))
 
 
-class _Trial:
-    """Residuals in multiples of their noise, freed of what the bench's bands allow."""
+def _noise(plain: FloatArray, bins: int, code: float) -> FloatArray:
+    """Scatter of V_C1 and of V_C2 at firing about any smooth course, V."""
+    noise = np.empty(plain.size)
+    for part, least in (
+        (slice(0, bins), max(SYSTEMATIC * code, 1e-5)),
+        (slice(bins, plain.size), LEAST),
+    ):
+        found = irregularity(plain[part]) / 1.96
+        noise[part] = max(found, least) if np.isfinite(found) else least
+    return noise
 
-    def __init__(self, belief: Belief, problem: Residuals, code: float) -> None:
-        self._belief, self._problem = belief, problem
-        plain, bins = problem.under(belief.deviating(Deviation())), problem.bins
-        self._noise = np.empty(problem.size)
-        for part, least in (
-            (slice(0, bins), max(SYSTEMATIC * code, 1e-5)),
-            (slice(bins, problem.size), LEAST),
-        ):
-            found = irregularity(plain[part]) / 1.96
-            self._noise[part] = max(found, least) if np.isfinite(found) else least
-        self.plain = plain / self._noise
+
+def _levels(V_C1: Measured) -> float:
+    """So many independent values V_C1 has: bins at one code share what it is off by."""
+    _, bins = np.unique(np.round(V_C1.value / V_C1.resolution), return_counts=True)
+    return float(bins.sum() ** 2 / (bins**2).sum())
+
+
+class _Trial:
+    """Residuals over their noise, by weight, freed of what the bench's bands allow."""
+
+    def __init__(
+        self,
+        belief: Belief,
+        problem: Residuals,
+        noise: FloatArray,
+        weight: FloatArray,
+    ) -> None:
+        self._belief, self._problem, self._weight = belief, problem, weight
+        self._scale = weight / noise
+        self.plain = self._under(belief.driven)
         self._bands = [
             (cause, (self._under(driven) - self.plain) / PART)
             for cause, driven in belief.displaced()
         ]
+        bins = problem.bins
         if bins and problem.offset > 0:
             shifted = np.zeros(problem.size)
-            shifted[:bins] = problem.offset / self._noise[:bins]
+            shifted[:bins] = problem.offset * self._scale[:bins]
             self._bands.append(("offset", shifted))
 
     def _under(self, driven: DrivenCircuit) -> FloatArray:
-        return self._problem.under(driven) / self._noise
+        return self._problem.under(driven) * self._scale
 
     def freed(self, scaled: FloatArray, but: str = "") -> FloatArray:
-        """Residuals less what the bands explain best, all `but` one cause's."""
+        """Residuals less what the bands explain best, then how far each was used.
+
+        Args:
+            scaled: shape (size,).
+            but: the cause whose band may not be used.
+
+        Returns:
+            Shape (size + bands,): the parts of the 95 % bands used stand at the end, in
+            standard deviations, so that the sum of squares weighs one with the other.
+        """
         bands = [change for cause, change in self._bands if cause != but]
         if not bands:
             return scaled
-        bent, reduced = np.linalg.qr(np.column_stack(bands))
-        taken = lsq_linear(reduced, -bent.T @ scaled, (-BAND, BAND)).x
-        return np.asarray(scaled + bent @ (reduced @ taken))
+        free = np.column_stack(bands)
+        prior = 1.96**2 * np.eye(len(bands))
+        taken = -np.linalg.solve(free.T @ free + prior, free.T @ scaled)
+        return np.concatenate([scaled + free @ taken, 1.96 * taken])
 
-    def misfit(self, scaled: FloatArray) -> float:
-        """Root mean square of each kind of evidence, the larger."""
-        bins = self._problem.bins
+    def misfit(self, freed: FloatArray) -> float:
+        """Root mean square of each kind of evidence, or bands overused: the largest."""
+        bins, size = self._problem.bins, self._problem.size
+        scaled, taken = freed[:size] / self._weight, np.abs(freed[size:]) / 1.96
         parts = [part for part in (scaled[:bins], scaled[bins:]) if part.size]
-        return max(float(np.sqrt(np.mean(part**2))) for part in parts)
+        found = [float(np.sqrt(np.mean(part**2))) for part in parts]
+        overused = float(np.max(taken, initial=0.0)) - 1
+        return max(*found, EXPLAINED * overused / (BAND - 1))
 
-    def fitted(self, name: str) -> Suspect | None:
-        """The suspect's best size; None where the model cannot follow it."""
+    def _told(self, slope: FloatArray, but: str) -> float:
+        """What the data tell of a size, 1/step^2, each band's cause left free in it."""
+        told = float(slope @ slope)
+        bands = [change for cause, change in self._bands if cause != but]
+        if bands:
+            free = np.column_stack(bands)
+            shared = free.T @ slope
+            prior = 1.96**2 * np.eye(len(bands))
+            told -= float(shared @ np.linalg.solve(free.T @ free + prior, shared))
+        return max(told, 1e-300)
+
+    def fitted(self, name: str, at: float = 0.0) -> Suspect | None:
+        """The suspect's best size, sought from `at`, where the belief is already.
+
+        None where the model cannot follow it.
+        """
         step, own = SUSPECTS[name], OWN.get(name, name)
 
         def residual(x: float) -> FloatArray:
@@ -220,12 +276,9 @@ class _Trial:
             slope = (residual(x + DIFFERENCE) - residual(x)) / DIFFERENCE
         except TactileLabError:
             return None
-        misfit, square = self.misfit(left), float(slope @ slope) or math.inf
-        error = step * max(misfit, 1.0) / math.sqrt(square)
-        size = Estimate.of(step * x, error, left.size - 1)
-        # what the estimate would be off by were each band's edge the truth
-        shifts = (slope @ band / square for cause, band in self._bands if cause != own)
-        size = size.widened(*(step * abs(float(shift)) for shift in shifts))
+        misfit = self.misfit(left)
+        error = step * max(misfit, 1.0) / math.sqrt(self._told(slope, own))
+        size = Estimate.of(at + step * x, error, self._problem.size - 1)
         return Suspect(name, size, misfit)
 
 

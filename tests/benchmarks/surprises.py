@@ -72,7 +72,7 @@ def row(seed: int) -> dict[str, object]:
     explanation = beside.explanation
     cause = None if explanation is None else explanation.cause
     size = None if cause is None else cause.size
-    said = "nothing to explain" if explanation is None else "cannot tell"
+    said = "not noticed" if explanation is None else "cannot tell"
     return {
         "seed": seed,
         "true": " and ".join(beyond) or "none",
@@ -99,8 +99,8 @@ def page(rows: list[dict[str, str]]) -> str:
         "suspects lies beyond, by a size drawn evenly in its logarithm. Three pulses",
         "of 120, 160 and 190 mN, 1 s each.",
         "",
-        "| what differs | size drawn | seeds | named | cannot tell | nothing to explain "
-        "| another named | size within its 95 % interval |",
+        "| what differs | size drawn | seeds | named | cannot tell | not noticed | "
+        "another named | size within its 95 % interval |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name in (*SPANS, None):
@@ -133,7 +133,7 @@ def page(rows: list[dict[str, str]]) -> str:
     return "\n".join(lines)
 
 
-SILENT = ("cannot tell", "nothing to explain")
+SILENT = ("cannot tell", "not noticed")
 
 
 def _span(least: float, most: float, unit: str) -> str:
