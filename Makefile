@@ -47,6 +47,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/tactile-lab validate honesty --scenes 1000 --out docs
 	$(BIN)/tactile-lab validate stability --out docs
 	$(BIN)/python docs/make_fit_recovery.py
+	$(BIN)/python docs/make_bench_coverage.py
 	if command -v ngspice >/dev/null; then $(BIN)/python docs/make_saturation.py; fi
 	$(BIN)/python docs/make_paper.py
 	$(BIN)/python tests/benchmarks/surprises.py --out docs/surprise-figures.md

@@ -152,7 +152,7 @@ def _changes(
             float(changed[i]) + there * amplitude.half,
         )  # fmt: skip
         shifts = (abs(float(other[i] - changed[i])) for _, other in moved)
-        changes.append(known.widened(*shifts, 2 * noise))
+        changes.append(known.widened(*shifts, 2 * noise, steps))
     return tau, changes
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -26,8 +26,9 @@ PushForce = Annotated[float, Unit("N", above=0.0)]
 
 POINTS = 24
 """Straight pieces a cycle is drawn with: within 0.9 % of a sine."""
-RAMP = 0.25
-"""Time from one frequency's last force to the next one's first, s."""
+RAMP = 0.1
+"""Time from one frequency's last force to the next one's first, s; less where a sine is
+so fast that its film would not be settled then."""
 WITHIN = 16
 """Points in a bin at which the force is averaged, as the scope averages V_C1."""
 
@@ -78,17 +79,20 @@ class SineSweep(ForceProtocol):
 
     def presentations(self) -> Trials:
         """One trial per frequency."""
-        last, lead = 0.0, self._settling
+        last, lead = _Settled(0.0, 0.0), self._settling
         for frequency in self.frequencies():
-            force = self._sine(frequency, last, lead)
+            ramp = min(RAMP, 1 / (4 * math.pi * frequency))
+            first, after = last.onto(frequency, ramp, self._leak)
+            force = self._sine(frequency, first, last.force, lead, ramp)
             yield Trial(
                 force=force,
                 label=f"{frequency:.3g} Hz",
-                hold=(lead + RAMP, force.end),
+                hold=(lead + ramp, force.end),
             )
-            last, lead = float(force.value[-1]), 0.0
+            last, lead = after, 0.0
+        end = self.bias + self.amplitude * last.force
         yield Trial(
-            force=Waveform.through([(0.0, last), (RAMP, 0.0), (2 * RAMP, 0.0)]),
+            force=Waveform.through([(0.0, end), (0.25, 0.0), (0.5, 0.0)]),
             label="back to rest",
         )
 
@@ -96,24 +100,24 @@ class SineSweep(ForceProtocol):
     def _settling(self) -> float:
         """Time before the first sine, s: what a bias leaves of V_P dies away."""
         if self.settle is not None:
-            return RAMP + self.settle
-        return RAMP + 6 * self._leak if self.bias else 0.0
+            return 0.25 + self.settle
+        return 0.25 + 6 * self._leak if self.bias else 0.0
 
     @property
     def _leak(self) -> float:
         return self.tau or TABLE_1_TAU
 
-    def _sine(self, frequency: float, last: float, lead: float) -> Waveform:
-        points = [(0.0, last)]
+    def _sine(
+        self, frequency: float, first: float, last: float, lead: float, ramp: float
+    ) -> Waveform:
+        """From the force `last` of the amplitude onto the sine at phase `first`."""
+        points = [(0.0, self.bias + self.amplitude * last)]
         if lead > 0:
-            points += [(RAMP, self.bias), (lead, self.bias)]
-        # V_P = k_F F right after a quick change from rest, and in the settled answer
-        # k_F F i w tau/(1 + i w tau), where F is at this phase
-        first = math.atan(2 * math.pi * frequency * self._leak) / (2 * math.pi)
+            points = [(0.0, 0.0), (0.25, self.bias), (lead, self.bias)]
         phase = np.arange(POINTS * self.cycles + 1) / POINTS
-        values = self.bias + self.amplitude * np.sin(2 * np.pi * (first + phase))
+        values = self.bias + self.amplitude * np.sin(2 * np.pi * phase + first)
         values[-1] = values[0]
-        times = lead + RAMP + phase / frequency
+        times = lead + ramp + phase / frequency
         points += zip(times.tolist(), values.tolist(), strict=True)
         return Waveform.through(points)
 
@@ -208,10 +212,35 @@ class SineSweep(ForceProtocol):
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Settled:
+    """Where a sine has ended: its force, and V_P/k_F, as parts of the amplitude."""
+
+    force: float
+    film: float
+
+    def onto(self, frequency: float, ramp: float, tau: float) -> tuple[float, _Settled]:
+        """Phase at which to begin after a `ramp`, s, rad, and where that sine ends.
+
+        The film passes on i w tau/(1 + i w tau) = cos(a) exp(i a) of a sine: at its
+        phase p it is settled where V_P/k_F is cos(a) sin(p + a), Eq. (7).
+        """
+        lead = math.atan(1 / (2 * math.pi * frequency * tau))
+        left = math.exp(-ramp / tau)
+        passed = tau / ramp * (1 - left)
+        wanted = passed * self.force - self.film * left
+        one, two = passed - math.cos(lead) ** 2, math.cos(lead) * math.sin(lead)
+        reach = min(1.0, max(-1.0, wanted / math.hypot(one, two)))
+        first = math.atan2(two, one) + math.asin(reach)
+        film = math.cos(lead) * math.sin(first + lead)
+        return first, _Settled(math.sin(first), film)
+
+
 def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
     """Gain of V_C1 over the force, V/N, for each trial named by a frequency."""
     trace, found = run.trace("V_C1", model=model), []
     steps = 0.0 if model else run.step_bias("V_C1")
+    leak = None if run.circuit is None else run.circuit.tau
     for trial in run.results:
         if trace is None or trial.held is None or run.left_range("V_C1", *trial.held):
             continue
@@ -220,7 +249,7 @@ def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
         force = run.force.at(time) if model else _averaged(run.force, time)
         try:
             frequency = parse(trial.label, "Hz")
-            answer = gain(time, force, trace.mean[inside], frequency, steps)
+            answer = gain(time, force, trace.mean[inside], frequency, steps, leak)
         except (QuantityError, NotIdentifiableError):
             continue  # another trial, or one that was cut short
         found.append(answer if model else _known(run, trial, answer))

@@ -33,6 +33,7 @@ def step_bias(mean: ArrayLike, code: float, samples: float) -> float:
     # of second differences, so that a slope is no noise; the median, so that no edge is
     apart = np.abs(bins[2:] - 2 * bins[1:-1] + bins[:-2]) / math.sqrt(6)
     scatter = float(np.median(apart)) / 0.6745
-    noise = samples * scatter**2 - code**2 / 12
+    # noise that smooths little makes the steps' own scatter less or more than this
+    noise = 0.8 * (samples * scatter**2 - code**2 / 12)
     left = math.exp(-2 * math.pi**2 * max(noise, 0.0) / code**2)
     return min(code / 2, code / math.pi * left) if noise > 0 else code / 2

@@ -38,6 +38,7 @@ def gain(
     answer: ArrayLike,
     frequency: float,
     step_bias: float = 0.0,
+    leak: float | None = None,
 ) -> Gain:
     """Gain and phase at `frequency`, the answer's harmonics and slow drift allowed for.
 
@@ -50,6 +51,7 @@ def gain(
             unit (`tactile_lab.analysis.converter`). They move a sine's amplitude A by
             2/pi b sqrt(step/A), b = step/pi where no noise smooths them (the first of a
             sum of Bessel functions), and its phase not at all.
+        leak: time constant with which a transient dies away, s; fitted if given.
 
     Intervals hold the scatter of the answer, correlated as it is, and the steps.
 
@@ -64,7 +66,10 @@ def gain(
     phase = 2 * np.pi * frequency * t
     slow = (t - t.mean()) / (t[-1] - t[0])
     waves = [f(n * phase) for n in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
-    design = np.column_stack([*waves, np.ones_like(t), slow, slow**2])
+    drift = [np.ones_like(t), slow, slow**2]
+    if leak is not None:
+        drift.append(np.exp((t[0] - t) / leak))
+    design = np.column_stack([*waves, *drift])
     inverse = np.linalg.pinv(design)
     into, out = inverse @ np.asarray(cause), inverse @ np.asarray(answer)
     given, got = complex(into[0], into[1]), complex(out[0], out[1])

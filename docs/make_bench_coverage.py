@@ -1,0 +1,354 @@
+"""Write docs/bench-coverage.md: how often an interval holds the truth on a bench.
+
+Each repeat is a whole run on the simulated bench, drivers, converter, clocks, lags and
+noise included. What bench and sensor file have wrong is drawn for each seed from the
+uncertainty that they state, so that the believed circuit is never the true one.
+
+Run by `make reports`, or alone: ``.venv/bin/python docs/make_bench_coverage.py``; with
+a number, that many repeats of each case instead of 1000, then names of cases. It goes
+on where it was stopped; ``runs/bench-coverage.jsonl`` keeps what was done at the same
+commit. ``--table`` only writes the page from it.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.deviation import Deviation, DrivenCircuit
+from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import TactileLabError
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.report.findings import find
+from tactile_lab.report.from_run import read
+from tactile_lab.report.identified import identify_run
+from tactile_lab.report.run_data import RunData
+from tactile_lab.scene.load import load
+from tactile_lab.waveform import Waveform
+
+DOCS = Path(__file__).parent
+KEPT = DOCS.parent / "runs" / "bench-coverage.jsonl"
+REPEATS = 1000
+Z = 1.959963984540054
+GEOMETRY = 0.04
+"""Half of the 95 % band of the force that the bench file states here."""
+Told = Iterator[tuple[str, float, float, float, float]]
+"""(name, value, low, high, truth)"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene, what is drawn for it, and what it tells with an interval.
+
+    Attributes:
+        scene: name of a shipped scene.
+        changes: to it.
+        told: numbers with interval and truth, of a run.
+        code: of V_C1, V; the channel's offset is drawn within one.
+    """
+
+    scene: str
+    changes: tuple[str, ...]
+    told: Callable[[RunData, dict[str, Any], DrivenCircuit], Told]
+    code: float = 4 / 254
+
+
+def drawn(case: Case, seed: int) -> tuple[list[str], Deviation]:
+    """What is wrong in the believed bench with that seed, as changes to the scene."""
+    rng = np.random.default_rng([seed, 2026])
+    deviation = Deviation(
+        input_bias=rng.normal(0, 20e-12 / Z),
+        offset=rng.normal(0, case.code / Z),
+        V_GS=rng.normal(0, 3e-3),
+        force=rng.normal(0, GEOMETRY / Z),
+        lag=rng.normal(0, 1e-3 / Z),
+    )
+    units = {"input_bias": "A", "offset": "V", "V_GS": "V", "lag": "s"}
+    changes = [
+        f'simulated.deviation.{name}="{getattr(deviation, name)!r} {unit}"'
+        for name, unit in units.items()
+    ]
+    return [
+        *changes,
+        f"simulated.deviation.force={deviation.force!r}",
+        f"simulated.clock_error={rng.normal(0, 20e-6)!r}",
+        f"simulated.seed={seed}",
+        f"bench.magnet.geometry_uncertainty={GEOMETRY}",
+    ], deviation
+
+
+def of(name: str, found: dict[str, Any] | None, truth: float) -> Told:
+    """One estimate as results.json has it."""
+    if found is not None:
+        yield name, found["value"], found["low_95"], found["high_95"], truth
+
+
+def around(name: str, value: float | None, half: float | None, truth: float) -> Told:
+    """One number with the half-width of its band."""
+    if value is not None and half is not None:
+        yield name, value, value - half, value + half, truth
+
+
+def hold(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+    """Tau and V_GS by the circuit's own law."""
+    yield from of("tau", values.get("tau_s"), true.circuit.tau)
+    yield from of("V_GS", values.get("V_GS_V"), true.circuit.V_GS)
+
+
+def bipolar(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+    """Tau, changes of I_DS and the same per force."""
+    yield from of("tau", values.get("tau_s"), true.circuit.tau)
+    made = simulate(true.circuit, true.force, keep=("V_P",), until=run.duration)
+    for change in values.get("I_DS_changes", ()):
+        trial = next(t for t in run.results if t.label == change["label"])
+        arrived = run.applied_edge(trial)
+        later = 0.1  # the force is wholly there; V_P is followed back to `arrived`
+        V_P = made.sample("V_P", np.array([trial.start - 0.1, arrived + later]))
+        V_P[1] *= np.exp(later / true.circuit.tau)
+        before, after = (at_rest(true.circuit, float(v)) for v in V_P)
+        sign = "push" if change["level_N"] > 0 else "pull"
+        yield from around(
+            f"I_DS change, {sign}", change["change_A"],
+            change["change_uncertainty_A_95"], after - before,
+        )  # fmt: skip
+        yield from around(
+            f"I_DS per force, {sign}", change["sensitivity_A_per_N"],
+            change["sensitivity_uncertainty_A_per_N_95"],
+            (after - before) / (change["level_N"] * force_scale(run, true)),
+        )  # fmt: skip
+
+
+def at_rest(circuit: Circuit, V_P: float) -> float:
+    """I_DS where node A has followed V_P, A."""
+    from tactile_lab.model.equations import I_DS, rest_V_C1
+
+    return float(I_DS(circuit, V_P, rest_V_C1(circuit, V_P)))
+
+
+def force_scale(run: RunData, true: DrivenCircuit) -> float:
+    """True over believed force."""
+    at = run.force.time[int(np.argmax(np.abs(run.force.value)))] + 1e-3
+    return float(true.force.at(at) / run.force.at(at))
+
+
+def sine_sweep(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+    """Gain and phase of each frequency, the truth by a long sine."""
+    from tactile_lab.analysis.response import gain
+
+    scale = force_scale(run, true)
+    amplitude = run.protocol.amplitude * scale  # type: ignore[attr-defined]
+    for found in values.get("V_C1_over_force", ()):
+        f = found["frequency_Hz"]
+        cycles = max(4, int(60 * f) + 1)
+        phase = np.arange(cycles * 200 + 1) / 200
+        force = Waveform(phase / f, amplitude * np.sin(2 * np.pi * phase))
+        made = simulate(true.circuit, force, keep=("V_C1",))
+        last = np.linspace((cycles - 1) / f, cycles / f, 2001)
+        settled = gain(last, force.at(last), made.sample("V_C1", last), f)
+        name = f"{f:.3g} Hz"
+        yield from of(f"gain, {name}", found["gain_V_per_N"], settled.gain.value)
+        phases = found["phase_rad"]
+        turn = 2 * np.pi * round((phases["value"] - settled.phase.value) / (2 * np.pi))
+        yield from of(f"phase, {name}", phases, settled.phase.value + turn)
+
+
+def threshold(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+    """The critical force and the V_GS that explains it."""
+    yield from around(
+        "critical force",
+        values.get("critical_force_N"), values.get("critical_force_uncertainty_N_95"),
+        critical(run, true),
+    )  # fmt: skip
+    if "V_GS_low_V" in values:
+        low, high = values["V_GS_low_V"], values["V_GS_high_V"]
+        yield "V_GS", (low + high) / 2, low, high, true.circuit.V_GS
+
+
+def critical(run: RunData, true: DrivenCircuit) -> float:
+    """Least true force that fires, with ramp and hold as the coil gave them, N."""
+    trial = next(t for t in run.results if t.level)
+    start, end = trial.start, trial.start + trial.duration
+    full = true.force.at((start + end) / 2)
+    time, value = true.force.time, true.force.value / full
+    inside = (time > start) & (time < end)
+    shape = Waveform(
+        np.concatenate([[0.0], time[inside] - start]),
+        np.concatenate([[0.0], value[inside]]),
+    )
+    low, high = 0.05, 0.2
+    while high - low > 1e-6:
+        middle = (low + high) / 2
+        spikes = simulate(
+            true.circuit, shape.scaled(middle), keep=("spikes",), tolerance=1e-7
+        ).spike_times
+        low, high = (low, middle) if np.size(spikes) else (middle, high)
+    return high
+
+
+def identification(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+    """V_GS, tau and the input bias from V_C1 and spikes."""
+    names = ("V_GS", "tau", "I_bias")
+    for name, found in identify_run(run, names).estimates.items():
+        yield from of(name, found.to_dict(), getattr(true.circuit, name))
+
+
+CASES = {
+    "hold, 150 mN, 10 s": Case(
+        "hold_10s", ('record.signals=["V_K","spikes"]', 'protocol.rest="0.5 s"'), hold
+    ),
+    "hold, 180 mN, 3 s": Case(
+        "hold_10s",
+        (
+            'record.signals=["V_K","spikes"]',
+            'protocol.rest="0.5 s"',
+            'protocol.level="180 mN"',
+            'protocol.hold="3 s"',
+        ),
+        hold,
+    ),
+    "bipolar, ±50 and 100 mN": Case(
+        "bipolar", ('protocol.levels=["50 mN","-50 mN","100 mN"]',), bipolar
+    ),
+    "bipolar as shipped": Case("bipolar", (), bipolar, 10 / 254),
+    "sine_sweep, 0.05 and 0.4 Hz": Case(
+        "sine_sweep",
+        ("protocol.count=2", 'protocol.lowest="0.05 Hz"', 'protocol.highest="0.4 Hz"'),
+        sine_sweep,
+    ),
+    "threshold_search": Case(
+        "threshold_search", ('record.signals=["V_K","spikes"]',), threshold
+    ),
+    "identify, demo": Case(
+        "demo", ('record.signals=["V_C1","V_K","spikes"]',), identification
+    ),
+}
+
+
+def repeat(name: str, seed: int) -> dict[str, Any]:
+    """One run of a case: name, value, low, high and truth of each number it told."""
+    case = CASES[name]
+    changes, deviation = drawn(case, seed)
+    with tempfile.TemporaryDirectory() as scratch:
+        done = Execution(
+            load(case.scene, [*case.changes, *changes]), Path(scratch)
+        ).run()
+        run = read(done.folder)
+    believed = run.belief
+    assert believed is not None
+    true = believed.deviating(deviation)
+    told: list[tuple[str, float, float, float, float]] = []
+    refused = ""
+    try:
+        findings = find(replace(run, belief=None))
+        seen = replace(findings.run, belief=believed)
+        told = list(case.told(seen, findings.conclusion.plain, true))
+        refused = "" if told else "; ".join(findings.missing)
+    except TactileLabError as reason:
+        refused = str(reason)
+    return {"case": name, "seed": seed, "told": told, "refused": refused}
+
+
+def commit() -> str:
+    """Of the checkout."""
+    asked = ["git", "rev-parse", "--short", "HEAD"]
+    return subprocess.run(
+        asked, cwd=DOCS, capture_output=True, text=True, check=False
+    ).stdout.strip()
+
+
+def kept(version: str) -> list[dict[str, Any]]:
+    """What was done already at this commit."""
+    if not KEPT.exists():
+        return []
+    rows = (json.loads(line) for line in KEPT.read_text().splitlines())
+    return [row for row in rows if row["commit"] == version]
+
+
+def table(rows: list[dict[str, Any]], version: str) -> str:
+    """The page."""
+    counts: dict[tuple[str, str], list[tuple[bool, float]]] = defaultdict(list)
+    runs: dict[str, int] = defaultdict(int)
+    refused: dict[str, int] = defaultdict(int)
+    for row in rows:
+        runs[row["case"]] += 1
+        refused[row["case"]] += not row["told"]
+        for name, value, low, high, truth in row["told"]:
+            half = (high - low) / 2
+            error = (value - truth) / half if half else float("nan")
+            counts[row["case"], name].append((low <= truth <= high, error))
+    lines = []
+    for case in CASES:
+        for (of_case, name), seen in counts.items():
+            if of_case != case:
+                continue
+            inside = 100 * np.mean([hit for hit, _ in seen])
+            errors = np.array([error for _, error in seen])
+            lines.append(
+                f"| {case} | {name} | {len(seen)} | {inside:.1f} % | "
+                f"{np.mean(errors):+.2f} | {Z * np.std(errors):.2f} | {refused[case]} |"
+            )
+    today = datetime.date.today().isoformat()
+    body = "\n".join(lines)
+    return f"""# How often a 95 % interval holds the truth, as a bench measures it
+
+Written by `docs/make_bench_coverage.py` (part of `make reports`) at commit {version},
+{today}. Each repeat is a whole run on the simulated bench: drivers, serial timing,
+8 bit converter, noise, clocks and lags. For each seed the truth is drawn: input bias
+(±20 pA), offset of the channels (±1 code of V_C1), lag (±1 ms), force (±4 %, stated in
+the bench file), each 95 % normal, V_GS (3 mV standard deviation) and the scope's clock
+(20 ppm). An honest interval holds the truth in 93 to 97 % of the numbers.
+
+| run | number | n | holds the truth | mean error | spread | runs refused |
+|---|---|---|---|---|---|---|
+{body}
+
+Mean error and spread (1.96 standard deviations) are in units of the interval's
+half-width: 0 and 1 where the interval is neither biased nor too wide. A spread well
+below 1 belongs to an interval that holds a bound, such as an undecided step of a
+converter or of a search, rather than a scatter. "n" counts numbers: one run may tell
+several. "Refused" counts runs that told none of theirs.
+"""
+
+
+def main() -> None:
+    """Do what is not done yet, and write the page."""
+    words = [word for word in sys.argv[1:] if word != "--table"]
+    number = next((int(word) for word in words if word.isdigit()), REPEATS)
+    names = [n for n in CASES if any(word in n for word in words if not word.isdigit())]
+    version = commit()
+    if "--table" in sys.argv and KEPT.exists():
+        version = json.loads(KEPT.read_text().splitlines()[-1])["commit"]
+    done = {(row["case"], row["seed"]) for row in kept(version)}
+    KEPT.parent.mkdir(exist_ok=True)
+    began = time.monotonic()
+    wanted = [(n, seed) for seed in range(number) for n in names or CASES]
+    left = [pair for pair in wanted if pair not in done]
+    if "--table" in sys.argv:
+        left = []
+    for i, (name, seed) in enumerate(left):
+        row = repeat(name, seed) | {"commit": version}
+        with KEPT.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        if (i + 1) % 20 == 0:
+            rate = (time.monotonic() - began) / (i + 1)
+            says = f"{i + 1} of {len(left)}, {rate * (len(left) - i - 1) / 60:.0f} min"
+            print(f"{says} left", file=sys.stderr, flush=True)
+    page = table(kept(version), version)
+    (DOCS / "bench-coverage.md").write_text(page, encoding="utf-8")
+    print(page)
+
+
+if __name__ == "__main__":
+    main()
