@@ -126,36 +126,47 @@ def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
     inside = shunt.cut(began - reach, began + points.duration + reach)
     if inside.time.size < 3:
         return None
-    half = inside.time.size // 2
-    found = [_best(points, began, inside, shifts, part) for part in (
-        slice(None), slice(None, half), slice(half, None)
-    )]  # fmt: skip
-    (shift, unlike), first, last = found[0], found[1], found[2]
+    shift, unlike = _best(points, began, inside, shifts)
     latest = played.latest - zero + COIL_LAG
     edge = Edge(began + shift, played.earliest - zero, latest)
-    return SeenList(edge, unlike, last[0] - first[0])
+    return SeenList(edge, unlike, _longer(points, began + shift, inside))
+
+
+def _longer(points: CurrentList, began: float, seen: Trace) -> float:
+    """By how much the second half of a list came later than its first, s.
+
+    The halves have as much to show each; 0 where one of them has too little.
+    """
+    change = np.cumsum(np.abs(np.diff(seen.mean, prepend=seen.mean[:1])))
+    half = int(np.searchsorted(change, change[-1] / 2))
+    near = np.arange(-SEARCH, SEARCH, SHIFT)
+    found = []
+    for part in (seen[:half], seen[half:]):
+        if part.time.size < 3 or float(np.std(part.mean)) < SMALLEST:
+            return 0.0
+        shift, _ = _best(points, began, part, near)
+        if abs(shift) > SEARCH - 2 * SHIFT:
+            return 0.0  # it fits nowhere here, which says nothing of time
+        found.append(shift)
+    return found[1] - found[0]
 
 
 def _best(
-    points: CurrentList,
-    began: float,
-    seen: Trace,
-    shifts: NDArray[np.float64],
-    part: slice,
+    points: CurrentList, began: float, seen: Trace, shifts: NDArray[np.float64]
 ) -> tuple[float, float]:
     """The shift, s, with which the list is most like what was seen, and how unlike."""
-    time, mean = seen.time[part], seen.mean[part].astype(np.float64)
+    mean = seen.mean.astype(np.float64)
     variance = float(np.var(mean)) or 1.0
-    left = np.array([
-        np.var(points.mean(time - began - by, seen.width) - mean) for by in shifts
-    ])  # fmt: skip
+    unlike = [
+        np.var(points.mean(seen.time - began - by, seen.width) - mean) for by in shifts
+    ]
+    left = np.array(unlike)
     k = int(np.argmin(left))
+    off = 0.0
     if 0 < k < shifts.size - 1:
         before, at, after = left[k - 1 : k + 2]
         bend = before - 2 * at + after
         off = 0.5 * (before - after) / bend if bend > 0 else 0.0
-    else:
-        off = 0.0
     return float(shifts[k] + off * SHIFT), float(left[k]) / variance
 
 

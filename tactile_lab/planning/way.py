@@ -18,6 +18,7 @@ from tactile_lab.current_list import CurrentList, ListCapability
 from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.instruments.registry import BY_PERSON, coil_capability
+from tactile_lab.instruments.serial_dialect import MARGIN
 from tactile_lab.lag import Lag
 from tactile_lab.magnetics import Magnet
 from tactile_lab.planning.current import cut, limited, slewed, wanted_current
@@ -93,7 +94,10 @@ def _set_points(
     if asked is None:
         return Drive(played, why=why, warning=warning)
     starts = np.arange(0.0, wanted.end, interval)
-    steps = np.column_stack([starts, played.at(starts)])
+    # a value is of the time at which it is sent, and the source acts on it later
+    acts = starts + interval / MARGIN
+    steps = np.column_stack([acts, played.at(starts)])
+    steps = np.concatenate([[[0.0, before]], steps])
     new = np.abs(np.diff(steps[:, 1], prepend=np.inf)) > 0
     stairs = cut(Waveform.stairs(steps[new], wanted.end), wanted.end)
     given, _ = magnet.lagged_force(stairs, (before, before))

@@ -5,8 +5,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tactile_lab.acquisition.alignment import CLOCK_ERROR, Edge, align, find_edges
-from tactile_lab.acquisition.coil_thread import Applied
+from tactile_lab.acquisition.alignment import (
+    CLOCK_ERROR,
+    Edge,
+    align,
+    find_edges,
+    find_list,
+)
+from tactile_lab.acquisition.coil_thread import Applied, PlayedList
+from tactile_lab.current_list import CurrentList
 from tactile_lab.trace import Trace
 
 
@@ -101,3 +108,41 @@ def test_a_drifting_sample_clock_stays_within_the_stored_uncertainty(run_scene):
         assert segment["uncertainty"] > 0
         late = run.spikes["time"][-1] - truth.spikes["time"][-1]
         assert abs(late) <= segment["uncertainty"]
+
+
+def played_list(frequency, stretch=1.0):
+    """A list, and the shunt's bins under it, 14 ms after the host spoke."""
+    time = np.arange(0, 0.6, 1e-3)
+    over = 0.3 * np.sin(2 * np.pi * frequency * time) * (time > 0.1)
+    current = 0.5 * np.clip(time / 0.1, 0, 1) + over
+    current[-1] = 0.0
+    points = CurrentList(current, np.full(time.size, 1e-3))
+    axis = np.arange(0, 4.0, 1e-3)  # two seconds of rest follow
+    rng = np.random.default_rng(1)
+    seen = points.at((axis - 1.014) / stretch) + rng.normal(0, 0.01, axis.size)
+    codes = np.round(seen / 16e-3) * 16e-3
+    bins = Trace.bins(axis, codes, codes, codes, 1e-3)
+    return PlayedList(points, 101.0, 101.03), bins
+
+
+@pytest.mark.parametrize("frequency", [5, 20, 100, 150])
+def test_a_list_is_found_as_a_whole_however_often_it_repeats_itself(frequency):
+    played, bins = played_list(frequency)
+    seen = find_list(played, 100.0, bins)
+    assert seen.edge.sampled == pytest.approx(1.014, abs=1e-3)
+    assert seen.edge.earliest == 1.0 and seen.edge.latest > 1.03
+    assert seen.unlike < 0.02 and abs(seen.longer) < 1e-3
+
+
+def test_dwells_that_the_source_rounded_are_seen_in_its_second_half():
+    played, bins = played_list(20, stretch=1.015)
+    seen = find_list(played, 100.0, bins)
+    assert 3e-3 < seen.longer < 9e-3
+
+
+def test_a_list_that_moves_too_little_tells_nothing():
+    played, bins = played_list(20)
+    still = PlayedList(
+        CurrentList(played.points.currents / 30, played.points.dwells), 101.0, 101.03
+    )
+    assert find_list(still, 100.0, bins) is None

@@ -33,18 +33,29 @@ from tactile_lab.magnetics import Magnet
 
 OWNER = """
 import sys
+import numpy as np
 from drivers.coil.source import CoilSource
 from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
+from tactile_lab.current_list import CurrentList
 clock = RealClock()
-coil = CoilSource(coil_dialect("kepco-bop"), sys.argv[1], CoilLimits(), clock)
+limits = CoilLimits(list_slew=100.0)
+coil = CoilSource(coil_dialect("kepco-bop"), sys.argv[1], limits, clock)
 coil.open()
 coil.energise()
+listed = sys.argv[2] == "list"
+if listed:  # 20 Hz, 8 s long
+    wave = 0.1 * np.sin(2 * np.pi * np.arange(800) / 5)
+    coil.load_list(CurrentList(np.append(wave, 0.0), np.full(801, 0.01)))
+    coil.start_list()
 print("live", flush=True)
 k = 0
 while True:
-    coil.set_current(0.3 if k // 25 % 2 else -0.3)
+    if listed:
+        coil.read_current()
+    else:
+        coil.set_current(0.3 if k // 25 % 2 else -0.3)
     coil.beat()
     clock.sleep_until(clock.now() + max(0.01, coil.update_interval))
     k += 1
@@ -68,14 +79,19 @@ def served(
     return source, server, clock
 
 
-def times_to_off(kind: str, baud: int | None, how: int, times: int) -> list[float]:
-    """Seconds from signal `how` to output off, for each of `times` owners."""
+def times_to_off(
+    kind: str, baud: int | None, how: int, times: int, playing: str
+) -> list[float]:
+    """Seconds from signal `how` to output off, for each of `times` owners.
+
+    They are `playing` "set-points" or a "list".
+    """
     chance, found = random.Random(1), []
     with tempfile.TemporaryDirectory() as state:
         for _ in range(times):
             source, server, clock = served(kind, baud)
             owner = subprocess.Popen(
-                [sys.executable, "-c", OWNER, server.url],
+                [sys.executable, "-c", OWNER, server.url, playing],
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 env=os.environ | {"XDG_STATE_HOME": state},
@@ -90,6 +106,7 @@ def times_to_off(kind: str, baud: int | None, how: int, times: int) -> list[floa
             assert not source.output_on, "the output stayed on"
             off = [d for d in source.changes if d.what == "output"][-1]
             found.append(off.time - since)
+            assert not source.list.playing, "the list plays on"
             logged(Path(state), len(found))
             owner.kill()
             owner.wait()
@@ -142,21 +159,26 @@ def main() -> None:
         f"{provenance()}, load {os.getloadavg()[0]:.1f}. Made by "
         f"`tests/benchmarks/serial_bench.py --kills {chosen.kills}`.",
         "",
-        "| owner's end | wire | kills | median to off, ms | worst, ms |",
-        "|---|---|---|---|---|",
+        "| owner's end | playing | wire | kills | median to off, ms | worst, ms |",
+        "|---|---|---|---|---|---|",
     ]
     few = max(3, chosen.kills // 5)
-    for name, how, kind, baud, times in (
-        ("SIGKILL", signal.SIGKILL, "pty", None, chosen.kills),
-        ("SIGKILL", signal.SIGKILL, "tcp", None, few),
-        ("SIGKILL", signal.SIGKILL, "pty", 9600, few),
-        ("SIGSTOP (hangs)", signal.SIGSTOP, "pty", None, few),
+    kill, hang = ("SIGKILL", signal.SIGKILL), ("SIGSTOP (hangs)", signal.SIGSTOP)
+    for (name, how), playing, kind, baud, times in (
+        (kill, "set-points", "pty", None, chosen.kills),
+        (kill, "list", "pty", None, chosen.kills),
+        (kill, "set-points", "tcp", None, few),
+        (kill, "list", "tcp", None, few),
+        (kill, "set-points", "pty", 9600, few),
+        (kill, "list", "pty", 9600, few),
+        (hang, "set-points", "pty", None, few),
+        (hang, "list", "pty", None, few),
     ):
-        found = times_to_off(kind, baud, how, times)
+        found = times_to_off(kind, baud, how, times, playing)
         wire = f"{kind}, {baud} baud" if baud else f"{kind}, unpaced"
         lines.append(
-            f"| {name} | {wire} | {times} | {1e3 * statistics.median(found):.0f} | "
-            f"{1e3 * max(found):.0f} |"
+            f"| {name} | {playing} | {wire} | {times} | "
+            f"{1e3 * statistics.median(found):.0f} | {1e3 * max(found):.0f} |"
         )
     lines += [
         "",

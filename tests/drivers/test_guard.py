@@ -24,20 +24,27 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals"
 
 OWNER = """
 import sys, time
+import numpy as np
 from drivers.coil import guard
 from drivers.coil.source import CoilSource
 from patient import patient
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
+from tactile_lab.current_list import CurrentList
 guard.SILENCE = float(sys.argv[4])
 clock = RealClock()
 coil = CoilSource(patient("kepco-bop"), sys.argv[1], CoilLimits(), clock)
 coil.open()
 coil.energise()
+listed = sys.argv[3] == "list"
+if listed:
+    coil.load_list(CurrentList(np.array([0.3, 0.2] * 50 + [0.0]), np.full(101, 5.0)))
+    coil.start_list()
 print("live", flush=True)
 end = clock.now() + float(sys.argv[2])
 while clock.now() < end:
-    coil.set_current(0.3)
+    if not listed:
+        coil.set_current(0.3)
     coil.beat()
     clock.sleep_until(clock.now() + 0.02)
 if sys.argv[3] == "die":
@@ -129,6 +136,26 @@ def test_off_after_the_owner_is_killed(served, owner, tmp_path):
     wait_until_off(source)
     assert source.setpoint == 0.0
     assert "the owner died" in log_of(tmp_path)
+
+
+def test_a_list_ends_with_its_owner(served, owner, tmp_path):
+    """It would play for eight minutes more."""
+    source, _ = served
+    process = owner(how="list")
+    assert source.list.playing
+    process.kill()
+    wait_until_off(source)
+    assert not source.list.playing and source.setpoint == 0.0
+    assert "output verified off" in log_of(tmp_path)
+
+
+def test_a_list_ends_with_an_owner_that_hangs(served, owner, tmp_path):
+    source, _ = served
+    process = owner(how="list", silence=SILENCE)
+    process.send_signal(signal.SIGSTOP)
+    wait_until_off(source)
+    assert not source.list.playing and source.setpoint == 0.0
+    assert "silent" in log_of(tmp_path)
 
 
 def test_off_though_a_person_took_the_source_to_its_front_panel(

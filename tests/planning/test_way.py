@@ -19,16 +19,16 @@ def ways(*overrides, scene="demo"):
 def test_set_points_where_the_protocol_bears_their_stairs():
     (used,) = ways()
     assert used.way == "set-points"
-    # one step of the ramp: 200 mN in 0.25 s, once each 45 ms
-    assert used.error == pytest.approx(36e-3, rel=0.05)
-    assert used.part == pytest.approx(0.18, rel=0.05)
+    # 0.8 N/s for one interval of 45 ms, 30 ms until the source acts, 4 ms of lags
+    assert used.error == pytest.approx(0.8 * 80e-3, rel=0.1)
+    assert used.part == pytest.approx(used.error / 0.2)
 
 
 def test_a_list_where_the_force_must_be_nearer():
     (used,) = ways("coil.accuracy=0.02")
     assert used.way == "list" and used.part < 0.006
     assert used.load > 1.0
-    assert ways("coil.accuracy=0.3")[0].way == "set-points"
+    assert ways("coil.accuracy=0.4")[0].way == "set-points"
 
 
 def test_the_plan_says_so_and_counts_the_time_to_load():
