@@ -71,6 +71,20 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="What a manual teslameter showed at each hold, one a line, mT or with unit.",
 )
+@click.option(
+    "--sweep",
+    "sweeps",
+    multiple=True,
+    metavar="KEY=FROM:TO:STEP",
+    help="Run it at each value, as a study: --sweep 'protocol.hold=1 s:3 s:1 s'.",
+)
+@click.option(
+    "--repeat",
+    type=click.IntRange(min=1),
+    default=1,
+    metavar="N",
+    help="Run it N times at each value, as a study.",
+)
 @click.option("--no-report", is_flag=True, help="Leave out figure and report.")
 @json_option
 def command(
@@ -84,6 +98,8 @@ def command(
     transcripts: Path | None,
     again: Path | None,
     field: Path | None,
+    sweeps: tuple[str, ...],
+    repeat: int,
     no_report: bool,
     as_json: bool,
 ) -> None:
@@ -100,6 +116,17 @@ def command(
         if temperature is not None:
             overrides = (*overrides, f"conditions.temperature={temperature}")
         loaded = _scene(scene, overrides, bench, again)
+        if sweeps or repeat > 1:
+            given = {
+                "--realtime": realtime,
+                "--note": notes,
+                "--transcript": transcripts,
+                "--again": again,
+                "--field": field,
+            }
+            _refuse_with_sweep([name for name, value in given.items() if value])
+            _sweep(loaded, sweeps, repeat, out, as_json=as_json)
+            return
         narrator, person = Narrator(loaded.name), somebody()
         execution = Execution(
             loaded,
@@ -143,6 +170,26 @@ def command(
     if not done.off.verified:
         fail(done.off.text, done.exit_code)
     raise click.exceptions.Exit(done.exit_code)
+
+
+def _refuse_with_sweep(options: list[str]) -> None:
+    from tactile_lab.errors import SceneError
+
+    if options:
+        raise SceneError(
+            f"{' and '.join(options)} cannot go with --sweep or --repeat: that is a "
+            "study (`tactile-lab study --help`). Leave it out, or run once."
+        )
+
+
+def _sweep(
+    scene: Scene, sweeps: tuple[str, ...], repeat: int, out: Path, *, as_json: bool
+) -> None:
+    """Run `scene` at each value, `repeat` times, with its runs kept below `out`."""
+    from tactile_lab.commands.study import carry_out_attended
+    from tactile_lab.studies.study import short
+
+    carry_out_attended(short(scene, sweeps, repeat), out, as_json=as_json)
 
 
 def record(bench: Bench, folder: Path) -> None:

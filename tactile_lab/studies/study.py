@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,10 +15,11 @@ from tactile_lab.complaint import validated
 from tactile_lab.errors import SceneError, choices, nearest
 from tactile_lab.plugins import study_names, study_path
 from tactile_lab.scene.load import load
+from tactile_lab.scene.overrides import from_text
 from tactile_lab.scene.scene import Scene
-from tactile_lab.studies.axes import axis
+from tactile_lab.studies.axes import axis, changed
 from tactile_lab.studies.design import Design, Method, checked
-from tactile_lab.studies.kept import NAMED, Kept, kept
+from tactile_lab.studies.kept import Kept, kept
 from tactile_lab.table import SceneTable
 
 On = Literal["model", "simulated", "bench"]
@@ -220,8 +221,6 @@ def _scene(table: StudyFile, folder: Path) -> Scene:
 
 def _check(study: Study, origin: str) -> None:
     """Refuse keys and requirements that no point could use."""
-    from tactile_lab.studies.axes import changed
-
     names = [one.name for one in study.kept]
     for name in study.require:
         if name not in names:
@@ -243,9 +242,7 @@ def _tuples(data: Any) -> Any:
     return data
 
 
-def short(
-    scene: Scene, sweeps: tuple[str, ...], repeat: int, name: str | None = None
-) -> Study:
+def short(scene: Scene, sweeps: tuple[str, ...], repeat: int) -> Study:
     """The study that ``run --sweep KEY=VALUES --repeat N`` asks for.
 
     Raises:
@@ -259,10 +256,11 @@ def short(
                 f'--sweep "{text}": write KEY=FROM:TO:STEP, such as '
                 'protocol.hold="1 s:3 s:0.5 s", or KEY=VALUE,VALUE.'
             )
-        listed = values if values.count(":") == 2 else values.split(",")
+        ranged = values.count(":") == 2
+        listed = values if ranged else [from_text(v.strip()) for v in values.split(",")]
         axes.append(axis(key.strip(), {"values": listed}, scene))
     study = Study(
-        name=name or f"{scene.name}_sweep",
+        name=f"{scene.name}_sweep",
         title=f"{scene.name}: {', '.join(one.key for one in axes) or 'repeats'}",
         scene=scene,
         on="simulated" if scene.bench.simulated else "bench",
@@ -274,11 +272,3 @@ def short(
     )
     _check(study, "--sweep")
     return study
-
-
-def with_design(study: Study, design: Design) -> Study:
-    """The same study of other points."""
-    return replace(study, design=checked(design))
-
-
-__all__ = ["NAMED", "Study", "load_study", "short", "with_design"]
