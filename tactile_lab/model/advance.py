@@ -28,15 +28,18 @@ class Outputs:
         end: end of the slice, s; the state there is right-continuous.
         spike_times: shape (n,), absolute, s; None if not kept.
         run_time: wall time spent, s.
-        stages: evaluations of each stage in this slice.
     """
 
     start: float
     end: float
     spike_times: FloatArray | None
     run_time: float
-    stages: dict[str, int]
     solution: Solution
+
+    @property
+    def stages(self) -> dict[str, int]:
+        """Evaluations of each stage in this slice."""
+        return self.solution.stages
 
     def sample(self, signal: str, times: FloatArray) -> FloatArray:
         """Values of `signal` at absolute `times` in [start, end], right-continuous.
@@ -93,6 +96,5 @@ def advance(
         end=until,
         spike_times=solution.spike_times if "spikes" in need.signals else None,
         run_time=wall.perf_counter() - started,
-        stages=solution.stages,
         solution=solution,
     )

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.ellipse import E_11, E_22, transform, widen
 from tactile_lab.model.integrator import (
@@ -27,6 +27,7 @@ from tactile_lab.model.kernel import (
     DONE,
     EXPANSIONS,
     FAST,
+    FORCE,
     ITERATIONS,
     NOT_FINITE,
     PIECE_ROW,
@@ -37,15 +38,19 @@ from tactile_lab.model.kernel import (
     ROWS_2,
     SEGMENT_ROW,
     SEGMENTS,
+    SHARE,
     SHORTEST_SEGMENT,
     STEP_ROW,
     STEPS,
+    STRONG,
     STUCK,
     V_P,
     V_P_HIGHEST,
     Y_LARGEST_ERROR,
     Y,
+    largest_of,
     more_rows,
+    points_between,
 )
 from tactile_lab.model.node_a import (
     DIVIDER,
@@ -86,7 +91,7 @@ from tactile_lab.model.transistor import (
     TO_C2,
     reach,
 )
-from tactile_lab.model.truncation import carried, missing, unseen
+from tactile_lab.model.truncation import carried, longer, missing, unseen
 
 
 @inner
@@ -106,8 +111,11 @@ def restart(
 def _build(stamp: int) -> Callable[..., Any]:
     @entry
     def run(
-        time: FloatArray,
-        force: FloatArray,
+        wave_time: FloatArray,
+        wave: FloatArray,
+        start: float,
+        force_before: float,
+        until: float,
         k_F: float,
         par: FloatArray,
         node: FloatArray,
@@ -122,6 +130,10 @@ def _build(stamp: int) -> Callable[..., Any]:
     ) -> Any:
         _ = stamp
         status = DONE
+        time, force = points_between(wave_time, wave, start, force_before, until)
+        node[FORCE] = force[-1]
+        if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
+            status = STRONG
         seg_rows = np.empty((8, SEGMENT_ROW))
         step_rows = np.empty((16, STEP_ROW))
         piece_rows = np.empty((16, PIECE_ROW))
@@ -136,7 +148,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         part = np.empty(ORDER + 1)
         d = np.empty(ORDER + 1)
         after_reset = 0.0
-        for k in range(time.size - 1):
+        for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
                 node[V_P] += k_F * (force[k + 1] - force[k])
@@ -190,9 +202,11 @@ def _build(stamp: int) -> Callable[..., Any]:
                     status = STUCK
                     break
                 limit = max(above, v - y)
-                done = collocate_pair(
-                    s, h, y, v, held, V0, p, low, high, limit, par, W, f, matrix, right
-                )
+                wanted = max(SHARE * tolerance, 6e-16 * max(abs(y), abs(v)))
+                done, unsolved = collocate_pair(
+                    s, h, y, v, held, V0, p, low, high, limit, wanted, par, W, f,
+                    matrix, right,
+                )  # fmt: skip
                 if done < 0:
                     h *= 0.2
                     to_spike = False
@@ -202,28 +216,25 @@ def _build(stamp: int) -> Callable[..., Any]:
                 series_of(y, W, 0, a)
                 series_of(v, W, ORDER, b)
                 y1, v1 = y + W[ORDER - 1], v + W[2 * ORDER - 1]
-                left_1, left_2 = missing(a), missing(b)
+                big_1, big_2 = max(abs(y), abs(y1)), max(abs(v), abs(v1))
+                left_1, left_2 = missing(a, big_1), missing(b, big_2)
                 flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
                 layer_1 = unseen(f[TO_A], -f[A_BY_1], h, left_1, a)
                 layer_2 = 0.0
                 if not held:
                     layer_2 = unseen(f[TO_C2], -f[C2_BY_2], h, left_2, b)
-                big_1, big_2 = max(abs(y), abs(y1)), max(abs(v), abs(v1))
-                wanted = max(1e-3 * tolerance, 6e-16 * max(big_1, big_2))
-                tail = max(
-                    abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]), layer_1,
-                    abs(b[ORDER]), 0.1 * abs(b[ORDER - 1]), layer_2,
-                )  # fmt: skip
-                growth = 0.85 * (wanted / max(tail, 1e-40)) ** (1.0 / ORDER)
-                if tail > wanted:
-                    h *= max(0.1, growth)
+                growth = min(
+                    longer(a, big_1, wanted, 0.0), longer(b, big_2, wanted, 0.0)
+                )
+                if max(left_1 + layer_1, left_2 + layer_2) > 3.0 * wanted:
+                    h *= min(max(0.1, growth), 0.5)
                     to_spike = False
                     counts[REJECTED] += 1
                     continue
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, y1))
-                floor_1 = 5e-16 * (big_1 + 12.0 * depth)
-                floor_2 = 1e-15 * (big_2 + abs(par[V_FIRE]))
+                floor_1 = 5e-16 * (big_1 + 12.0 * depth) + unsolved
+                floor_2 = 1e-15 * (big_2 + abs(par[V_FIRE])) + unsolved
                 error_2 = left_2 + layer_2 + floor_2
                 if not held and not to_spike:
                     S[SEARCHES] += 1.0
@@ -277,9 +288,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                         piece_rows[n, 6 + i] = 0.0
                     counts[ROWS_2] += 1
                 y, v = y1, v1
-                h_next = h * min(
-                    max(growth, 0.2), 5.0 if tail > 1e-3 * wanted else 100.0
-                )
+                h_next = h * min(max(growth, 0.2), 30.0)
                 if fresh and not held and not to_spike:
                     fresh, after_reset = False, h
                 if not (abs(y) < np.inf and abs(v) < np.inf):

@@ -36,8 +36,9 @@ def omega(z: float) -> float:
         w = max(w, 0.2)
     else:
         log = math.log(z)
-        w = z - log + log / z
-    for _ in range(2):
+        one = 1.0 / z
+        w = z - log + log * one * (1.0 + one * (0.5 * log - 1.0))
+    for _ in range(1 if z > 20.0 else 2):
         r = z - w - math.log(w)
         one = 1.0 + w
         a = one * (one + 2.0 / 3.0 * r)
@@ -88,6 +89,29 @@ def series_at(series: FloatArray, degree: int, x: float) -> float:
     for n in range(degree, 0, -1):
         b1, b2 = series[n] + x2 * b1 - b2, b1
     return x * b1 - b2
+
+
+@inner
+def both_at(q: FloatArray, P: FloatArray, degree: int, x: float) -> tuple[float, float]:
+    """The series q and P at x, both whole, in one run of Clenshaw's recurrence."""
+    b1 = b2 = c1 = c2 = 0.0
+    x2 = 2.0 * x
+    for n in range(degree, ORDER, -1):
+        b1, b2 = P[n] + x2 * b1 - b2, b1
+    for n in range(min(degree, ORDER), 0, -1):
+        b1, b2 = P[n] + x2 * b1 - b2, b1
+        c1, c2 = q[n] + x2 * c1 - c2, c1
+    return q[0] + x * c1 - c2, P[0] + x * b1 - b2
+
+
+@inner
+def needed(q: FloatArray, P: FloatArray, degree: int, least: float) -> int:
+    """The degree up to which either series has a coefficient above `least`."""
+    while degree > 1 and abs(P[degree]) <= least:
+        if degree <= ORDER and abs(q[degree]) > least:
+            break
+        degree -= 1
+    return degree
 
 
 @inner

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import (
     LONG,
@@ -20,6 +20,7 @@ from tactile_lab.model.integrator import (
     V_RESET,
     Q_at,
     Q_gain,
+    needed,
     particular,
     series_at,
     to_series,
@@ -44,18 +45,22 @@ from tactile_lab.model.spiking import (
 )
 from tactile_lab.model.tableau import NODES, ORDER
 from tactile_lab.model.threshold import above_threshold
-from tactile_lab.model.truncation import carried, missing, unseen
+from tactile_lab.model.truncation import carried, longer, missing, unseen
 
 SEGMENT_ROW, STEP_ROW, PIECE_ROW = 4, 3 + ORDER + 1, 6 + MOST_TERMS + 1
 """Columns of the dense stores: t T V0 p; t s h series; t s h degree V resume series."""
 STEPS, ITERATIONS, REJECTED, SEGMENTS, PIECES, EXPANSIONS = range(6)
 ROWS_0, ROWS_1, ROWS_2 = range(6, 9)
-DONE, STUCK, FAST, NOT_FINITE = range(4)
+DONE, STUCK, FAST, NOT_FINITE, STRONG = range(5)
+SHARE, SHARE_Q = 0.1, 0.5
+"""Of the tolerance: what a step's series of V_C1, V, and of Q, V, may be wrong by."""
+KNEE = 12.0
+"""From so many V_T down exp(-V_C1/V_T) bends V_C1."""
 SHORTEST_SEGMENT = 1e-290
 """A segment shorter than this is a jump, s."""
-Y, Y_ERROR, Y_LARGEST_ERROR, V_P, V_P_HIGHEST = range(5)
-NODE, COUNTS = 5, 9
-"""Lengths of the node's memory and of the counters."""
+Y, Y_ERROR, Y_LARGEST_ERROR, V_P, V_P_HIGHEST, FORCE = range(6)
+COUNTS = 9
+"""Number of counters."""
 
 
 @inner
@@ -70,11 +75,65 @@ def more_rows(rows: FloatArray, count: int) -> FloatArray:
     return larger
 
 
+@inner
+def after(time: FloatArray, t: float) -> int:
+    """Number of points at or before t."""
+    low, high = 0, time.size
+    while low < high:
+        middle = (low + high) // 2
+        if time[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@inner
+def value_at(time: FloatArray, value: FloatArray, k: int, t: float) -> float:
+    """The waveform at t, k points of which are at or before t."""
+    if k == 0:
+        return float(value[0])
+    if k == time.size:
+        return float(value[k - 1])
+    t0, t1, F0, F1 = time[k - 1], time[k], value[k - 1], value[k]
+    return float(F0 + (t - t0) / (t1 - t0) * (F1 - F0))
+
+
+@inner
+def points_between(
+    time: FloatArray, value: FloatArray, start: float, force: float, until: float
+) -> tuple[FloatArray, FloatArray]:
+    """The force from the state on: its own value, a jump to the waveform's, points."""
+    first, stop = after(time, start), after(time, until)
+    ends = stop > first and time[stop - 1] == until
+    n = 2 + stop - first + (0 if ends else 1)
+    t, F = np.empty(n), np.empty(n)
+    t[0] = t[1] = start
+    F[0], F[1] = force, value_at(time, value, first, start)
+    for i in range(first, stop):
+        t[2 + i - first], F[2 + i - first] = time[i], value[i]
+    if not ends:
+        t[n - 1], F[n - 1] = until, value_at(time, value, stop, until)
+    return t, F
+
+
+@inner
+def largest_of(values: FloatArray) -> float:
+    """Largest magnitude."""
+    found = 0.0
+    for x in values:
+        found = max(found, abs(x))
+    return found
+
+
 def _build(stamp: int) -> Callable[..., Any]:
     @entry
     def run(
-        time: FloatArray,
-        force: FloatArray,
+        wave_time: FloatArray,
+        wave: FloatArray,
+        start: float,
+        force_before: float,
+        until: float,
         k_F: float,
         par: FloatArray,
         node: FloatArray,
@@ -89,7 +148,11 @@ def _build(stamp: int) -> Callable[..., Any]:
         most: float,
     ) -> Any:
         _ = stamp
-        status = 0
+        status = DONE
+        time, force = points_between(wave_time, wave, start, force_before, until)
+        node[FORCE] = force[-1]
+        if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
+            status = STRONG
         seg_rows = np.empty((8 if node_a else max(time.size, 1), SEGMENT_ROW))
         step_rows = np.empty((16, STEP_ROW))
         piece_rows = np.empty((16, PIECE_ROW))
@@ -105,7 +168,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         P = np.empty(2 * MOST_TERMS + 2)
         fires = np.empty(4)
         piece_fires = np.empty(4)
-        for k in range(time.size - 1):
+        for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
                 node[V_P] += k_F * (force[k + 1] - force[k])
@@ -135,11 +198,20 @@ def _build(stamp: int) -> Callable[..., Any]:
             high = max(y, y_a, y_b) + 1e-3 * par[V_T]
             s = 0.0
             rate = par[LAMBDA] + B0 * math.exp(-y / par[V_T]) / par[V_T]
+            slope = slope_at(B0, y, par)
             h = T
-            if V1 != V0 or abs(slope_at(B0, y, par)) > 1e-14 * rate * high:
-                h = min(h, max(2.0 / rate, 1e-280))
+            if V1 != V0 or abs(slope) > 1e-14 * rate * high:
+                first = (SHARE * tolerance / 1e-11) ** (1.0 / (ORDER + 1))
+                h = min(h, max(4.0 * first / rate, 1e-280))
             tries = 0
+            falls = min(y_a, y_b) < KNEE * par[V_T]
             while s < T:
+                if falls:
+                    # V_C1 bends where exp(-V_C1/V_T) appears: not beyond it at once
+                    slope = slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y, par)
+                    fall = max(0.5 * y, y - KNEE * par[V_T])
+                    if y > par[V_T] and slope * h < -fall:
+                        h = -fall / slope
                 if s + 1.0001 * h >= T:
                     h = T - s
                 elif s + 1.8 * h > T:
@@ -148,7 +220,11 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if tries > 200000 or h <= 0.0:
                     status = STUCK
                     break
-                done = collocate(s, h, y, V0, p, low, high, par, W, B, matrix, right)
+                biggest = max(abs(y), abs(high))
+                wanted = max(SHARE * tolerance, 6e-16 * biggest)
+                done, unsolved = collocate(
+                    s, h, y, V0, p, low, high, wanted, par, W, B, matrix, right
+                )
                 if done < 0:
                     h *= 0.2
                     counts[REJECTED] += 1
@@ -162,25 +238,23 @@ def _build(stamp: int) -> Callable[..., Any]:
                 for i in range(ORDER):
                     part[i + 1] = W[i]
                 to_series(part, a)
-                left = missing(a)
+                a[0] += y
+                biggest = max(abs(y), abs(values[ORDER]))
+                left = missing(a, biggest)
                 stays = carried(a, left)
                 B_s = B_at(V_P_at(s, V0, p, par[TAU]), par)
                 rate = par[LAMBDA] + B_s * math.exp(-y / par[V_T]) / par[V_T]
                 layer = unseen(slope_at(B_s, y, par), rate, h, left, a)
-                tail = max(abs(a[ORDER]), 0.1 * abs(a[ORDER - 1]), layer)
-                biggest = max(abs(y), abs(values[ORDER]))
-                wanted = max(1e-3 * tolerance, 6e-16 * biggest)
-                if tail > wanted:
-                    h *= max(0.1, 0.85 * (wanted / tail) ** (1.0 / ORDER))
+                growth = longer(a, biggest, wanted, rate * h)
+                if left + layer > 3.0 * wanted:
+                    h *= min(max(0.1, longer(a, biggest, wanted, 0.0)), 0.5)
                     counts[REJECTED] += 1
                     continue
-                a[0] += y
                 counts[STEPS] += 1
-                growth = 0.85 * (wanted / max(tail, 1e-40)) ** (1.0 / ORDER)
                 error_in = node[Y_ERROR]
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, values[ORDER]))
-                floor = 2.5e-16 * (biggest + 12.0 * depth)
+                floor = 2.5e-16 * (biggest + 12.0 * depth) + unsolved
                 error = error_in + left + layer + floor
                 node[Y_LARGEST_ERROR] = max(node[Y_LARGEST_ERROR], error)
                 node[Y_ERROR] = (
@@ -196,9 +270,9 @@ def _build(stamp: int) -> Callable[..., Any]:
                         step_rows[n, 3 + i] = a[i]
                     counts[ROWS_1] += 1
                 if integrate:
-                    above_threshold(a, s, h, V0, p, par, fires)
+                    asked = False
                     u, width = 0.0, 1.0
-                    Q_error_y = error_in + max(0.05 * left, stays) + layer + floor
+                    Q_error_y = error_in + stays + layer + floor
                     while u < 1.0:
                         if width < 1.0:
                             x = 2.0 * u - 1.0
@@ -215,31 +289,46 @@ def _build(stamp: int) -> Callable[..., Any]:
                             Q_low, Q_high = min(Q_low, part[i]), max(Q_high, part[i])
                         to_series(part, q)
                         counts[EXPANSIONS] += 1
-                        tail_q = max(abs(q[ORDER]), 0.1 * abs(q[ORDER - 1]))
                         span = par[V_FIRE] - par[V_RESET]
                         largest_Q = max(abs(Q_low), abs(Q_high))
+                        gain = Q_gain(Q_high, par)
+                        # the last digit of V_C1, which "direct" multiplies
+                        rounding = max(largest_Q, 2.0 * biggest * gain)
+                        left_q = missing(q, rounding)
                         limit = max(
-                            5e-3 * tolerance * (1.0 + max(Q_low, 0.0) / span),
-                            2e-15 * largest_Q,
-                            # the last digit of V_C1, which "direct" multiplies
-                            4e-16 * biggest * Q_gain(Q_high, par),
+                            SHARE_Q * tolerance * (1.0 + max(Q_low, 0.0) / span),
+                            2e-15 * rounding,
                         )
                         piece = width * h
                         r = piece / par[TAU_L]
-                        if tail_q > limit or SHORT < r < LONG:
+                        if left_q > limit or SHORT < r < LONG:
                             width *= 0.5
                             if width < 1e-12:
                                 status = STUCK
                                 break
                             continue
                         degree = particular(q, r, P)
+                        degree = needed(q, P, degree, 1e-18 * largest_Q)
                         counts[PIECES] += 1
-                        for i in range(4):
-                            piece_fires[i] = (
-                                min(max(fires[i] - u, 0.0), width) * h
-                                if fires[i] < u + width
-                                else piece
-                            )
+                        size = left_q
+                        for i in range(1, ORDER + 1):
+                            size += abs(q[i])
+                        piece_fires[0] = piece_fires[2] = piece_fires[3] = piece
+                        piece_fires[1] = piece
+                        if q[0] - size > par[V_FIRE]:
+                            piece_fires[0] = 0.0
+                        elif q[0] + size >= par[V_FIRE]:
+                            if not asked:
+                                asked = True
+                                above_threshold(
+                                    a, y, values[ORDER], s, h, V0, p, par, fires
+                                )
+                            for i in range(4):
+                                piece_fires[i] = (
+                                    min(max(fires[i] - u, 0.0), width) * h
+                                    if fires[i] < u + width
+                                    else piece
+                                )
                         if Q_low > par[V_FIRE]:
                             # refuse at once what would take for ever to count
                             slowest = par[T_EPS] + par[TAU_L] * math.log1p(
@@ -261,9 +350,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                             for i in range(degree + 1):
                                 piece_rows[n, 6 + i] = P[i]
                             counts[ROWS_2] += 1
+                        # what a series misses changes its sign at every node, and C2
+                        # sums it up
+                        averaged = min(1.0, 0.02 + 0.05 * r)
                         Q_error = (
-                            Q_gain(Q_high, par) * Q_error_y
-                            + missing(q)
+                            gain * (Q_error_y + averaged * left)
+                            + averaged * left_q
                             + 2.5e-16 * largest_Q
                         )
                         spikes = run_piece(
@@ -282,8 +374,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if not abs(y) < np.inf or not abs(S[VOLTAGE]) < np.inf:
                     status = NOT_FINITE
                     break
-                most_growth = 5.0 if tail > 1e-3 * wanted else 100.0
-                h *= min(max(growth, 0.2), most_growth)
+                h *= min(max(growth, 0.2), 30.0)
             node[Y] = y
             if status != DONE:
                 break

@@ -15,7 +15,14 @@ import numpy as np
 
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import inner
-from tactile_lab.model.tableau import DIFFERENTIATE, NODES
+from tactile_lab.model.tableau import (
+    DIFFERENTIATE,
+    NODES,
+    ORDER,
+    SCHUR_Q,
+    SCHUR_Q_TURNED,
+    SCHUR_T,
+)
 
 LOG_B_CAP = 230.0
 MOST_ITERATIONS = 14
@@ -59,28 +66,59 @@ def equilibrium(B: float, par: FloatArray) -> float:
 
 @inner
 def eliminate(matrix: FloatArray, right: FloatArray) -> None:
-    """Solve in place by Gaussian elimination with partial pivoting."""
-    n = right.size
-    for k in range(n):
-        pivot, largest = k, abs(matrix[k, k])
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > largest:
-                pivot, largest = i, abs(matrix[i, k])
-        if pivot != k:
-            for j in range(k, n):
-                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
-            right[k], right[pivot] = right[pivot], right[k]
-        reciprocal = 1.0 / matrix[k, k]
-        for i in range(k + 1, n):
-            factor = matrix[i, k] * reciprocal
-            for j in range(k + 1, n):
-                matrix[i, j] -= factor * matrix[k, j]
-            right[i] -= factor * right[k]
-    for k in range(n - 1, -1, -1):
-        total = right[k]
-        for j in range(k + 1, n):
-            total -= matrix[k, j] * right[j]
-        right[k] = total / matrix[k, k]
+    """Solve in place by Gaussian elimination.
+
+    Without pivoting: in `DIFFERENTIATE` plus any positive diagonal no entry grows by
+    more than a few times, and each Newton iteration mends what the last one left.
+    """
+    for k in range(0, ORDER, 2):
+        # two columns at a time: half as many passes over the rest
+        p, q = matrix[k, k], matrix[k, k + 1]
+        u = matrix[k + 1, k] / p
+        r = matrix[k + 1, k + 1] - u * q
+        matrix[k + 1, k + 1] = r
+        for j in range(k + 2, ORDER):
+            matrix[k + 1, j] -= u * matrix[k, j]
+        right[k + 1] -= u * right[k]
+        by_p, by_r = 1.0 / p, 1.0 / r
+        for i in range(k + 2, ORDER):
+            one = matrix[i, k] * by_p
+            two = (matrix[i, k + 1] - one * q) * by_r
+            for j in range(k + 2, ORDER):
+                matrix[i, j] -= one * matrix[k, j] + two * matrix[k + 1, j]
+            right[i] -= one * right[k] + two * right[k + 1]
+    for k in range(ORDER - 2, -1, -2):
+        one, two = right[k], right[k + 1]
+        for j in range(k + 2, ORDER):
+            one -= matrix[k, j] * right[j]
+            two -= matrix[k + 1, j] * right[j]
+        right[k + 1] = two / matrix[k + 1, k + 1]
+        right[k] = (one - matrix[k, k + 1] * right[k + 1]) / matrix[k, k]
+
+
+@inner
+def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
+    """Solve (DIFFERENTIATE + r) x = right in place, by its Schur form."""
+    for i in range(ORDER):
+        total = 0.0
+        for j in range(ORDER):
+            total += SCHUR_Q_TURNED[i, j] * right[j]
+        turned[i] = total
+    for k in range(ORDER - 2, -1, -2):
+        one, two = turned[k], turned[k + 1]
+        for j in range(k + 2, ORDER):
+            one -= SCHUR_T[k, j] * turned[j]
+            two -= SCHUR_T[k + 1, j] * turned[j]
+        a, b = SCHUR_T[k, k] + r, SCHUR_T[k, k + 1]
+        c, d = SCHUR_T[k + 1, k], SCHUR_T[k + 1, k + 1] + r
+        reciprocal = 1.0 / (a * d - b * c)
+        turned[k] = (d * one - b * two) * reciprocal
+        turned[k + 1] = (a * two - c * one) * reciprocal
+    for i in range(ORDER):
+        total = 0.0
+        for j in range(ORDER):
+            total += SCHUR_Q[i, j] * turned[j]
+        right[i] = total
 
 
 @inner
@@ -92,44 +130,69 @@ def collocate(
     p: float,
     low: float,
     high: float,
+    wanted: float,
     par: FloatArray,
     W: FloatArray,
     B: FloatArray,
     matrix: FloatArray,
     right: FloatArray,
-) -> int:
+) -> tuple[int, float]:
     """One step from s to s + h: fill W with V_C1 - y0 at the nodes.
 
-    Newton's iterates are kept within [low, high], between which the exact solution
-    lies. Returns the iterations, or -1 where they do not converge.
+    Where V_C1 stays so far above V_T that exp(-V_C1/V_T) is next to nothing, the
+    equation is linear and solved by the Schur form of the rule, else by Newton's
+    iteration and elimination, to a thousandth of `wanted` V. The iterates are kept
+    within [low, high], between which the exact solution lies. Returns the iterations,
+    -1 where they do not converge, and what another one would still change, V.
     """
-    n = W.size
-    enough = 4e-9 * math.sqrt(par[V_T])
-    for i in range(n):
+    most = 0.0
+    for i in range(ORDER):
         B[i] = B_at(V_P_at(s + h * NODES[i], V0, p, par[TAU]), par)
-        W[i] = 0.0
+        most = max(most, B[i])
+    closing = most * math.exp(-low / par[V_T]) / (par[V_T] * par[LAMBDA])
+    linear = closing < 1e-3
+    # what the next iteration would change: by the part left out and by rounding, or
+    # by the square of this one's change over 2 V_T
+    slope = 0.0
+    if linear:
+        enough = 1e-3 * wanted / max(closing, 1e-12)
+    else:
+        enough = math.sqrt(2e-3 * wanted * par[V_T])
+        slope = h * slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y0, par)
+    for i in range(ORDER):
+        W[i] = min(max(y0 + slope * NODES[i], low), high) - y0 if slope != 0.0 else 0.0
     for iteration in range(MOST_ITERATIONS):
-        for i in range(n):
+        for i in range(ORDER):
             y = y0 + W[i]
-            q = math.exp(-y / par[V_T])
-            e = q - 1.0 if q < 0.5 else math.expm1(-y / par[V_T])
-            rate = h * (par[LAMBDA] + B[i] * q / par[V_T])
-            scale = 1.0 / (1.0 + rate)
+            e, q = -1.0, 0.0
+            if closing > 1e-20:
+                q = math.exp(-y / par[V_T])
+                e = q - 1.0 if q < 0.5 else math.expm1(-y / par[V_T])
             total = h * (par[LAMBDA] * (par[DIVIDER] - y) + B[i] * e)
-            for j in range(n):
-                total -= DIFFERENTIATE[i, j] * W[j]
-                matrix[i, j] = DIFFERENTIATE[i, j] * scale
-            matrix[i, i] += rate * scale
-            right[i] = total * scale
-        eliminate(matrix, right)
+            if iteration or slope != 0.0:
+                for j in range(ORDER):
+                    total -= DIFFERENTIATE[i, j] * W[j]
+            right[i] = total
+            if not linear:
+                rate = h * (par[LAMBDA] + B[i] * q / par[V_T])
+                scale = 1.0 / (1.0 + rate)
+                for j in range(ORDER):
+                    matrix[i, j] = DIFFERENTIATE[i, j] * scale
+                matrix[i, i] += rate * scale
+                right[i] = total * scale
+        if linear:
+            solve_shifted(h * par[LAMBDA], right, matrix[0])
+        else:
+            eliminate(matrix, right)
         largest = 0.0
-        for i in range(n):
+        for i in range(ORDER):
             if not abs(right[i]) < np.inf:
-                return -1
+                return -1, 0.0
             V = min(max(y0 + W[i] + right[i], low), high)
             change = V - y0 - W[i]
             W[i] += change if V in (low, high) else right[i]
             largest = max(largest, abs(right[i]))
         if largest < enough:
-            return iteration + 1
-    return -1
+            share = max(closing, 1e-12) if linear else 0.5 * largest / par[V_T]
+            return iteration + 1, largest * share
+    return -1, 0.0

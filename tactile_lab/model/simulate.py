@@ -40,22 +40,40 @@ class Result:
     Attributes:
         duration: s.
         spike_times: shape (n,), s; None if not kept.
-        error: how far from the exact solution at most, by estimate.
         run_time: wall time spent, s.
-        left_out: signals that were not computed because nothing asked for them.
-        warnings: where the model leaves what it describes well.
-        stages: evaluations of each stage, 0 where left out.
+        solution: the solved slice, with dense evaluators.
+        end: the state at `duration`.
     """
 
     duration: float
     spike_times: FloatArray | None
-    error: ErrorEstimate
     run_time: float
-    left_out: tuple[str, ...]
-    warnings: tuple[str, ...]
-    stages: dict[str, int]
     solution: Solution
     end: State
+
+    @property
+    def error(self) -> ErrorEstimate:
+        """How far from the exact solution at most, by estimate."""
+        found = self.solution
+        return ErrorEstimate(
+            found.error_spike_time if found.need.integrator else None,
+            found.error_V_C1 if found.need.node_a else None,
+        )
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Signals that were not computed because nothing asked for them."""
+        return self.solution.need.left_out
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Where the model leaves what it describes well."""
+        return self.solution.warnings
+
+    @property
+    def stages(self) -> dict[str, int]:
+        """Evaluations of each stage, 0 where left out."""
+        return self.solution.stages
 
     def sample(self, signal: str, times: FloatArray) -> FloatArray:
         """Values of `signal` at `times` s in [0, duration], right-continuous.
@@ -118,14 +136,7 @@ def simulate(
     return Result(
         duration=duration,
         spike_times=solution.spike_times if "spikes" in need.signals else None,
-        error=ErrorEstimate(
-            solution.error_spike_time if need.integrator else None,
-            solution.error_V_C1 if need.node_a else None,
-        ),
         run_time=wall.perf_counter() - began,
-        left_out=need.left_out,
-        warnings=solution.warnings,
-        stages=solution.stages,
         solution=solution,
         end=end,
     )

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError
-from tactile_lab.model import sampling
-from tactile_lab.model.circuit import Circuit, FloatArray
-from tactile_lab.model.equations import I_C, I_DS, T1_currents
-from tactile_lab.model.need import Need
+from tactile_lab.model import kernel, sampling, spiking
+from tactile_lab.model.circuit import SUBTHRESHOLD_LIMIT, Circuit, FloatArray
+from tactile_lab.model.equations import I_C, I_DS, T1_currents, fires_at_rest
+from tactile_lab.model.need import STAGES, Need
+from tactile_lab.model.tableau import ORDER
 from tactile_lab.spikes.rate import rate
 from tactile_lab.waveform import Waveform
 
@@ -59,13 +63,82 @@ class Solution:
     pieces: FloatArray
     last: tuple[float, float, float]
     """V_P, V_C1, V_C2 at the end, after a jump or reset there."""
-    stages: dict[str, int]
-    evaluations: int
-    """Evaluations of Eq. (16), of Eq. (17) or of both at once."""
-    statistics: Statistics | None
-    error_spike_time: float
-    error_V_C1: float
-    warnings: tuple[str, ...]
+    counts: NDArray[np.int64]
+    node: FloatArray
+    memory: FloatArray
+    """What the kernel counted and knows at the end; see `kernel` and `spiking`."""
+
+    @cached_property
+    def stages(self) -> dict[str, int]:
+        """Evaluations of each stage, 0 where left out."""
+        counts = self.counts
+        return dict.fromkeys(STAGES, 0) | {
+            "V_P": int(counts[kernel.SEGMENTS]),
+            "V_C1": int(counts[kernel.STEPS] + counts[kernel.REJECTED]),
+            "I_C": int(counts[kernel.EXPANSIONS]),
+            "V_C2": int(counts[kernel.PIECES]),
+            "spikes": int(self.memory[spiking.SEARCHES]),
+        }
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of Eq. (16), of Eq. (17) or of both at once."""
+        of_16 = ORDER * int(self.counts[kernel.ITERATIONS])
+        return of_16 + (ORDER + 1) * int(self.counts[kernel.EXPANSIONS])
+
+    @property
+    def error_spike_time(self) -> float:
+        """Largest estimated error of a spike time, s."""
+        return float(self.memory[spiking.LARGEST_ERROR])
+
+    @property
+    def error_V_C1(self) -> float:
+        """Largest estimated error of V_C1, V."""
+        return float(self.node[kernel.Y_LARGEST_ERROR])
+
+    @property
+    def statistics(self) -> Statistics | None:
+        """Of the spikes; None where they were left out."""
+        if not self.need.integrator:
+            return None
+        S = self.memory
+        count = int(S[spiking.COUNT])
+        intervals = math.isfinite(S[spiking.SHORTEST])
+        return Statistics(
+            count,
+            float(S[spiking.FIRST]) if count else None,
+            float(S[spiking.LAST]) if count else None,
+            float(S[spiking.SHORTEST]) if intervals else None,
+            float(S[spiking.LONGEST]) if intervals else None,
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Where the model leaves what it describes well."""
+        found = []
+        highest = self.node[kernel.V_P_HIGHEST] + self.circuit.V_GS
+        if self.need.node_a and highest > SUBTHRESHOLD_LIMIT:
+            found.append(
+                f"V_GS + V_P exceeds {SUBTHRESHOLD_LIMIT} V, where the exponential law "
+                "of Eq. (1) ends; I_DS is overestimated there."
+            )
+        if self.memory[spiking.SATURATED]:
+            found.append(
+                "Spikes occur with V_C1 below V_fire - 0.5 V, where a real T1 "
+                "saturates and the circuit stops firing; Eq. (17) cannot show it, "
+                "saturation = true does."
+            )
+        if self.memory[spiking.DOUBT]:
+            found.append(
+                "V_C2 only just reaches or misses V_fire, closer than the estimated "
+                "error: whether there is a spike cannot be decided."
+            )
+        if self.need.integrator and fires_at_rest(self.circuit):
+            found.append(
+                "The circuit fires at rest: its equilibrium lies above V_fire; V_C2 "
+                "starts at V_reset."
+            )
+        return tuple(found)
 
     def sample(self, signal: str, times: FloatArray) -> FloatArray:
         """Values of `signal` at `times`, any shape, right-continuous.

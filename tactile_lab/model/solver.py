@@ -5,22 +5,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_lab.errors import ParameterError, SolverError
+from tactile_lab.errors import ParameterError, SolverError, TactileLabError
 from tactile_lab.model import kernel, spiking
 from tactile_lab.model.circuit import (
     LARGEST_VOLTAGE,
-    SUBTHRESHOLD_LIMIT,
     Circuit,
     FloatArray,
 )
-from tactile_lab.model.equations import fires_at_rest
-from tactile_lab.model.need import STAGES, Need
+from tactile_lab.model.need import Need
 from tactile_lab.model.packed import parameters
-from tactile_lab.model.solution import Solution, Statistics
+from tactile_lab.model.solution import Solution
 from tactile_lab.model.state import State
-from tactile_lab.model.tableau import ORDER
 from tactile_lab.waveform import Waveform
 
 MOST_SPIKES = 1e8
@@ -44,26 +40,20 @@ def solve(
             "The state was advanced without what is asked for now; keep the same "
             "signals in every slice."
         )
-    time, value = _points(state, force, until)
-    largest = max(float(value.max()), -float(value.min()))
-    if not abs(circuit.k_F) * largest <= LARGEST_VOLTAGE:
-        raise ParameterError(
-            f"A force of {largest:g} N makes {abs(circuit.k_F) * largest:g} V; at most "
-            f"{LARGEST_VOLTAGE:g} V can be simulated."
-        )
     par = parameters(circuit)
-    node = np.array([state.V_C1, state.error_V_C1, 0.0, state.V_P, state.V_P])
+    node = np.array([state.V_C1, state.error_V_C1, 0.0, state.V_P, state.V_P, 0.0])
     S = _memory(state)
     counts = np.zeros(kernel.COUNTS, dtype=np.int64)
-    keep_spikes = bool(need.signals & {"spikes"})
+    slice_ = (state.time, state.force, until)
+    keep_spikes = "spikes" in need.signals
     if circuit.saturation and need.node_a:
         from tactile_lab.model import coupled, ellipse
 
         most = MOST_COUPLED
         E = np.array([state.error_V_C1**2, state.errors_together, state.error_V_C2**2])
         status, segments, steps, pieces, spikes = coupled.run(
-            time, value, circuit.k_F, par, node, E, S, counts, tolerance,
-            keep_spikes, need.dense, need.dense_V_C2, most,
+            force.time, force.value, *slice_, circuit.k_F, par, node, E, S, counts,
+            tolerance, keep_spikes, need.dense, need.dense_V_C2, most,
         )  # fmt: skip
         node[kernel.Y_ERROR] = math.sqrt(E[ellipse.E_11])
         S[spiking.ERROR] = math.sqrt(E[ellipse.E_22])
@@ -71,62 +61,32 @@ def solve(
     else:
         most, together = MOST_SPIKES, 0.0
         status, segments, steps, pieces, spikes = kernel.run(
-            time, value, circuit.k_F, par, node, S, counts, tolerance,
-            need.node_a, need.integrator, keep_spikes,
-            need.dense, need.dense_V_C2, most,
+            force.time, force.value, *slice_, circuit.k_F, par, node, S, counts,
+            tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
+            need.dense_V_C2, most,
         )  # fmt: skip
     if status != kernel.DONE:
-        raise SolverError(_refusal(status, float(S[spiking.COUNT]), most))
-    after = _after(state, until, float(value[-1]), node, S, need, together)
+        raise _refusal(status, circuit, force, float(S[spiking.COUNT]), most)
+    after = _after(state, until, node, S, need, together)
     return after, Solution(
         circuit=circuit,
         need=need,
         force=force,
         start=state.time,
         end=until,
-        spike_times=spikes[: int(S[spiking.COUNT]) if keep_spikes else 0].copy(),
+        spike_times=spikes[: int(S[spiking.COUNT]) if keep_spikes else 0],
         before=tuple(
             t for t in (state.previous_spike, state.last_spike) if t is not None
         ),
         parameters=par,
-        segments=segments[: counts[kernel.ROWS_0]].copy(),
-        steps=steps[: counts[kernel.ROWS_1]].copy(),
-        pieces=pieces[: counts[kernel.ROWS_2]].copy(),
+        segments=segments[: counts[kernel.ROWS_0]],
+        steps=steps[: counts[kernel.ROWS_1]],
+        pieces=pieces[: counts[kernel.ROWS_2]],
         last=(after.V_P, after.V_C1, after.V_C2),
-        stages=_stages(counts, S, need),
-        evaluations=ORDER * int(counts[kernel.ITERATIONS])
-        + (ORDER + 1) * int(counts[kernel.EXPANSIONS]),
-        statistics=_statistics(S) if need.integrator else None,
-        error_spike_time=float(S[spiking.LARGEST_ERROR]),
-        error_V_C1=float(node[kernel.Y_LARGEST_ERROR]),
-        warnings=_warnings(circuit, need, node, S),
+        counts=counts,
+        node=node,
+        memory=S,
     )
-
-
-def _points(
-    state: State, force: Waveform, until: float
-) -> tuple[FloatArray, FloatArray]:
-    """Force from the state on: its own value, a jump to the waveform's, the points."""
-    first = int(np.searchsorted(force.time, state.time, side="right"))
-    stop = int(np.searchsorted(force.time, until, side="right"))
-    now, end = _value(force, first, state.time), _value(force, stop, until)
-    ends = stop > first and force.time[stop - 1] == until
-    head, tail = slice(0, 2), slice(2, 2 + stop - first)
-    points = np.empty((2, 2 + stop - first + (0 if ends else 1)))
-    points[0, head], points[1, head] = state.time, (state.force, now)
-    points[0, tail], points[1, tail] = force.time[first:stop], force.value[first:stop]
-    if not ends:
-        points[0, -1], points[1, -1] = until, end
-    return points[0], points[1]
-
-
-def _value(force: Waveform, after: int, t: float) -> float:
-    """`force.at(t)` where point number `after` is the first later than t."""
-    if after == 0 or after == force.time.size:
-        return float(force.value[min(after, force.time.size) - (after > 0)])
-    t0, t1 = float(force.time[after - 1]), float(force.time[after])
-    F0, F1 = float(force.value[after - 1]), float(force.value[after])
-    return F0 + (t - t0) / (t1 - t0) * (F1 - F0)
 
 
 def _memory(state: State) -> FloatArray:
@@ -144,27 +104,38 @@ def _memory(state: State) -> FloatArray:
     return S
 
 
-def _refusal(status: int, count: float, most: float) -> str:
+def _refusal(
+    status: int, circuit: Circuit, force: Waveform, count: float, most: float
+) -> TactileLabError:
+    if status == kernel.STRONG:
+        largest = float(np.abs(force.value).max())
+        return ParameterError(
+            f"A force of {largest:g} N makes {abs(circuit.k_F) * largest:g} V; at most "
+            f"{LARGEST_VOLTAGE:g} V can be simulated."
+        )
     if status == kernel.FAST and count >= most:
-        return (
+        return SolverError(
             f"More than {most:g} spikes in one simulation; make it shorter or check "
             "the integrator's current (t1, I_T1s, C2)."
         )
     if status == kernel.FAST:
-        return (
+        return SolverError(
             f"Spikes follow each other within {spiking.SHORTEST_INTERVAL:g} s, or "
             "faster than double-precision time resolves; the integrator's current is "
             "too large for C2 (t1, I_T1s, C2)."
         )
     if status == kernel.STUCK:
-        return "The solver cannot resolve V_C1 or I_C; parameters are too extreme."
-    return "The solution left the range of finite numbers; parameters are too extreme."
+        return SolverError(
+            "The solver cannot resolve V_C1 or I_C; parameters are too extreme."
+        )
+    return SolverError(
+        "The solution left the range of finite numbers; parameters are too extreme."
+    )
 
 
 def _after(
     state: State,
     until: float,
-    force: float,
     node: FloatArray,
     S: FloatArray,
     need: Need,
@@ -184,7 +155,7 @@ def _after(
     )
     return State(
         time=until,
-        force=force,
+        force=float(node[kernel.FORCE]),
         V_P=float(node[kernel.V_P]),
         V_C1=float(node[kernel.Y]),
         V_C2=V_C2,
@@ -197,53 +168,3 @@ def _after(
         errors_together=together,
         left_out=left_out,
     )
-
-
-def _stages(counts: NDArray[np.int64], S: FloatArray, need: Need) -> dict[str, int]:
-    stages = dict.fromkeys(STAGES, 0)
-    stages["V_P"] = int(counts[kernel.SEGMENTS])
-    stages["V_C1"] = int(counts[kernel.STEPS] + counts[kernel.REJECTED])
-    stages["I_C"] = int(counts[kernel.EXPANSIONS])
-    stages["V_C2"] = int(counts[kernel.PIECES])
-    stages["spikes"] = int(S[spiking.SEARCHES])
-    return stages
-
-
-def _statistics(S: FloatArray) -> Statistics:
-    count = int(S[spiking.COUNT])
-    intervals = math.isfinite(S[spiking.SHORTEST])
-    return Statistics(
-        count,
-        float(S[spiking.FIRST]) if count else None,
-        float(S[spiking.LAST]) if count else None,
-        float(S[spiking.SHORTEST]) if intervals else None,
-        float(S[spiking.LONGEST]) if intervals else None,
-    )
-
-
-def _warnings(
-    circuit: Circuit, need: Need, node: FloatArray, S: FloatArray
-) -> tuple[str, ...]:
-    found = []
-    if need.node_a and node[kernel.V_P_HIGHEST] + circuit.V_GS > SUBTHRESHOLD_LIMIT:
-        found.append(
-            f"V_GS + V_P exceeds {SUBTHRESHOLD_LIMIT} V, where the exponential law of "
-            "Eq. (1) ends; I_DS is overestimated there."
-        )
-    if S[spiking.SATURATED]:
-        found.append(
-            "Spikes occur with V_C1 below V_fire - 0.5 V, where a real T1 saturates "
-            "and the circuit stops firing; Eq. (17) cannot show it, saturation = true "
-            "does."
-        )
-    if S[spiking.DOUBT]:
-        found.append(
-            "V_C2 only just reaches or misses V_fire, closer than the estimated error: "
-            "whether there is a spike cannot be decided."
-        )
-    if need.integrator and fires_at_rest(circuit):
-        found.append(
-            "The circuit fires at rest: its equilibrium lies above V_fire; V_C2 starts "
-            "at V_reset."
-        )
-    return tuple(found)

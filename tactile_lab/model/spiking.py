@@ -19,6 +19,7 @@ from tactile_lab.model.integrator import (
     V_FIRE,
     V_RESET,
     Y_SATURATED,
+    both_at,
     series_at,
 )
 
@@ -85,6 +86,8 @@ def run_piece(
     tau = par[TAU_L]
     to_x = 2.0 / length
     V_f, V_r = par[V_FIRE], par[V_RESET]
+    known = False
+    Q = P_now = 0.0
     for k in range(fires.size // 2):
         a, b = fires[2 * k], fires[2 * k + 1]
         while b > a:
@@ -93,30 +96,39 @@ def run_piece(
                     break
                 S[REF], S[REF_LOW], S[VOLTAGE] = S[RESUME], 0.0, V_r
                 S[RESUME] = -1.0
+                known = False
             ref = S[REF]
             left = (b - ref) - S[REF_LOW]
             if left <= 0.0:
                 break
             V = S[VOLTAGE]
-            P_ref = series_at(P, degree, ref * to_x - 1.0)
-            above = V - (P[0] + P_ref)
+            if not known:
+                Q, P_now = both_at(q, P, degree, ref * to_x - 1.0)
+            Q_ref, P_ref = Q, P_now
+            above = V - P_ref
             need = V_f - V
             low, high = 0.0, left
             sure = False
             d = max(a - ref, 0.0)
             e = math.expm1(-d / tau)
-            slope = 0.0
             if need > 0.0:
                 d = left
                 if -above > need:
-                    d = min(left, -tau * math.log1p(need / above))
+                    # as if P went on in a straight line
+                    drift = (Q_ref - P_ref) / tau
+                    d = -tau * math.log1p(need / above)
+                    rise = drift - (above + need) / tau
+                    if rise > 0.0:
+                        d -= d * drift / rise
+                    d = min(max(d, 0.0), left)
                 missed, margin = False, 0.0
                 for _ in range(100):
                     S[SEARCHES] += 1.0
                     x = (ref + d) * to_x - 1.0
                     e = math.expm1(-d / tau)
-                    w = above * e + (series_at(P, degree, x) - P_ref) - need
-                    slope = (q[0] + series_at(q, q.size - 1, x) - V_f - w) / tau
+                    Q, P_now = both_at(q, P, degree, x)
+                    w = above * e + (P_now - P_ref) - need
+                    slope = (Q - V_f - w) / tau
                     if w < 0.0:
                         if d >= left:
                             missed = True
@@ -126,21 +138,31 @@ def run_piece(
                     else:
                         high = d
                         sure = True
-                    change = -w / slope if slope > 0.0 else np.inf
+                    # exact where Q is constant; its drift decides what is left
+                    change = np.inf
+                    bend = w / (slope * tau) if slope > 0.0 else -1.0
+                    if bend > -1.0:
+                        change = -tau * math.log1p(bend)
                     following = d + change
                     if following >= high and not sure:
                         following = left
                     elif not low <= following <= high:
                         following = 0.5 * (low + high)
-                    settled = abs(following - d) <= 1e-15 * d
-                    if abs(change) <= 1e-9 * d and slope * tau > 1e-2 * (V_f - V):
-                        settled = True
+                    step = following - d
+                    after = abs((Q - Q_ref) / (slope * tau)) * step * step / d
+                    settled = slope > 0.0 and after <= 1e-16 * d
                     if following >= left and not sure:
                         settled = False
+                    elif abs(step) <= 1e-15 * d:
+                        settled = True
                     d = following
                     if settled:
+                        # the series there, from those just evaluated
+                        P_now += (Q - P_now) / tau * step
+                        Q += (Q - Q_ref) / d * step
                         break
                 if missed:
+                    known = False
                     e = math.expm1(-left / tau)
                     error = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V_f)
                     if margin < error:
@@ -152,8 +174,9 @@ def run_piece(
             v = rough + low_part
             carry = (rough - v) + low_part
             at = t + (s + v)
-            x = v * to_x - 1.0
-            Q = q[0] + series_at(q, q.size - 1, x)
+            if need <= 0.0:
+                Q, P_now = both_at(q, P, degree, v * to_x - 1.0)
+            known = True
             slope = (Q - V_f) / tau
             error = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V_f)
             time_error = error / max(slope, 1e-300)
@@ -179,12 +202,17 @@ def run_piece(
         return spikes
     if S[RESUME] >= 0.0:
         S[REF], S[REF_LOW], S[VOLTAGE], S[RESUME] = S[RESUME], 0.0, V_r, -1.0
+        known = False
     d = (length - S[REF]) - S[REF_LOW]
     if d > 0.0:
-        P_ref = series_at(P, degree, S[REF] * to_x - 1.0)
+        if not known:
+            P_now = P[0] + series_at(P, degree, S[REF] * to_x - 1.0)
         e = math.expm1(-d / tau)
         V = S[VOLTAGE]
-        S[VOLTAGE] = V + (V - P[0] - P_ref) * e + (series_at(P, degree, 1.0) - P_ref)
+        P_end = P[0]
+        for n in range(1, degree + 1):
+            P_end += P[n]
+        S[VOLTAGE] = V + (V - P_now) * e + (P_end - P_now)
         S[ERROR] = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V)
     S[REF] = S[REF_LOW] = 0.0
     return spikes

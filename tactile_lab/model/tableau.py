@@ -48,3 +48,23 @@ TO_SERIES = np.ascontiguousarray(
     np.linalg.inv(chebyshev.chebvander(2 * POINTS - 1, ORDER))
 )
 """Values at POINTS to Chebyshev coefficients in x = 2u - 1."""
+
+
+def real_schur(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Q and T with matrix = Q T Q', Q orthogonal, T of 2 x 2 blocks and above them.
+
+    For matrices whose eigenvalues are distinct complex pairs, as `DIFFERENTIATE` is.
+    """
+    values, vectors = np.linalg.eig(matrix)
+    upper = vectors[:, values.imag > 0]
+    pairs = np.stack([upper.real, upper.imag], axis=2).reshape(matrix.shape)
+    Q, _ = np.linalg.qr(pairs)
+    T = Q.T @ matrix @ Q
+    rows, columns = np.indices(T.shape)
+    T[rows // 2 > columns // 2] = 0.0
+    return np.ascontiguousarray(Q), np.ascontiguousarray(T)
+
+
+SCHUR_Q, SCHUR_T = real_schur(DIFFERENTIATE)
+SCHUR_Q_TURNED = np.ascontiguousarray(SCHUR_Q.T)
+"""(DIFFERENTIATE + r) is solved for any number r by Q (T + r) Q'."""

@@ -11,22 +11,29 @@ from tactile_lab.model.tableau import ORDER
 
 @inner
 def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
-    """Where the series a, monotone on [low, high], passes `level`, by bisection."""
-    rising = series_at(a, a.size - 1, 2.0 * high - 1.0) > series_at(
-        a, ORDER, 2.0 * low - 1.0
-    )
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if (a[0] + series_at(a, a.size - 1, 2.0 * middle - 1.0) > level) == rising:
-            high = middle
+    """Where the series a, monotone on [low, high], passes `level` (Illinois' rule)."""
+    f_low = (a[0] - level) + series_at(a, ORDER, 2.0 * low - 1.0)
+    f_high = (a[0] - level) + series_at(a, ORDER, 2.0 * high - 1.0)
+    u = high
+    for _ in range(100):
+        if high - low <= 1e-16 or f_low == f_high:
+            break
+        u = low - f_low * (high - low) / (f_high - f_low)
+        f = (a[0] - level) + series_at(a, ORDER, 2.0 * u - 1.0)
+        if abs(f) <= 1e-16 * abs(level):
+            break
+        if (f > 0.0) == (f_low > 0.0):
+            low, f_low, f_high = u, f, 0.5 * f_high
         else:
-            low = middle
-    return 0.5 * (low + high)
+            high, f_high, f_low = u, f, 0.5 * f_low
+    return u
 
 
 @inner
 def above_threshold(
     a: FloatArray,
+    y0: float,
+    y1: float,
     s: float,
     h: float,
     V0: float,
@@ -36,13 +43,14 @@ def above_threshold(
 ) -> None:
     """Fill `fires` with the intervals of u where V_C1 < its critical value.
 
+    The step's series a goes from y0 to y1.
+
     On one segment V_P is monotone, so V_C1'' at V_C1' = 0 has one sign: V_C1 has at
     most one extremum per segment. Each monotone part has no or exactly one crossing.
     """  # fmt: skip
     level = par[Y_CRITICAL]
-    split = 1.0
-    y0 = a[0] + series_at(a, a.size - 1, -1.0)
-    y1 = a[0] + series_at(a, a.size - 1, 1.0)
+    fires[0] = fires[1] = 0.0
+    fires[2] = fires[3] = split = 1.0
     f0 = slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y0, par)
     f1 = slope_at(B_at(V_P_at(s + h, V0, p, par[TAU]), par), y1, par)
     middle_y = y1
@@ -56,8 +64,6 @@ def above_threshold(
                 low = split
             else:
                 high = split
-    fires[0] = fires[1] = 0.0
-    fires[2] = fires[3] = 1.0
     if (y0 < level) == (middle_y < level):
         if y0 < level:
             fires[1] = split
