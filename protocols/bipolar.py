@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.analysis.decay import Decay, fit_decay
@@ -13,7 +17,9 @@ from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.drain_current import BOXCAR_3DB
+from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, printed, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.levels import Levels
@@ -91,6 +97,63 @@ class Bipolar(Levels):
             "tau_s": tau,
         }
         return Conclusion(tuple(said), values, cut)
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """I_DS beside Eq. (8), as in Fig. 2c, and what is left of it."""
+        trace = run.trace("I_DS")
+        held = [t for t in run.results if t.held is not None]
+        if trace is None or run.circuit is None or not held:
+            return
+        from tactile_lab.model.simulate import simulate
+
+        def theory(circuit: Circuit) -> NDArray[np.float64]:
+            found = simulate(circuit, run.force, keep=("I_DS",), until=run.duration)
+            return found.sample("I_DS", np.clip(trace.time, 0.0, found.duration))
+
+        lines: list[tuple[str, Mark, str, NDArray[np.float64]]]
+        lines = [("Eq. (8)", "dotted", "model", theory(run.circuit))]
+        with suppress(NotIdentifiableError):
+            tau = _changes(run, held)[0]
+            named = f"with τ = {show(tau.value, 's', 3)}"
+            fitted = theory(replace(run.circuit, tau=tau.value))
+            lines.append((named, "dashed", "V_C1", fitted))
+        yield Plot(
+            name="summary",
+            title="drain current",
+            caption="(a) I_DS, from V_C1 by Eq. (16), under the forces applied, as in "
+            "Fig. 2c. Dotted: Eq. (8) with the sensor's parameters as believed; "
+            "dashed: with the time constant fitted to the decays in the holds. (b) "
+            "I_DS less both; short peaks at the ramps are what Eq. (16) averages over.",
+            x_label="Time",
+            x_unit="s",
+            x_limits=(0.0, run.duration),
+            letters=True,
+            panels=(
+                Panel(
+                    label="I_DS",
+                    unit="A",
+                    series=(
+                        Series(x=trace.time, y=trace.mean, colour="I_DS", name="I_DS"),
+                        *(
+                            Series(x=trace.time, y=y, mark=mark, colour=hue, name=name)
+                            for name, mark, hue, y in lines
+                        ),
+                    ),
+                    limits=(0.0, None),
+                    height=2.2,
+                ),
+                Panel(
+                    label="Less Eq. (8)",
+                    unit="A",
+                    series=tuple(
+                        Series(x=trace.time, y=trace.mean - y, mark=mark, colour=hue)
+                        for _, mark, hue, y in lines
+                    ),
+                    guides=(Guide(at=0.0, along="x", dashed=False),),
+                    height=1.1,
+                ),
+            ),
+        )
 
 
 def _changes(

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from tactile_lab.analysis.adaptation import Adaptation
 from tactile_lab.analysis.adrian import ADRIAN, MARK
 from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 from tactile_lab.analysis.spike_train import within
@@ -18,6 +20,8 @@ from tactile_lab.quantity import Duration, Force, Pause, show
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
+
+FloatArray = NDArray[np.float64]
 
 
 class Hold(ForceProtocol):
@@ -88,45 +92,71 @@ class Hold(ForceProtocol):
                 f"{name} = {value.text(unit)}"
                 for name, value, unit in (*values, ("γ", fit.gamma, "Hz"))
             ]
-        later = np.linspace(0, 8, 200)
-        colours = zip(ADRIAN, ("V_C1", "V_C2"), strict=True)
+        middles = (held[1:] + held[:-1]) / 2 - start
         yield Plot(
             name="summary",
             title="adaptation",
-            caption="Left: instantaneous rate during the hold, as in Fig. 5c; line: "
-            "Eq. (15) with V_P(t), fitted to the spikes and the silence; dashed: "
-            "α exp(βt) + γ, as in the paper, up to the last spike. Right: Adrian and "
-            "Zotterman's adaptation drawn from the coefficients the paper prints (Fig. "
-            "5d, left); these curves are not data.",
-            x_label="Time",
+            caption="Instantaneous rate during the hold, each 1/ISI in the middle of "
+            "its interval, as in Fig. 5c; line: Eq. (15) with V_P(t), fitted to the "
+            "spikes and the silence; dashed: α exp(βt) + γ, as in the paper, up to the "
+            "last spike.",
+            x_label="Time from the start of the hold",
             x_unit="s",
-            beside=True,
             panels=(
                 Panel(
                     label="Rate",
                     unit="Hz",
                     series=(
-                        Series(x=held[1:] - start, y=1 / np.diff(held), mark="dots"),
+                        Series(x=middles, y=1 / np.diff(held), mark="dots"),
                         *curves,
                     ),
                     limits=(0, None),
                     text="\n".join(fitted),
                 ),
-                Panel(
-                    label="Rate",
-                    unit="Hz",
-                    series=tuple(
+            ),
+        )
+        if fit is not None and held.size > 1:
+            yield _beside_adrian(middles, 1 / np.diff(held), fit)
+
+
+def _beside_adrian(middles: FloatArray, rates: FloatArray, fit: Adaptation) -> Plot:
+    """Falling rates over their peak against time over its constant (Fig. 5d left)."""
+    tau, scaled = fit.time_constant.value, np.linspace(0, 6, 200)
+    colours = zip(ADRIAN, ("V_C1", "V_C2"), strict=True)
+    return Plot(
+        name="adrian",
+        title="adaptation beside a muscle's",
+        caption="Rate over its highest against time over the time constant of its own "
+        "exponential: dots, this run; dashed, Adrian and Zotterman's muscle drawn from "
+        "the coefficients the paper prints (Fig. 5d, left), which are no data. So "
+        "scaled, curves that fall alike lie on one another; their rates "
+        f"({ADRIAN[0].rate(0):.0f} and {ADRIAN[1].rate(0):.0f} Hz at first) and time "
+        "constants (1.3 and 1.0 s) are others.",
+        x_label="Time over the time constant",
+        panels=(
+            Panel(
+                label="Rate over its highest",
+                series=(
+                    Series(
+                        x=middles / tau, y=rates / rates.max(), mark="dots",
+                        name=f"this run, τ = {show(tau, 's', 3)}",
+                    ),
+                    *(
                         Series(
-                            x=later, y=curve.rate(later), mark="dashed", colour=colour,
-                            name=curve.stimulus,
+                            x=scaled,
+                            y=curve.rate(-scaled / curve.beta) / curve.rate(0),
+                            mark="dashed", colour=colour,
+                            name=f"muscle, {curve.stimulus}",
                         )
                         for curve, colour in colours
                     ),
-                    limits=(0, None),
-                    text=f"Adrian and Zotterman 1926:\n{MARK}",
                 ),
+                limits=(0, None),
+                text=MARK,
+                corner="lower",
             ),
-        )  # fmt: skip
+        ),
+    )  # fmt: skip
 
 
 def _by_circuit(run: Measurement, trial: MeasuredTrial) -> Conclusion:

@@ -106,6 +106,7 @@ class Panel:
         text: some lines within it, such as fitted values.
         corner: the one on the right where they stand.
         note: a small line above it.
+        blank: without numbers on the y axis, where they mean nothing.
         height: inches in the report.
     """
 
@@ -119,6 +120,7 @@ class Panel:
     text: str = ""
     corner: Literal["upper", "lower"] = "upper"
     note: str = ""
+    blank: bool = False
     height: float = 2.5
 
 

@@ -93,7 +93,7 @@ def _spikes(spikes: NDArray[np.float64]) -> Panel:
         prefix="",
         series=(
             Series(x=spikes, mark="ticks", colour="V_K"),
-            Series(x=spikes[1:], y=rates, mark="dots"),
+            Series(x=(spikes[1:] + spikes[:-1]) / 2, y=rates, mark="dots"),
         ),
         limits=(0.0, float(rates.max(initial=0.0)) / 0.78 or 1.0),
         note=f"{spikes.size} spikes (ticks), instantaneous rate 1/ISI (dots)",

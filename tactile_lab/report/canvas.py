@@ -89,7 +89,7 @@ def draw(
             _x_axis(axes, plot, factor)
         for axes, letter in zip(drawn, "abcdef" if plot.letters else "", strict=False):
             axes.annotate(
-                letter, (0, 1), (-0.58 * 72, -1), xycoords="axes fraction",
+                letter, (0, 1), (-0.66 * 72, -1), xycoords="axes fraction",
                 textcoords="offset points", weight="bold", size=10, va="top",
             )  # fmt: skip
         labelled = drawn if plot.beside else drawn[-1:]
@@ -156,7 +156,13 @@ def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
         None if low is None else low * factor, None if high is None else high * factor
     )
     axes.set_ylabel(_math(text))
-    if not panel.log:
+    if panel.blank:
+        axes.yaxis.label.set(rotation=0, ha="right", va="center")
+        axes.yaxis.set_label_coords(-0.08 / (WIDTH - LEFT - RIGHT), 0.5)
+    if panel.blank:
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+    elif not panel.log:
         few = max(3, round(3 * panel.height))
         axes.yaxis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
     _legend(axes, panel.series)
@@ -168,9 +174,10 @@ def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
         )  # fmt: skip
     if panel.note:
         axes.annotate(
-            _math(panel.note), (1, 1), (0, 3), xycoords="axes fraction",
-            textcoords="offset points", ha="right", va="bottom", size=6.5,
-            color=QUIET.light,
+            _math(panel.note), (1, 1), (-2, -2), xycoords="axes fraction",
+            textcoords="offset points", ha="right", va="top", size=6.5, zorder=20,
+            color=QUIET.light, bbox={"fc": PAPER.light, "ec": "none", "alpha": 0.8,
+            "pad": 1},
         )  # fmt: skip
 
 
@@ -208,7 +215,7 @@ def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None
     y = _scaled(s.y, y_by) if np.size(s.y) else np.empty(0)
     over: Any = {"color": colour, "zorder": order}
     if s.mark == "ticks":
-        axes.vlines(x, 0.86, 0.98, transform=axes.get_xaxis_transform(), lw=0.7, **over)
+        axes.vlines(x, 0.1, 0.9, transform=axes.get_xaxis_transform(), lw=0.7, **over)
         return
     if s.low is not None and s.high is not None:
         _between(axes, s, x, _scaled(s.low, y_by), _scaled(s.high, y_by), over)

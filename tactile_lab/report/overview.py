@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import show
+from tactile_lab.quantity import count, show
 from tactile_lab.report.splice import ClosedTime
+from tactile_lab.spikes.rate import begins
 
 FloatArray = NDArray[np.float64]
 
@@ -24,48 +25,57 @@ SHARP = {"V_C2", "V_K"}
 """Signals that jump within a bin: their extremes are the trace, not their mean."""
 DRAWN_BINS = 1600
 """More bins than a printed column can show only swell the file."""
+MOST_TICKS = 150
+"""More spikes than that run into one another: their density is drawn."""
+SPIKES_IN_BIN, MOST_BINS = 5, 200
+"""Of that density: spikes in a bin on average, at least, and bins."""
+
+Told = tuple[Panel, str]
+"""A panel, and what its caption says of it."""
 
 
 def overview(run: Measurement) -> Plot:
     """Describe the whole run, recoveries left out."""
     axis = ClosedTime(run)
-    panels = [_force(run, axis)]
-    said = ["Force"]
+    told = [_force(run, axis)]
     voltages = [t for name in ("V_C1", "V_C2") if (t := run.trace(name))]
     if voltages:
-        panels.append(_voltages(run, voltages, axis))
-        said.append(
-            "Voltages: mean and, shaded, the extremes within each bin; dotted: the "
-            "model driven by the applied current"
-        )
+        told.append(_voltages(run, voltages, axis))
     if drain := run.trace("I_DS"):
-        panels.append(_drain(run, drain, axis))
-        said.append("Drain current")
+        told.append(_drain(run, drain, axis))
+    if spiking := run.trace("V_K"):
+        told.append(_potential(spiking, axis))
     if run.searched or run.spike_times.size:
-        panels.append(_spikes(run, axis))
-        said.append(
-            "Spikes as detected (ticks) and the instantaneous rate 1/ISI (dots)"
-        )
+        told += _spikes(run, axis)
     marks = (*_holds(run, axis), *(Guide(at=cut) for cut in axis.cuts))
-    parts = [f"({'abcd'[i]}) {text}." for i, text in enumerate(said)]
+    parts = [f"({'abcdef'[i]}) {text}." for i, (_, text) in enumerate(told)]
+    ends = " Grey bands: holds, from when the applied force was there."
     return Plot(
         name="figure",
-        caption=" ".join([*parts, "Grey bands: holds."]),
-        x_label="Time, recoveries left out at dotted lines" if axis.cuts else "Time",
+        caption=" ".join(parts) + ends,
+        x_label=axis.label,
         x_unit="s",
         x_prefix="",
-        x_limits=(0.0, axis.end),
+        x_limits=(axis.begin, axis.end),
         letters=True,
         panels=tuple(
             Panel(**{**vars(panel), "guides": (*marks, *panel.guides)})
-            for panel in panels
+            for panel, _ in told
         ),
     )
 
 
 def _holds(run: Measurement, axis: ClosedTime) -> list[Guide]:
-    held = [t.held for t in run.trials if t.held is not None and not t.pause]
-    return [Guide(at=axis.at(a), to=axis.at(b), colour="band") for a, b in held]
+    """Bands from when the force applied reached a hold's level to when it left it."""
+    found = []
+    for trial in run.trials:
+        if trial.held is not None and not trial.pause:
+            start, end = trial.held
+            late = max((run.applied_edge(trial) or start) - start, 0.0)
+            late = late if late < (end - start) / 2 else 0.0
+            begin, over = axis.at(start + late), axis.at(end + late)
+            found.append(Guide(at=begin, to=over, colour="band"))
+    return found
 
 
 def overranges(signals: list[RecordedSignal], axis: ClosedTime) -> list[Guide]:
@@ -82,7 +92,7 @@ def overranges(signals: list[RecordedSignal], axis: ClosedTime) -> list[Guide]:
     ]
 
 
-def _force(run: Measurement, axis: ClosedTime) -> Panel:
+def _force(run: Measurement, axis: ClosedTime) -> Told:
     time = axis.closed(np.append(run.force.time, max(run.duration, run.force.end)))
     force = np.append(run.force.value, run.force.value[-1])
     low = high = None
@@ -101,7 +111,7 @@ def _force(run: Measurement, axis: ClosedTime) -> Panel:
     ]
     least, most = min(0.0, float(force.min())), max(0.0, float(force.max()))
     span = (most - least) or 1e-3
-    return Panel(
+    panel = Panel(
         label="Force",
         unit="N",
         prefix="m",
@@ -118,11 +128,15 @@ def _force(run: Measurement, axis: ClosedTime) -> Panel:
         limits=(least - (0.22 if least < 0 else 0) * span, most + 0.26 * span),
         height=1.15,
     )
+    text = "Force by the current that flowed, the lags of coil and core included"
+    if run.current is not None and len(run.current) > 2:
+        text += "; its steps are the source's set-points"
+    return panel, text
 
 
 def _voltages(
     run: Measurement, signals: list[RecordedSignal], axis: ClosedTime
-) -> Panel:
+) -> Told:
     model, guides = run.trace("V_C1", model=True), []
     if run.circuit is not None and not run.force.value.any():
         # without force, what matters is how far the sensor is from firing
@@ -137,7 +151,7 @@ def _voltages(
         series.append(Series(x=time, y=mean, name="V_C1 of the model", **look))
     least = min(float(np.min(s.mean)) for s in signals if s.mean.size)
     floor = 0.0 if len(signals) > 1 and least >= 0 else None
-    return Panel(
+    panel = Panel(
         label="Voltage",
         unit="V",
         series=tuple(series),
@@ -145,20 +159,24 @@ def _voltages(
         limits=(floor, None),
         height=1.9,
     )
+    text = "Voltages: mean and, shaded, the extremes within each bin"
+    if model is not None:
+        text += "; dotted: the model driven by the applied current"
+    return panel, text
 
 
-def _drain(run: Measurement, signal: RecordedSignal, axis: ClosedTime) -> Panel:
+def _drain(run: Measurement, signal: RecordedSignal, axis: ClosedTime) -> Told:
     derived = signal.source == "derived"
     seen = run.trace("V_C1") if derived else signal
-    return Panel(
+    panel = Panel(
         label="I_DS",
         unit="A",
         guides=tuple(overranges([seen] if seen else [], axis)),
         series=(_series(signal, axis),),
         limits=(min(0.0, float(signal.mean.min()) * 1.05), None),
-        note="from V_C1, Eq. (16)" if derived else "",
         height=0.95,
     )
+    return panel, "Drain current" + (", from V_C1 by Eq. (16)" if derived else "")
 
 
 def _series(signal: RecordedSignal, axis: ClosedTime, name: str = "") -> Series:
@@ -191,46 +209,69 @@ def _binned(
     return np.append(cells, how(values[whole:]))
 
 
-def _spikes(run: Measurement, axis: ClosedTime) -> Panel:
+def _potential(signal: RecordedSignal, axis: ClosedTime) -> Told:
+    panel = Panel(
+        label="V_K",
+        unit="V",
+        series=(_series(signal, axis),),
+        guides=tuple(overranges([signal], axis)),
+        limits=(min(0.0, float(np.min(signal.mean))), None),
+        height=0.7,
+    )
+    return panel, "V_K: the extremes within each bin"
+
+
+def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
+    """The spike train in a lane of its own, and the rate."""
     trials = run.results
     starts = [axis.at(t.start) for t in trials]
     spikes = [t.spike_times + at for t, at in zip(trials, starts, strict=True)]
-    at, rates, highest = _rates(spikes)
+    at, rates = _rates(spikes)
     fits = [
         _fit(t, start)
         for t, start in zip(trials, starts, strict=True)
         if t.adaptation is not None
     ]
-    count = sum(times.size for times in spikes)
-    note = f"{count} spikes (ticks), instantaneous rate 1/ISI (dots)"
+    text = "Instantaneous rate 1/ISI, each in the middle of its interval"
     if fits:
-        note += ", fit α exp(βt) + γ (dashed)"
-    return Panel(
+        text += "; dashed: fit α exp(βt) + γ"
+    panel = Panel(
         label="Rate",
         unit="Hz",
         prefix="",
-        series=(
-            Series(x=np.concatenate([*spikes, []]), mark="ticks", colour="V_K"),
-            Series(x=at, y=rates, mark="steps"),
-            Series(x=at, y=rates, mark="dots"),
-            *fits,
-        ),
-        limits=(0.0, highest / 0.78 if highest else 1.0),
-        note=note,
-        height=1.75,
+        series=(Series(x=at, y=rates, mark="dots"), *fits),
+        limits=(0.0, 1.08 * float(np.nanmax(rates)) if rates.size else 1.0),
+        height=1.5,
     )
+    return [_train(np.concatenate([*spikes, []]), axis), (panel, text)]
 
 
-def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray, float]:
-    """Times and instantaneous rates, NaN between trains, and the highest rate."""
-    trains = [times for times in spikes if times.size > 1]
-    at = np.concatenate(
-        [np.append(times[1:], np.nan) for times in trains] or [np.empty(0)]
-    )
-    rates = np.concatenate(
-        [np.append(1 / np.diff(t), np.nan) for t in trains] or [np.empty(0)]
-    )
-    return at, rates, float(np.nanmax(rates)) if trains else 0.0
+def _train(spikes: FloatArray, axis: ClosedTime) -> Told:
+    """Ticks, or where they would run into one another how many there are."""
+    told = count(spikes.size, "spike")
+    if spikes.size <= MOST_TICKS:
+        series = Series(x=spikes, mark="ticks", colour="V_K")
+        panel = Panel(
+            label="Spikes", series=(series,), limits=(0, 1), blank=True, height=0.3
+        )
+        return panel, f"{told}, as detected"
+    bins = min(spikes.size // SPIKES_IN_BIN, MOST_BINS)
+    edges = np.linspace(axis.begin, axis.end, bins + 1)
+    density = np.histogram(spikes, edges)[0] / np.diff(edges)
+    middles = (edges[:-1] + edges[1:]) / 2
+    series = Series(x=middles, y=density, mark="filled", colour="V_K")
+    panel = Panel(label="Spikes/s", series=(series,), limits=(0, None), height=0.5)
+    return panel, f"{told}: how many a second, in {bins} bins"
+
+
+def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Middles of the intervals of each train and their rates; none across a silence."""
+    at, rates = [np.empty(0)], [np.empty(0)]
+    for times in spikes:
+        inside = ~begins(times)[1:]
+        at.append(((times[1:] + times[:-1]) / 2)[inside])
+        rates.append(1 / np.diff(times)[inside])
+    return np.concatenate(at), np.concatenate(rates)
 
 
 def _fit(trial: MeasuredTrial, start: float) -> Series:

@@ -15,21 +15,31 @@ FloatArray = NDArray[np.float64]
 class ClosedTime:
     """A run's time axis that closes up over each pause.
 
+    Where the run has a single trial, its start is 0: what is said of a trial counts
+    from there.
+
     Attributes:
         cuts: where something was cut, s on the closed axis.
+        begin, end: of the run, s on the closed axis.
+        label: what the axis is called.
     """
 
     def __init__(self, run: Measurement) -> None:
         pauses = [(t.start, t.start + t.duration) for t in run.trials if t.pause]
+        single = run.results if len(run.results) == 1 and not pauses else ()
+        self._zero = single[0].start if single else 0.0
         self._begins, self._ends = np.array(pauses or np.empty((0, 2))).T
         self._gone = np.append(0.0, np.cumsum(self._ends - self._begins))
         self.cuts = tuple(float(c) for c in self.closed(self._begins))
-        self.end = float(self.closed(np.array(run.duration)))
+        self.begin, self.end = self.at(0.0), self.at(run.duration)
+        self.label = "Time" if self._zero == 0 else "Time from the start of the trial"
+        if self.cuts:
+            self.label = "Time, recoveries left out at dotted lines"
 
     def closed(self, time: FloatArray) -> FloatArray:
         """Run time, s, on the closed axis; all of a pause falls onto its cut."""
         if not self._begins.size:
-            return time
+            return time - self._zero
         number = np.searchsorted(self._begins, time, side="right")
         last = np.maximum(number - 1, 0)
         still = np.where(number > 0, np.maximum(0.0, self._ends[last] - time), 0.0)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from tactile_lab.analysis.spike_pairs import Matched
 from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
 from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
-from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import printed
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
@@ -182,11 +182,12 @@ def twin_plot(run: Measurement, twin: Twin) -> Plot | None:
         title="measured less model",
         caption="Measured less model, the model driven by the applied current. "
         f"{parts} Shaded: the tolerance, what codes, clocks and what the bench "
-        "states of followers, lag, force and temperature leave open (95 %).",
-        x_label="Time, recoveries left out at dotted lines" if axis.cuts else "Time",
+        "states of followers, lag, force and temperature leave open (95 %). Triangles: "
+        "beyond the panel.",
+        x_label=axis.label,
         x_unit="s",
         x_prefix="",
-        x_limits=(0.0, axis.end),
+        x_limits=(axis.begin, axis.end),
         letters=True,
         panels=tuple(
             Panel(
@@ -216,7 +217,18 @@ def _voltage(
         float(np.nanpercentile(np.abs(difference), 99.5)),
         float(np.nanmedian(tolerance)),
     )
-    return "V_C1", "V", _tolerated(time, difference, tolerance, "line"), most or 1e-3
+    series = _tolerated(time, difference, tolerance, "line")
+    most = most or 1e-3
+    return "V_C1", "V", (*series, *_beyond(time, difference, most)), most
+
+
+def _beyond(time: FloatArray, value: FloatArray, most: float) -> Iterator[Series]:
+    """Triangles at the edge of the panel where the line goes on beyond it."""
+    for mark, outside in (("up", value > most), ("down", value < -most)):
+        at = time[outside]
+        if at.size:
+            edge = np.full(at.size, most if mark == "up" else -most)
+            yield Series(x=at, y=0.94 * edge, mark=cast(Mark, mark), colour="V_C1")
 
 
 def _matched(

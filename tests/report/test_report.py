@@ -182,7 +182,8 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
     )  # fmt: skip
     report = write(tmp_path, empty)
     assert "No trial was completed" in report.html.read_text(encoding="utf-8")
-    assert len(overview(report.findings.run).panels) == 2
+    labels = [panel.label for panel in overview(report.findings.run).panels]
+    assert labels == ["Force", "Spikes", "Rate"]
 
 
 @pytest.mark.parametrize(
@@ -210,6 +211,47 @@ def test_what_left_its_range_is_shaded_in_its_panels(demo):
     assert shaded["Force"] == shaded["Rate"] == []
 
 
+def panel_of(run, label):
+    return next(p for p in overview(run).panels if p.label == label)
+
+
+def test_a_rate_stands_in_the_middle_of_its_interval_and_none_over_a_silence(demo):
+    times = np.array([0.5, 0.6, 0.8, 0.9, 3.0, 3.1])
+    trial = replace(demo.trials[0], spike_times=times, hold=None)
+    run = replace(demo, trials=(trial, *demo.trials[1:2]))
+    (rates, *_) = panel_of(run, "Rate").series
+    first = rates.x[:4] - trial.start
+    np.testing.assert_allclose(first, [0.55, 0.7, 0.85, 3.05])
+    np.testing.assert_allclose(rates.y[:4], [10, 5, 10, 10])
+
+
+def test_many_spikes_are_drawn_as_their_density(demo):
+    few = next(p for p in overview(demo).panels if p.label == "Spikes")
+    assert few.series[0].mark == "ticks" and few.blank
+    times = np.linspace(0.5, 4.0, 351)
+    trial = replace(demo.trials[0], spike_times=times)
+    (density,) = panel_of(replace(demo, trials=(trial,)), "Spikes/s").series
+    inside = (density.x > 0.7) & (density.x < 3.8)
+    assert density.y[inside] == pytest.approx(100, rel=0.1)
+
+
+def test_a_hold_is_shaded_from_when_its_force_was_there(demo):
+    late = Waveform(demo.force.time + 0.06, demo.force.value)
+    run = replace(demo, force=late)
+    bands = [g for g in overview(run).panels[0].guides if g.colour == "band"]
+    start, end = demo.trials[0].held
+    assert bands[0].at == pytest.approx(start + 0.06, abs=0.01)
+    assert bands[0].to == pytest.approx(end + 0.06, abs=0.01)
+
+
+def test_a_single_trial_counts_time_from_its_start(demo):
+    trial = replace(demo.trials[0], start=0.3)
+    plot = overview(replace(demo, trials=(trial,)))
+    assert plot.x_limits == (-0.3, demo.duration - 0.3)
+    assert plot.x_label == "Time from the start of the trial"
+    assert overview(demo).x_label == "Time"
+
+
 def test_what_a_protocol_calls_its_trials_stands_in_table_and_figure(demo):
     trials = [
         replace(t, label=f"gap {i} s", level=0.15) for i, t in enumerate(demo.trials)
@@ -227,4 +269,4 @@ def test_what_a_protocol_calls_its_trials_stands_in_table_and_figure(demo):
 def test_writing_tells_how_far_it_is(demo, tmp_path):
     told = []
     write(tmp_path, demo, progress=told.append)
-    assert told == sorted(told) and told[-1] == 1.0 and len(told) > 2
+    assert told == sorted(told) and told[-1] == 1.0 and len(told) > 1
