@@ -10,11 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from PySide6.QtCore import QObject, QPoint, Qt, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.closing import Closing
+from gui.dialogs.overlay import Overlay
+from gui.menu import Acts, GearMenu
+from gui.preferences import Preferences
 from gui.run_actions import RunActions
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
@@ -47,6 +50,7 @@ class Actions(QObject):
         screen: opens scenes and runs.
         runs: what can be done with runs on disk.
         closing: the question in which Esc is not STOP.
+        preferences: of the user.
     """
 
     fold_asked = Signal(QWidget, bool)
@@ -59,10 +63,11 @@ class Actions(QObject):
         screen: Screen,
         runs: RunActions,
         closing: Closing,
+        preferences: Preferences,
     ) -> None:
         super().__init__(window)
-        self._window, self._panels, self._screen = window, panels, screen
-        self._runs = runs
+        self.window, self.panels, self.screen = window, panels, screen
+        self.runs, self.preferences = runs, preferences
         self.keys = self._all()
         for key in self.keys:
             for keys in () if key.single else key.keys:
@@ -82,11 +87,17 @@ class Actions(QObject):
         panels.header.picture_asked.connect(self.copy_picture)
 
     def _bind(self, keys: str, key: Shortcut) -> None:
-        shortcut = QShortcut(QKeySequence(keys), self._window)
+        shortcut = QShortcut(QKeySequence(keys), self.window)
         shortcut.activated.connect(lambda: key.act())
 
     def take_key(self, event: QKeyEvent) -> bool:
-        """A key no widget wanted; whether it was one of the single ones."""
+        """A key no widget wanted; whether it was one of the single ones.
+
+        None acts on what lies hidden below a card.
+        """
+        cards = self.window.findChildren(Overlay)
+        if any(card.isVisible() for card in cards):
+            return False
         pressed = _written(event)
         for key in self.keys:
             if key.single and pressed in key.keys:
@@ -95,7 +106,7 @@ class Actions(QObject):
         return False
 
     def _all(self) -> list[Shortcut]:
-        panels = self._panels
+        panels = self.panels
         tools, view = panels.centre.tools, panels.centre.view
         cross = panels.centre.stack.scene.toggle_crosshair
         form = panels.setup.form
@@ -130,13 +141,16 @@ class Actions(QObject):
                 ("End",), "End of the run", lambda: view.set_follow(True), single=True
             ),
             Shortcut(("N",), "Note", panels.centre.log.note.setFocus, single=True),
-            Shortcut(("Ctrl+O",), "Open a scene", self._screen.ask_scene),
-            Shortcut(("Ctrl+Shift+O",), "Open a run", self._screen.ask_run),
+            Shortcut(("Ctrl+O",), "Open a scene", self.screen.ask_scene),
+            Shortcut(("Ctrl+Shift+O",), "Open a run", self.screen.ask_run),
+            Shortcut(("Ctrl+K",), "Connect instruments", self.connect_dialog),
+            Shortcut(("Ctrl+,",), "Settings", self.show_preferences),
+            Shortcut(("Ctrl+Q",), "Quit", self.window.close),
             Shortcut(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
             Shortcut(("Ctrl+E",), "Export the view", lambda: self.export_view()),
             Shortcut(("Ctrl+F",), "Search runs", self._search),
-            Shortcut(("Ctrl+I",), "About the run: notes", self._runs.about_shown),
-            Shortcut(("F5",), "Read the runs anew", self._screen.list_runs),
+            Shortcut(("Ctrl+I",), "About the run: notes", self.runs.about_shown),
+            Shortcut(("F5",), "Read the runs anew", self.screen.list_runs),
             Shortcut(("Ctrl+1",), "Results", lambda: self._tab(0)),
             Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
             Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),
@@ -157,92 +171,94 @@ class Actions(QObject):
         ]
 
     def _nudge(self, way: int) -> None:
-        view = self._panels.centre.view
+        view = self.panels.centre.view
         if view.cursors is not None:
             view.move_cursor(1, view.cursors[1] + way * view.width / 400)
         else:
             view.pan(way * view.width / 10)
 
     def _home(self) -> None:
-        view = self._panels.centre.view
+        view = self.panels.centre.view
         view.show_span(0.0, view.width)
 
     def _tab(self, number: int) -> None:
-        panels = self._panels
+        panels = self.panels
         if panels.review.isHidden():
             self.fold_asked.emit(panels.review, False)
         panels.review.show_tab(number)
 
     def _search(self) -> None:
         self._tab(1)
-        self._panels.review.runs.search.setFocus()
+        self.panels.review.runs.search.setFocus()
 
     def _fold(self, side: object) -> None:
-        panels = self._panels
+        panels = self.panels
         panel = panels.setup if side is panels.setup else panels.review
         self.fold_asked.emit(panel, panel.isVisible())
 
     def _focus(self) -> None:
-        panels = self._panels
+        panels = self.panels
         folded = panels.setup.isVisible() or panels.review.isVisible()
         self.fold_asked.emit(panels.setup, folded)
         self.fold_asked.emit(panels.review, folded)
 
     def copy_picture(self) -> None:
         """Put a picture of the window on the clipboard."""
-        QGuiApplication.clipboard().setPixmap(self._window.grab())
+        QGuiApplication.clipboard().setPixmap(self.window.grab())
 
     def save_scene(self) -> None:
         """Save the form as a scene file."""
         from gui.dialogs.saving import save_scene
 
-        save_scene(self._panels)
+        save_scene(self.panels)
 
     def export_view(self) -> None:
         """Export what the lanes show."""
         from gui.dialogs.saving import export_view
 
-        export_view(self._panels, self._screen)
+        export_view(self.panels, self.screen)
 
-    def show_help(self, topic: str = "") -> None:
-        """Show the shortcut list and the help of the panels, at a topic."""
+    def show_help(self, topic: str = "", page: int = 0) -> None:
+        """Show the help: 0 panels, at a topic; 1 shortcuts; 2 about the program."""
         from gui.dialogs.help import show_help
 
         keys = [(", ".join(key.keys), key.words) for key in self.keys]
-        show_help(self._window, keys, topic)
+        show_help(self.window, keys, topic, page)
 
     def connect_dialog(self) -> None:
         """Show the connect dialog."""
         from gui.dialogs.connect import show_connect
 
-        show_connect(self._window, self._panels, self._screen)
+        show_connect(self.window, self.panels, self.screen)
+
+    def show_preferences(self) -> None:
+        """Show the card with what a user prefers."""
+        from gui.dialogs.preferring import PreferencesCard
+
+        found = self.window.findChild(PreferencesCard)
+        card = found or PreferencesCard(self.window, self.preferences)
+        card.show_preferences()
 
     def show_menu(self) -> None:
         """Open the menu below its button."""
-        panels, menu = self._panels, QMenu(self._window)
-        session, theme = panels.session, panels.theme
-        menu.addAction("Open scene …", self._screen.ask_scene)
-        menu.addAction("Save scene …", self.save_scene)
-        menu.addAction("Open run …", self._screen.ask_run)
-        menu.addAction("Export view …", self.export_view)
-        menu.addSeparator()
-        menu.addAction("Use simulated bench", lambda: session.connect_bench("sim"))
-        menu.addAction("Connect instruments …", self.connect_dialog)
-        menu.addAction("Disconnect", session.disconnect_bench)
-        menu.addSeparator()
-        for word in ("system", "light", "dark"):
-            one = menu.addAction(f"Theme: {word}", partial(theme.choose, word))
-            one.setCheckable(True)
-            one.setChecked(theme.choice == word)
-        menu.addSeparator()
-        menu.addAction("Copy command line", self._copy_command)
-        menu.addAction("Help and shortcuts", lambda: self.show_help())
-        menu.addAction("Quit", self._window.close)
-        button = panels.header.menu_button
-        menu.popup(button.mapToGlobal(QPoint(0, button.height())))
+        acts = Acts(
+            save_scene=self.save_scene,
+            about_run=self.runs.about_shown,
+            export_view=self.export_view,
+            connect=self.connect_dialog,
+            settings=self.show_preferences,
+            copy_command=self.copy_command,
+            help=self.show_help,
+            about=partial(self.show_help, page=2),
+            quit=self.window.close,
+        )
+        recent = self.preferences.recent
+        menu = GearMenu(self.window, self.panels, self.screen, recent, acts)
+        menu.open_below(self.panels.header.menu_button)
 
-    def _copy_command(self) -> None:
-        QGuiApplication.clipboard().setText(self._panels.setup.request().command())
+    def copy_command(self) -> None:
+        """Put the command that runs what the form asks for on the clipboard."""
+        QGuiApplication.clipboard().setText(self.panels.setup.request().command())
 
 
 def _written(event: QKeyEvent) -> str:

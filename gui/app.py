@@ -13,7 +13,9 @@ from PySide6.QtWidgets import QApplication
 
 from gui.look import fonts
 from gui.look.theme import Theme
+from gui.preferences import Preferences
 from gui.session.session import Session
+from gui.tool_tips import ToolTips
 from gui.window import Window
 from tactile_lab.engine.threads import start
 
@@ -29,22 +31,24 @@ def application(arguments: Sequence[str] = ()) -> QApplication:
     app.setOrganizationName("tactile-lab")
     app.setStyle("Fusion")
     app.setFont(fonts.load())
+    if not app.findChildren(ToolTips):
+        ToolTips(app)
     return app
 
 
 def main(
     target: str | None = None,
     *,
-    out: Path = Path("runs"),
-    bench: str | None = "sim",
+    out: Path | None = None,
+    bench: str | None = None,
     theme: str = "system",
 ) -> int:
     """Open the window and stay until it is closed.
 
     Args:
         target: scene, protocol file or run folder to open; None for the demo.
-        out: folder for run folders.
-        bench: "sim", a bench file, or None for the empty state.
+        out: folder for run folders; None for that of the preferences.
+        bench: "sim", a bench file, "none"; None for that of the preferences.
         theme: "system", "light" or "dark".
 
     Returns:
@@ -55,12 +59,17 @@ def main(
     app = application(["tactile-lab"])
     chosen = Theme(theme)
     chosen.apply()
-    session = Session(out)
-    window = Window(session, chosen, QSettings())
+    settings = QSettings()
+    wishes = Preferences(settings)
+    session = Session(out or wishes.folder)
+    session.run.reports = wishes.reports
+    window = Window(session, chosen, settings)
     window.resize(window.size().boundedTo(window.screen().availableSize() - FRAME))
     window.show()
     _close_on_signals(window)
-    QTimer.singleShot(0, lambda: begin(window, target, bench))
+    wanted = bench or wishes.bench
+    wanted_bench = None if wanted == "none" else wanted
+    QTimer.singleShot(0, lambda: begin(window, target, wanted_bench))
     app.exec()
     session.close()
     left = session.coil_view()

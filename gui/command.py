@@ -9,8 +9,6 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.options import runs_option
-
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
 INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
 
@@ -19,17 +17,20 @@ INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
 @click.argument("target", required=False, metavar="[SCENE|RUN]")
 @click.option(
     "--bench",
-    default="sim",
-    show_default=True,
     metavar="FILE|sim|none",
-    help="Bench to connect to.",
+    help="Bench to connect to; else that of the window's settings, at first sim.",
 )
-@runs_option
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR",
+    help="Where run folders are put; else as the settings say, at first runs.",
+)  # fmt: skip
 @click.option(
     "--theme", type=click.Choice(["system", "light", "dark"]), default="system",
     show_default=True, help="Colours.",
 )  # fmt: skip
-def command(target: str | None, bench: str, out: Path, theme: str) -> None:
+def command(
+    target: str | None, bench: str | None, out: Path | None, theme: str
+) -> None:
     """Open the bench window, on SCENE, PROTOCOL.py or a RUN folder if given."""
     if importlib.util.find_spec("PySide6") is None:
         raise click.ClickException(
@@ -48,6 +49,4 @@ def command(target: str | None, bench: str, out: Path, theme: str) -> None:
             f"Qt does not load: {error}. On Debian its libraries come with: apt-get "
             "install libegl1 libgl1 libxkbcommon0 libdbus-1-3 libfontconfig1"
         ) from error
-    sys.exit(
-        app.main(target, out=out, bench=None if bench == "none" else bench, theme=theme)
-    )
+    sys.exit(app.main(target, out=out, bench=bench, theme=theme))

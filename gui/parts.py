@@ -34,6 +34,7 @@ from PySide6.QtWidgets import (
 
 from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
+from gui.look.tokens import DARK
 
 
 def label(text: str, role: str = "", *, wrap: bool = False) -> QLabel:
@@ -138,6 +139,11 @@ class IconButton(QToolButton):
 
     def set_wide(self, wide: bool) -> None:
         """Show the text beside the icon, or the icon alone."""
+        alone = not (wide and self._text)
+        if alone is not self.property("alone"):
+            self.setProperty("alone", alone)
+            self.style().unpolish(self)
+            self.style().polish(self)
         if wide and self._text:
             self.setText(self._text)
             self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
@@ -152,7 +158,8 @@ class IconButton(QToolButton):
     def _tint(self) -> None:
         tokens = self._theme.tokens
         colour = tokens.header_muted if self._on_header else tokens.muted
-        self.setIcon(icon(self._icon, colour, tokens.selected_text))
+        down = DARK.selected_text if self._on_header else tokens.selected_text
+        self.setIcon(icon(self._icon, colour, down))
 
 
 class Combo(QComboBox):
@@ -161,6 +168,22 @@ class Combo(QComboBox):
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Leave the wheel to the page."""
         event.ignore()
+
+    def showPopup(self) -> None:
+        """Open the list as high as its rows need; Qt forgets the style's padding."""
+        super().showPopup()
+        view = self.view()
+        bar = view.verticalScrollBar()
+        if 0 < self.count() <= self.maxVisibleItems() and bar.maximum() > 0:
+            frame = view.window()
+            rows = sum(view.sizeHintForRow(row) for row in range(self.count()))
+            more = rows - view.viewport().height()
+            frame.resize(frame.width(), frame.height() + max(more, 0))
+            below = (
+                frame.screen().availableGeometry().bottom() - frame.geometry().bottom()
+            )
+            if below < 0:
+                frame.move(frame.x(), frame.y() + below)
 
 
 class Segments(QFrame):

@@ -19,9 +19,11 @@ from gui.banner import Banner
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.dialogs.question import QuestionCard
+from gui.habits import Habits
 from gui.header.header import Header
 from gui.look.theme import Theme
 from gui.parts import column
+from gui.preferences import Preferences
 from gui.review.panel import ReviewPanel
 from gui.run_actions import RunActions
 from gui.screen.centre import Centre
@@ -53,10 +55,10 @@ class Window(QMainWindow):
         self, session: Session, theme: Theme, settings: QSettings | None = None
     ) -> None:
         super().__init__()
-        self.setWindowTitle("Tactile Lab")
         self.setMinimumSize(1180, 720)
         self.setAcceptDrops(True)
         self.session, self.theme, self._settings = session, theme, settings
+        self.preferences = Preferences(settings)
         self.page = QWidget()
         self.header = Header(theme)
         self.banner = Banner(theme)
@@ -75,8 +77,9 @@ class Window(QMainWindow):
         self.frames = Frames(self.panels, self.screen_)
         self.runs = RunActions(self, self.panels, self.screen_)
         self.actions_ = Actions(
-            self, self.panels, self.screen_, self.runs, self.closing
+            self, self.panels, self.screen_, self.runs, self.closing, self.preferences
         )
+        self._habits = Habits(session, self.preferences, self.screen_)
         self._leaving = False
         self._connect()
         self.render_state()
@@ -87,6 +90,8 @@ class Window(QMainWindow):
         """Render everything from the session's snapshot."""
         snapshot, focus = self.session.snapshot(), QApplication.focusWidget()
         self.header.render_snapshot(snapshot)
+        named = dict.fromkeys((snapshot.title, snapshot.bench, "Tactile Lab"))
+        self.setWindowTitle(" · ".join(name for name in named if name))
         self.banner.show_fault(snapshot.fault)
         self.setup.render_snapshot(snapshot)
         self._render_manual(snapshot)
@@ -125,6 +130,13 @@ class Window(QMainWindow):
         if not folded and self.width() < NARROW:  # there is room for one of them
             other = self.setup if side is self.review else self.review
             other.setVisible(False)
+        self._show_folds()
+
+    def _show_folds(self) -> None:
+        """The header's buttons are down where their panel is seen."""
+        sides = (self.setup, self.review)
+        for button, side in zip(self.header.folds, sides, strict=True):
+            button.setChecked(not side.isHidden())
 
     # --- closing
 
@@ -195,6 +207,7 @@ class Window(QMainWindow):
                 side.setVisible(width >= limit)
         if width < NARROW and self.setup.isVisible():  # whatever was unfolded by hand
             self.review.setVisible(False)
+        self._show_folds()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes as one reads; below an open card it reaches the header only."""
@@ -232,6 +245,10 @@ class Window(QMainWindow):
         self.screen_.changed.connect(self.render_state)
         self.frames.told.connect(self.render_clock)
         self.actions_.fold_asked.connect(self.fold)
+        sides = (self.setup, self.review)
+        self.header.fold_asked.connect(
+            lambda number: self.fold(sides[number], not sides[number].isHidden())
+        )
         session.log.added.connect(self.centre.log.add)
         session.plan.arrived.connect(self.screen_.plan_arrived)
         session.source_changed.connect(self.screen_.follow_run)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QStackedWidget, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.parts import STRETCH, Segments, column, label, push, row, scrolling
+from tactile_lab.engine.provenance import environment
+from tactile_lab.notebook import facts
 
 PANELS = (
     (
@@ -104,7 +107,7 @@ class Help(Overlay):
         super().__init__(window, 640)
         self.topic = ""
         self._titles: dict[str, QLabel] = {}
-        choice = Segments(["Panels", "Shortcuts"], "Help page")
+        choice = Segments(["Panels", "Shortcuts", "About"], "Help page")
         choice.group.idClicked.connect(self._show)
         self._choice = choice
         self.close_button = push("Close", "primary")
@@ -112,17 +115,17 @@ class Help(Overlay):
         self._pages = QStackedWidget()
         self._pages.setMinimumHeight(430)
         self._area = scrolling(self._panels())
-        for page in (self._area, scrolling(self._shortcuts(keys))):
+        for page in (self._area, scrolling(self._shortcuts(keys)), self._about()):
             self._pages.addWidget(page)
         head = row(label("Help", "big"), STRETCH, choice)
         foot = row(STRETCH, self.close_button)
         column(self.card, head, self._pages, foot, margin=22, spacing=14)
         self._show(0)
 
-    def show_topic(self, topic: str) -> None:
-        """Open the first page at a topic; "" is its start."""
+    def show_topic(self, topic: str, page: int = 0) -> None:
+        """Open a page, the first at a topic; "" is its start."""
         self.topic = topic
-        self._show(0)
+        self._show(page)
         title = self._titles.get(topic)
         top = 0 if title is None else title.y()
         self._area.verticalScrollBar().setValue(top)
@@ -144,6 +147,15 @@ class Help(Overlay):
         rows.addStretch(1)
         return page
 
+    def _about(self) -> QWidget:
+        """Which versions of what this is."""
+        page = QWidget()
+        found = environment()
+        said = label(facts("Tactile Lab", _flat(found)), "", wrap=True)
+        said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        column(page, said, STRETCH)
+        return page
+
     def _shortcuts(self, own: Sequence[tuple[str, str]]) -> QWidget:
         page = QWidget()
         grid = QGridLayout(page)
@@ -160,12 +172,20 @@ class Help(Overlay):
         return page
 
 
+def _flat(found: Mapping[str, Any]) -> list[tuple[str, object]]:
+    """A mapping of mappings as rows."""
+    rows: list[tuple[str, object]] = []
+    for name, value in found.items():
+        rows += _flat(value) if isinstance(value, Mapping) else [(name, value)]
+    return rows
+
+
 def show_help(
-    window: QWidget, keys: Sequence[tuple[str, str]], topic: str = ""
+    window: QWidget, keys: Sequence[tuple[str, str]], topic: str = "", page: int = 0
 ) -> None:
-    """Open the help, at a topic."""
+    """Open a page of the help, the first at a topic."""
     found = window.findChild(Help)
     shown = found if isinstance(found, Help) else Help(window, keys)
     shown.open()
-    shown.show_topic(topic)
+    shown.show_topic(topic, page)
     shown.close_button.setFocus()

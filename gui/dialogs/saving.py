@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +25,7 @@ from gui.look.tokens import LIGHT, Tokens
 from gui.session.log import Severity
 from gui.setup.parameter import FieldError
 from tactile_lab.errors import TactileLabError
-from tactile_lab.trace import FloatArray
+from tactile_lab.trace import FloatArray, Trace
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels
@@ -64,7 +65,7 @@ def export_view(panels: Panels, screen: Screen) -> None:
         panels.centre.window(),
         "Export this view",
         lambda path: write_view(panels, screen.run, path),
-        kinds="Picture (*.png *.svg);;Table (*.csv)",
+        kinds="Picture or table (*.png *.svg *.csv)",
         start="view.png",
         save=True,
     )
@@ -77,6 +78,9 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
     if run is not None:
         simulated = run.simulated
     title = panels.session.run.name or "plan"
+    bar = panels.centre.compare_bar
+    if run is not None and bar.comparison is run:
+        title += f", {bar.comparison.layout.value}"
     title += " · SIMULATED" if simulated else " · measured"
     try:
         if path.suffix == ".csv":
@@ -172,14 +176,31 @@ def table(stack: LaneStack, title: str) -> str:
     """The visible time as CSV in SI: columns for each lane, units in the header.
 
     Lanes have times of their own, so each has its own time column; shorter columns
-    end early. Of compared runs each has columns, on the common time.
+    end early. What is shown of the model stands beside what was measured. Of compared
+    runs each has columns, on the common time; where the first is taken from them, the
+    columns say so.
     """
-    members, columns = stack.source.members, []
+    source, view = stack.source, stack.view
+    members, columns = source.members, []
     for row in stack.visible_rows():
-        for number, member in enumerate(members, 1):
+        lane = row.lane
+        if lane.raster:
+            columns += _spikes(members, view)
+            continue
+        fine = replace(lane, scale=1.0)
+        count = 1 << 20 if lane.key == "rate" else CSV_POINTS
+        traces = source.shown(fine, view.start, view.end, count)
+        for number, found in enumerate(traces, 1):
             prefix = f"run{number}_" if len(members) > 1 else ""
-            found = _columns(row.lane, member, stack.view)
-            columns += [(prefix + name, values) for name, values in found]
+            if source.subtracts(lane):
+                prefix = f"run{number}_less_run1_"
+                if number == 1:
+                    continue  # nothing is left of it
+            columns += _columns(prefix + lane.key, lane, found)
+        if len(members) == 1 and stack.options.twin and lane.key != "residual":
+            modelled = source.twin(lane.key, view.start, view.end, count)
+            if not modelled.empty:
+                columns += _columns(f"model_{lane.key}", lane, modelled)
     if len(members) > 1:
         names = (f"run{number} {one.name}" for number, one in enumerate(members, 1))
         title = "; ".join([title, *names])
@@ -192,24 +213,23 @@ def table(stack: LaneStack, title: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _columns(
-    lane: Lane, member: Member, view: TimeView
-) -> list[tuple[str, FloatArray]]:
-    """Names and values of a lane's columns, on the common time; the residual's none."""
-    if lane.key == "residual":
-        return []
-    if lane.raster:
+def _spikes(members: Sequence[Member], view: TimeView) -> list[tuple[str, FloatArray]]:
+    """A column of spike times for each run, s."""
+    found = []
+    for number, member in enumerate(members, 1):
         first, last = np.searchsorted(member.spikes, [view.start, view.end])
-        return [("spikes_s", member.spikes[first:last])]
-    count = 1 << 20 if lane.key == "rate" else CSV_POINTS
-    si = replace(lane, scale=1.0)
-    found = member.trace(si, view.start, view.end, count)
-    unit = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}.get(
-        lane.unit, lane.unit
-    )
+        prefix = f"run{number}_" if len(members) > 1 else ""
+        found.append((f"{prefix}spikes_s", member.spikes[first:last]))
+    return found
+
+
+def _columns(name: str, lane: Lane, found: Trace) -> list[tuple[str, FloatArray]]:
+    """Names and values of a trace's columns, SI."""
+    units = {"mN": "N", "mV": "V", "mA": "A", "nA": "A", "mT": "T"}
+    unit = units.get(lane.unit, lane.unit)
     return [
-        (f"{lane.key}_time_s", found.time),
-        (f"{lane.key}_mean_{unit}", found.mean),
-        (f"{lane.key}_min_{unit}", found.low),
-        (f"{lane.key}_max_{unit}", found.high),
+        (f"{name}_time_s", found.time),
+        (f"{name}_mean_{unit}", found.mean),
+        (f"{name}_min_{unit}", found.low),
+        (f"{name}_max_{unit}", found.high),
     ]

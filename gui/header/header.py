@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFont, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel
@@ -34,6 +36,8 @@ class Header(QFrame):
     picture_asked = Signal()
     menu_asked = Signal()
     help_asked = Signal()
+    fold_asked = Signal(int)
+    """Fold a side panel or unfold it: 0 the left one, 1 the right one."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -64,7 +68,20 @@ class Header(QFrame):
         for button, asked in zip(self._buttons, asks, strict=True):
             button.clicked.connect(asked)
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.folds = [
+            IconButton(theme, icon, words, role="hflat", on_header=True, checkable=True)
+            for icon, words in (
+                ("panel-left", "Protocol (F7)"),
+                ("panel-right", "Results, runs and manual control (F8)"),
+            )
+        ]
+        for number, button in enumerate(self.folds):
+            button.clicked.connect(partial(self._fold, number))
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._lay_out()
+
+    def _fold(self, number: int) -> None:
+        self.fold_asked.emit(number)
 
     @property
     def chips(self) -> list[Chip]:
@@ -94,7 +111,8 @@ class Header(QFrame):
             for chip in self._chips:
                 chip.show_room(room)
             bare = room is Room.BARE
-            self._buttons[0].setVisible(not bare)
+            self._buttons[0].setVisible(room is Room.FULL)
+            self._buttons[2].setVisible(not bare)
             least = WHOLE if room is Room.FULL else SHORT
             self._title.setMinimumWidth(least)
             self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
@@ -109,7 +127,8 @@ class Header(QFrame):
         """Render identity, chips, clock and STOP."""
         self.badge.setVisible(snapshot.simulated)
         self._title.set_whole(snapshot.title)
-        self._title.setToolTip(snapshot.title)
+        bench = f"Bench: {snapshot.bench}" if snapshot.bench else "No bench"
+        self._title.setToolTip(f"{snapshot.title}\n{bench}")
         while len(self._chips) < len(snapshot.instruments):
             chip = Chip()
             self._chips.append(chip)
@@ -150,7 +169,7 @@ class Header(QFrame):
         clock = lines(self._state, self._clock, spacing=1)
         clock.setContentsMargins(0, 14, 0, 12)
         whole = bar(self, (16, 0, 14, 0), 11, logo, words, 8, self._chip_row, STRETCH)
-        filled(whole, (*self._buttons, 6, clock, self.stop))
+        filled(whole, (*self.folds, *self._buttons, 6, clock, self.stop))
 
 
 def _colour(snapshot: Snapshot) -> str:

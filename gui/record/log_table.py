@@ -88,8 +88,9 @@ class LogTable(QTableView):
         return "  ".join(str(cell) for cell in cells)
 
     def _current_changed(self, current: QModelIndex, before: QModelIndex) -> None:
-        if before.isValid():
+        if before.isValid() and self.rowHeight(before.row()) != ROW:
             self.setRowHeight(before.row(), ROW)
+            self._follows = True  # it was left only for the sake of that line
         self._fit(current)
 
     def _fit(self, current: QModelIndex) -> None:
@@ -101,8 +102,9 @@ class LogTable(QTableView):
         wrapped = self.fontMetrics().boundingRect(room, Qt.TextFlag.TextWordWrap, text)
         room_for = max(self.viewport().height() // ROW, 1)
         rows = -(-wrapped.height() // ROW)
-        if self.rowHeight(current.row()) != ROW * min(rows, room_for):
+        if rows > 1:
             self._follows = False  # it stays in sight while it is read
+        if self.rowHeight(current.row()) != ROW * min(rows, room_for):
             self.setRowHeight(current.row(), ROW * min(rows, room_for))
             self.scrollTo(current)
         if rows > room_for and self.isVisible():

@@ -98,9 +98,9 @@ class ProgressStrip(QWidget):
         if state.in_run:
             self._running(snapshot, holds, length, reach, trial)
         else:
-            if ending.startswith("complete"):
+            if ending.startswith("Complete"):
                 colour = "green"
-            elif ending.startswith("aborted"):
+            elif ending.startswith("Aborted"):
                 colour = "amber"
             self._left.setText(ending or "No run yet")
             self._right.setText("" if not ending else f"{reach:.1f} s kept")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tactile_lab.measurement import FloatArray, MeasuredTrial
-from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.plot import Mark, Panel, Plot, Series
 
 
 def rate_plot(
@@ -27,9 +27,11 @@ def rate_plot(
     if not any(peak for _, peak, _ in steps):
         return None
     force, peak, final = np.array(sorted(steps)).T
+    # the same force twice is two results, not a line between them
+    mark: Mark = "joined" if np.unique(force).size == force.size else "points"
     series = [
-        Series(x=force, y=peak, name="peak", mark="joined"),
-        Series(x=force, y=final, name="final", mark="joined", colour="force"),
+        Series(x=force, y=peak, name="peak", mark=mark),
+        Series(x=force, y=final, name="final", mark=mark, colour="force"),
     ]
     if model:
         at, rate = np.array(sorted(model)).T

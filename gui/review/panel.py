@@ -36,7 +36,7 @@ class ReviewPanel(QFrame):
         self.results = ResultsView(theme)
         self.runs = RunsView(theme)
         self.manual = ManualView(theme)
-        self.export = IconButton(theme, "export", "Open the run's folder")
+        self.export = IconButton(theme, "folder", "Open the run's folder")
         self.help = IconButton(theme, "help", "Help on this panel")
         manual = with_gutter(scrolling(self.manual), self.manual.rows)
         self._pages = QStackedWidget()

@@ -44,8 +44,8 @@ from tactile_lab.plot import Plot
 from tactile_lab.quantity import count
 from tactile_lab.trace import FloatArray
 
-HEAD, ROW, MOST = 52, 26, 12
-"""Heights of the table's head and of a row, px; rows that always have room."""
+HEAD, ROW = 52, 26
+"""Heights of the table's head and of a row, px."""
 
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -198,9 +198,7 @@ class ResultsView(QWidget):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(RIGHT if where else LEFT)
                 table.setItem(at, where, item)
-        table.setMinimumHeight(HEAD + ROW * min(max(len(steps), 4), MOST))
-        if steps:
-            table.scrollToBottom()
+        table.setFixedHeight(HEAD + ROW * max(len(steps), 4))  # the page scrolls
 
     def _set_up_table(self) -> None:
         table = self.table
@@ -211,7 +209,8 @@ class ResultsView(QWidget):
         table.verticalHeader().setDefaultSectionSize(ROW)
         table.setShowGrid(False)
         table.verticalHeader().setMinimumSectionSize(ROW)
-        table.setMinimumHeight(HEAD + 4 * ROW)
+        table.setFixedHeight(HEAD + 4 * ROW)
+        table.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         table.setAlternatingRowColors(True)
         table.setTabKeyNavigation(False)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

@@ -17,13 +17,13 @@ from gui.state import minutes
 from tactile_lab.store.catalogue import RunSummary
 
 PILLS = {
-    "complete": ("ok", "pill-ok"),
-    "running": ("running", "pill"),
-    "aborted": ("aborted", "pill-warn"),
-    "cut short": ("cut short", "pill-bad"),
-    "recovered": ("recovered", "pill-warn"),
-    "faulted": ("fault", "pill-bad"),
-    "unreadable": ("unreadable", "pill-bad"),
+    "complete": ("Complete", "pill-ok"),
+    "running": ("Running", "pill"),
+    "aborted": ("Aborted", "pill-warn"),
+    "cut short": ("Cut short", "pill-bad"),
+    "recovered": ("Recovered", "pill-warn"),
+    "faulted": ("Fault", "pill-bad"),
+    "unreadable": ("Unreadable", "pill-bad"),
 }
 
 

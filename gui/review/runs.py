@@ -125,6 +125,11 @@ class RunsView(QWidget):
         self._current = folder
         self._choose(None if folder is None else self._entry(folder))
 
+    def newest(self, most: int) -> list[RunSummary]:
+        """The newest runs of the folder that can be opened."""
+        whole = [one for one in self._entries if not one.trouble]
+        return sorted(whole, key=lambda one: one.started, reverse=True)[:most]
+
     def ticked(self) -> list[RunSummary]:
         """Runs ticked for comparison."""
         return [card.entry for card in self.cards if card.tick.isChecked()]

@@ -19,6 +19,7 @@ from gui.session.log import Severity
 from gui.state import WindowState
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
+from tactile_lab.quantity import count
 from tactile_lab.store.catalogue import RunSummary, catalogue
 from tactile_lab.store.folder import DATA
 from tactile_lab.trial import Outcome
@@ -47,6 +48,8 @@ class Screen(QObject):
 
     changed = Signal()
     listed = Signal(object)
+    scene_opened = Signal(str)
+    """A scene stands in the form; its file, or its name where it ships."""
 
     def __init__(self, panels: Panels) -> None:
         super().__init__(panels.centre)
@@ -143,6 +146,8 @@ class Screen(QObject):
         self._panels.session.log.add(
             Severity.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
         )
+        if name is not None:
+            self.scene_opened.emit(name)
         return True
 
     def run_scene(self, name: str) -> None:
@@ -220,7 +225,9 @@ class Screen(QObject):
 
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
-        self.ending = f"{done.state} · {done.folder.name} · {done.spikes} spikes"
+        self.ending = (
+            f"{done.state.capitalize()} · {done.folder.name} · {done.spikes} spikes"
+        )
         source = self._panels.session.source
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
@@ -292,8 +299,9 @@ class Screen(QObject):
         panels.session.run.name = f"Looking at {source.path.name}"
         panels.centre.view.clear_cursors()
         panels.centre.show_source(source, self._lanes())
-        status = str(source.info.get("status"))
-        self.ending = f"{status} · {source.path.name} · {source.spikes.size} spikes"
+        status = str(source.info.get("status")).capitalize()
+        spikes = count(source.spikes.size, "spike")
+        self.ending = f"{status} · {source.path.name} · {spikes}"
         self.results.stored(source)
         self._show_stored(source)
         self.changed.emit()

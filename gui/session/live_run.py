@@ -55,6 +55,7 @@ class LiveRun(LiveTask):
         elapsed, expected: run time, s.
         agreement: how well the model follows the run on screen; None if nobody knows.
         notes: kept with each run.
+        out: folder for run folders.
         waiting: notes that were typed before the next run; it will have them.
         reports: whether the report is written at its end.
     """
@@ -74,7 +75,7 @@ class LiveRun(LiveTask):
         field_read: Callable[[float], None],
     ) -> None:
         super().__init__(link, status, log)
-        self._out, self._field_read = out, field_read
+        self.out, self._field_read = out, field_read
         self.source: LiveSource | None = None
         self.request: Request | None = None
         self.title = self.name = ""
@@ -104,7 +105,7 @@ class LiveRun(LiveTask):
         self.elapsed, self.expected, self.asked = 0.0, None, None
         self.request, self.expectation = request, expectation
         self.title = self.name = title
-        self._begin(begin_run, request, self._out, dict(self.notes))
+        self._begin(begin_run, request, self.out, dict(self.notes))
         waiting, self.waiting = self.waiting, []
         for text in waiting:
             self.say(note, text, None)

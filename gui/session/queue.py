@@ -86,6 +86,11 @@ class Queue(QObject):
         self.changed.emit()
         self.next()
 
+    @property
+    def going(self) -> bool:
+        """Whether a run of it starts as soon as it can."""
+        return bool(self.items) and not self.held
+
     def hold(self) -> None:
         """Wait until somebody resumes."""
         if self.items and not self.held:

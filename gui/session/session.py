@@ -114,6 +114,10 @@ class Session(QObject):
             return "The scope's inputs are set between runs."
         return self.bench.set_inputs(channels)
 
+    def keep_in(self, out: Path) -> None:
+        """Keep the runs that follow in another folder."""
+        self.out = self.run.out = out
+
     def read_field(self) -> None:
         """Read the field between runs, or while the coil is driven by hand."""
         if self.state is WindowState.READY:

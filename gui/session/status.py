@@ -53,7 +53,7 @@ class Status(QObject):
             kept: there are data of a run.
         """
         self.coil.left(UNKNOWN)
-        data = "Data up to then are kept (`tactile-lab recover`). " if kept else ""
+        data = "Data up to then are kept (Recover, in Runs). " if kept else ""
         self.set_fault(
             "The process that drives the instruments has ended.",
             f"{data}Look at the source: its guard switches it off, a simulated one is "

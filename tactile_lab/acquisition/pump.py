@@ -84,6 +84,7 @@ class Pump:
             self._lease.renew()
             self._take_blocks()
             self._account.readings(self._instruments)
+            self._tell_progress()
             if self._stop.requested:
                 raise StopAskedError
             self._instruments.raise_failure()
@@ -212,9 +213,13 @@ class Pump:
             for reading in self._intake.take_field():
                 self._account.field(reading.time, reading.value)
             self._lease.renew()
-            if self._intake.reached - self._told >= PULSE:
-                self._told = self._intake.reached
-                self._emit(events.Progress(self._told, self._program.expected))
+
+    def _tell_progress(self) -> None:
+        """Tell how far the run is by the clock, whether or not samples come."""
+        reached = self._account.axis(self._clock.now())
+        if reached - self._told >= PULSE:
+            self._told = reached
+            self._emit(events.Progress(reached, self._program.expected))
 
     def _end_intake(self, scope: ScopeThread) -> None:
         seen_until = self._account.axis(scope.polled_until)

@@ -10,6 +10,7 @@ from typing import Any
 from tactile_lab.complaint import written
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
+from tactile_lab.table import described
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,9 @@ def keys(scene: Scene) -> list[Key]:
     meanings = {f"protocol.{n}": f.description or "" for n, f in fields.items()}
     values = dict(_flat(scene.to_dict()))
     names = [*meanings, *(name for name in values if name not in meanings)]
+    for table in ("record", "detect", "sensor", "coil", "simulated", "conditions"):
+        said = described(type(getattr(scene, table)))
+        meanings |= {f"{table}.{key}": text for key, text in said.items()}
     return [
         Key(
             name,

@@ -92,7 +92,7 @@ def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
     lab.until(lambda: session.state is WindowState.READY)
     coil = session.coil_view()
     assert coil is not None and coil.output is False and coil.verified_off
-    assert window.screen_.ending.startswith("aborted")
+    assert window.screen_.ending.startswith("Aborted")
 
 
 def test_stop_is_enabled_in_every_state(lab) -> None:
@@ -434,6 +434,9 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     lab.until(lambda: "less ●" in stack.row("V_C1").card.text)
     view = window.centre.view
     view.show_span(0.0, 1.0)
+    said = table(stack, "Comparing 2 runs").splitlines()[1]
+    assert "run2_less_run1_force_mean_N" in said and ",run1_force" not in said
+    window.centre.compare_bar.layout_.group.button(0).click()
     lines = table(stack, "Comparing 2 runs").splitlines()
     assert lines[0].count("run1 ") == lines[0].count("run2 ") == 1
     header = lines[1].split(",")

@@ -1,0 +1,82 @@
+"""The card with what a user prefers."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
+
+from gui.ask_file import ask_file
+from gui.dialogs.overlay import Overlay
+from gui.parts import STRETCH, Part, column, label, line, line_edit, push, row
+from gui.preferences import Preferences
+
+SWITCHES = {
+    "sound": "Sound at the end of a run, and three times at a fault",
+    "monitor": "Watch the sensor as soon as a bench is ready (coil off)",
+    "reports": "Write the report at the end of each run",
+}
+
+
+class PreferencesCard(Overlay):
+    """Saved at once where they are valid."""
+
+    def __init__(self, window: QWidget, preferences: Preferences) -> None:
+        super().__init__(window, 560)
+        self._preferences = preferences
+        self.folder = line_edit("Folder for runs", "runs")
+        self.bench = line_edit("Bench at the start", "sim, none, or a bench file")
+        self.switches = {key: QCheckBox(words) for key, words in SWITCHES.items()}
+        self.save = push("Save", "primary")
+        self.close_button = push("Close")
+        self.save.clicked.connect(self._save)
+        self.close_button.clicked.connect(self.hide)
+        note = label(
+            "Folder and bench hold where the command line says nothing else: "
+            "--out and --bench.",
+            "muted",
+            wrap=True,
+        )
+        parts: tuple[Part, ...] = (
+            label("Settings", "big"),
+            self._chosen("Folder for runs", self.folder, folder=True),
+            self._chosen("Bench at the start", self.bench, folder=False),
+            *(note, line(), *self.switches.values()),
+            row(STRETCH, self.close_button, self.save),
+        )
+        column(self.card, *parts, margin=22, spacing=12)
+
+    def show_preferences(self) -> None:
+        """Open the card."""
+        self.folder.setText(str(self._preferences.folder))
+        self.bench.setText(self._preferences.bench)
+        for key, switch in self.switches.items():
+            switch.setChecked(getattr(self._preferences, key))
+        self.open()
+        self.folder.setFocus()
+
+    def _save(self) -> None:
+        self._preferences.set(
+            folder=self.folder.text().strip(),
+            bench=self.bench.text().strip(),
+            **{key: switch.isChecked() for key, switch in self.switches.items()},
+        )
+        self.hide()
+
+    def _chosen(self, words: str, edit: QLineEdit, *, folder: bool) -> QWidget:
+        name = label(words)
+        name.setFixedWidth(130)
+        browse = push("…", name=f"Choose: {words}")
+        kinds = "" if folder else "Bench files (*.toml)"
+        put = partial(self._put, edit)
+        browse.clicked.connect(
+            lambda: ask_file(self, words, put, folder=folder, kinds=kinds)
+        )
+        across = QWidget()
+        filled_row = row(name, (edit, 1), browse, spacing=8)
+        column(across).addLayout(filled_row)
+        return across
+
+    def _put(self, edit: QLineEdit, path: Path) -> None:
+        edit.setText(str(path))

@@ -1,0 +1,55 @@
+"""What the program does by itself because its user prefers it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer
+from PySide6.QtWidgets import QApplication
+
+from gui.preferences import Preferences
+from gui.screen.screen import Screen
+from gui.session.session import Session
+
+APART = 400
+"""Time between two of the sounds of a fault, ms."""
+
+
+class Habits(QObject):
+    """Sounds, watching the sensor, recent scenes, where runs are kept.
+
+    Args:
+        session: what happens.
+        preferences: what is to follow.
+        screen: opens scenes, lists runs.
+    """
+
+    def __init__(
+        self, session: Session, preferences: Preferences, screen: Screen
+    ) -> None:
+        super().__init__(screen)
+        self._session, self._wishes, self._screen = session, preferences, screen
+        session.run.ended.connect(lambda done: self._sound(1))
+        session.status.faulted.connect(lambda: self._sound(3))
+        session.bench.ready.connect(self._watch)
+        screen.scene_opened.connect(self._remember)
+        preferences.changed.connect(self.follow)
+
+    def follow(self) -> None:
+        """The preferences have changed."""
+        self._session.run.reports = self._wishes.reports
+        self._session.keep_in(self._wishes.folder)
+        self._screen.list_runs()
+
+    def _sound(self, times: int) -> None:
+        if self._wishes.sound:
+            for number in range(times):
+                QTimer.singleShot(number * APART, QApplication.beep)
+
+    def _watch(self) -> None:
+        if self._wishes.monitor and not self._session.queue.going:
+            self._session.show_monitor(True)
+
+    def _remember(self, scene: str) -> None:
+        if Path(scene).is_file():
+            self._wishes.remember(scene)

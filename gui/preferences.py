@@ -1,0 +1,89 @@
+"""What a user prefers, kept from one start to the next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, QSettings, Signal
+
+MOST = 8
+"""Recent scenes and benches that are kept."""
+
+DEFAULTS: dict[str, Any] = {
+    "folder": "",
+    "bench": "",
+    "sound": False,
+    "monitor": False,
+    "reports": True,
+}
+
+
+class Preferences(QObject):
+    """Kept by the desktop's own means; in memory alone where nothing is to be kept.
+
+    Args:
+        settings: where they are kept; None keeps nothing.
+    """
+
+    changed = Signal()
+
+    def __init__(self, settings: QSettings | None = None) -> None:
+        super().__init__()
+        self._settings = settings
+        self._values = dict(DEFAULTS)
+        self._recent: list[str] = []
+        if settings is not None:
+            for key, default in DEFAULTS.items():
+                kept = settings.value(f"preferences/{key}", default)
+                # some desktops keep texts only
+                is_switch = isinstance(default, bool)
+                self._values[key] = (
+                    str(kept).lower() == "true" if is_switch else str(kept)
+                )
+            self._recent = str(settings.value("recent", "")).split("\n")
+
+    @property
+    def folder(self) -> Path:
+        """For runs, where the command line names none."""
+        return Path(self._values["folder"] or "runs")
+
+    @property
+    def bench(self) -> str:
+        """Bench file that is connected at the start, "sim", or "none"."""
+        return str(self._values["bench"] or "sim")
+
+    @property
+    def sound(self) -> bool:
+        """Whether the end of a run, and a fault, are heard."""
+        return bool(self._values["sound"])
+
+    @property
+    def monitor(self) -> bool:
+        """Whether the sensor is watched as soon as a bench is ready."""
+        return bool(self._values["monitor"])
+
+    @property
+    def reports(self) -> bool:
+        """Whether a report is written at the end of each run."""
+        return bool(self._values["reports"])
+
+    @property
+    def recent(self) -> list[Path]:
+        """Scenes opened last, the newest first, as far as they are still there."""
+        return [path for path in map(Path, self._recent) if path.is_file()]
+
+    def set(self, **values: str | bool) -> None:
+        """Change some; all are kept."""
+        self._values |= values
+        if self._settings is not None:
+            for key, value in values.items():
+                self._settings.setValue(f"preferences/{key}", value)
+        self.changed.emit()
+
+    def remember(self, scene: str) -> None:
+        """A scene file was opened."""
+        path = str(Path(scene).resolve())
+        self._recent = [path, *(one for one in self._recent if one != path)][:MOST]
+        if self._settings is not None:
+            self._settings.setValue("recent", "\n".join(self._recent))

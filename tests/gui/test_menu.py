@@ -1,0 +1,150 @@
+"""The menu, what a user prefers, and what is at hand on a small screen."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QSettings, Qt
+from PySide6.QtGui import QHelpEvent, QKeySequence, QShortcut
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QMenu, QToolTip
+
+from gui.dialogs.preferring import PreferencesCard
+from gui.menu import GearMenu
+from gui.parts import Combo
+from gui.preferences import Preferences
+from gui.state import WindowState
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> QSettings:
+    return QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+
+
+def test_preferences_are_kept_from_one_start_to_the_next(
+    app: QApplication, kept: QSettings, tmp_path: Path
+) -> None:
+    scene = tmp_path / "mine.toml"
+    scene.touch()
+    first = Preferences(kept)
+    assert first.folder == Path("runs") and first.bench == "sim" and not first.monitor
+    first.set(folder="/data/runs", monitor=True, reports=False)
+    first.remember(str(scene))
+    first.remember(str(tmp_path / "gone.toml"))
+    kept.sync()
+    second = Preferences(QSettings(kept.fileName(), QSettings.Format.IniFormat))
+    assert second.folder == Path("/data/runs") and second.monitor
+    assert not second.reports and not second.sound
+    assert second.recent == [scene], "those that are still there"
+
+
+def test_settings_act_at_once(lab) -> None:
+    window, session = lab.window, lab.session
+    out = session.out
+    window.actions_.show_preferences()
+    card = window.findChild(PreferencesCard)
+    assert card.isVisible()
+    card.folder.setText(str(lab.folder / "elsewhere"))
+    card.switches["reports"].setChecked(False)
+    card.save.click()
+    assert session.run.out == lab.folder / "elsewhere" and not card.isVisible()
+    window.preferences.set(folder=str(out))
+    assert session.out == out
+
+
+def test_the_sensor_is_watched_where_that_is_preferred(lab) -> None:
+    lab.window.preferences.set(folder=str(lab.session.out), monitor=True, reports=False)
+    lab.session.connect_bench("sim")
+    lab.until(lambda: lab.session.monitor.alive)
+    lab.window.preferences.set(monitor=False)
+    lab.session.show_monitor(False)
+    lab.until(lambda: not lab.session.monitor.alive)
+
+
+def entries(menu: QMenu) -> dict[str, str]:
+    parts = (one.text().partition("\t") for one in menu.actions() if one.text())
+    return {words: keys for words, _, keys in parts}
+
+
+def test_the_menu_names_shortcuts_that_exist_and_what_was_opened_last(lab) -> None:
+    window = lab.window
+    window.screen_.open_scene(str(lab.folder / "short.toml"))
+    lab.runs(1)
+    window.screen_.list_runs()
+    lab.until(lambda: window.review.runs.newest(1))
+    window.actions_.show_menu()
+    (menu,) = window.findChildren(GearMenu)
+    found = entries(menu)
+    bound = {one.key().toString() for one in window.findChildren(QShortcut)}
+    for words, keys in found.items():
+        if keys and keys != "?":
+            assert QKeySequence(keys).toString() in bound, words
+    submenus = {one.text(): one.menu() for one in menu.actions() if one.menu()}
+    assert "short" in submenus["Recent scenes"].actions()[0].text()
+    assert submenus["Recent runs"].actions()
+    assert "About Tactile Lab" in found
+    menu.close()
+
+
+def test_single_keys_do_nothing_below_a_card(lab) -> None:
+    window = lab.window
+    before = window.centre.tools.twin.isChecked()
+    window.actions_.show_help()
+    window.page.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_M)
+    assert window.centre.tools.twin.isChecked() is before
+
+
+def test_a_folded_panel_leaves_a_button_that_brings_it_back(lab) -> None:
+    window = lab.window
+    window.resize(1280, 800)
+    left, right = window.header.folds
+    assert window.review.isHidden() and not right.isChecked() and left.isChecked()
+    right.click()
+    assert not window.review.isHidden() and right.isChecked()
+    right.click()
+    assert window.review.isHidden() and not right.isChecked()
+    window._folds = dict.fromkeys(window._folds)
+    window.resize(1720, 1080)
+    window.review.show()
+
+
+def test_the_title_names_run_and_bench(lab) -> None:
+    lab.runs(1)
+    title = lab.window.windowTitle()
+    assert "simulated bench" in title and title.endswith("Tactile Lab")
+
+
+def test_a_list_opens_with_all_its_rows(lab) -> None:
+    boxes = [lab.window.setup.picker]
+    boxes += [b for b in lab.window.setup.form.findChildren(Combo) if b.count() > 1]
+    for box in boxes:
+        box.showPopup()
+        lab.app.processEvents()
+        assert box.view().verticalScrollBar().maximum() == 0, box.accessibleName()
+        box.hidePopup()
+
+
+def test_long_tool_tips_are_broken_into_lines(lab) -> None:
+    stop = lab.window.header.stop
+    words = "a word " * 30
+    before = stop.toolTip()
+    stop.setToolTip(words)
+    at = stop.mapToGlobal(QPoint(5, 5))
+    QApplication.sendEvent(stop, QHelpEvent(QEvent.Type.ToolTip, QPoint(5, 5), at))
+    assert QToolTip.text().startswith("<p>")
+    QToolTip.hideText()
+    stop.setToolTip(before)
+
+
+def test_the_clock_goes_on_without_samples(lab) -> None:
+    session = lab.session
+    scene = lab.folder / "force_only.toml"
+    scene.write_text(
+        '[protocol]\nname = "pulses"\nlevels = ["120 mN"]\nhold = "3000 s"\n'
+        '[record]\nsignals = ["force"]\n'
+    )
+    window = lab.window
+    window.screen_.open_scene(str(scene))
+    window.setup.start_when_planned()
+    lab.until(lambda: session.state is WindowState.RUNNING)
+    lab.until(lambda: session.run.elapsed > 2.0)
