@@ -197,7 +197,7 @@ def table(stack: LaneStack, title: str) -> str:
                 if number == 1:
                     continue  # nothing is left of it
             columns += _columns(prefix + lane.key, lane, found)
-        if len(members) == 1 and stack.options.twin and lane.key != "residual":
+        if len(members) == 1 and stack.stage.twin and lane.key != "residual":
             modelled = source.twin(lane.key, view.start, view.end, count)
             if not modelled.empty:
                 columns += _columns(f"model_{lane.key}", lane, modelled)

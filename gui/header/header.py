@@ -113,6 +113,7 @@ class Header(QFrame):
             bare = room is Room.BARE
             self._buttons[0].setVisible(room is Room.FULL)
             self._buttons[2].setVisible(not bare)
+            self.folds[0].setVisible(not bare)  # F7, and wider windows, have it
             least = WHOLE if room is Room.FULL else SHORT
             self._title.setMinimumWidth(least)
             self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
