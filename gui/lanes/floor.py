@@ -99,7 +99,6 @@ class Floor(pg.GraphicsObject):  # type: ignore[misc]
             ahead = QRectF(x, frame.top, frame.right - x, frame.bottom - frame.top)
             painter.fillRect(ahead, QColor(tokens.ahead))
         _time_grid(painter, frame, tokens)
-        _names(painter, holds, tokens)
         for _, bottom in stage.lanes:
             # above it as much is left free as between a lane and the next
             painter.fillRect(QRectF(0, bottom - 2, stage.width, 2), QColor(tokens.plot))
@@ -125,16 +124,14 @@ def _visible(source: Source, frame: Frame) -> list[tuple[Stretch, float, float]]
     ]
 
 
-def _names(
-    painter: QPainter, holds: list[tuple[Stretch, float, float]], tokens: Tokens
-) -> None:
-    """Names of the holds, over the grid."""
-    for hold, left, right in holds:
+def hold_names(painter: QPainter, stage: Stage) -> None:
+    """Write the names of the holds at the top of the highest lane."""
+    for hold, left, right in _visible(stage.source, stage.whole()):
         if right - left > 34:
             text = "recovery" if hold.pause else hold.label
             painter.save()
             painter.setClipRect(QRectF(left, 0, right - left - 3, 20))
-            paint.write(painter, QPointF(left + 5, 10), text, tokens.muted)
+            paint.write(painter, QPointF(left + 5, 10), text, stage.tokens.muted)
             painter.restore()
 
 

@@ -69,14 +69,18 @@ def values_at(
     runs = painted.runs if painted.close(lane, time) else ()
     values: list[float | None] = []
     shown = runs or source.shown(lane, time - NEAR, time + NEAR, FEW)
-    for member, trace in zip(source.members, shown, strict=True):
+    inside = painted.runs and painted.start <= time <= painted.end
+    drawn = painted.runs if inside else shown
+    for member, trace, picture in zip(source.members, shown, drawn, strict=True):
         run, own = member.source, time - member.shift
         if run.reach <= 0 or not 0 <= own <= run.reach:
             values.append(None)
         elif lane.key == "rate":
             values.append(rate_at(run.spikes, own, starts(run.holds)))
         else:
-            values.append(trace.at(time))
+            # a record may end some of its picture's columns before its run
+            value = trace.at(time)
+            values.append(picture.at(time) if value is None else value)
     return tuple(values)
 
 

@@ -20,7 +20,8 @@ from PySide6.QtGui import (
 
 from gui.lanes import paint
 from gui.lanes.box import LaneBox
-from gui.lanes.floor import AXIS, TIME_AXIS, Floor, Stage
+from gui.lanes.floor import AXIS, TIME_AXIS, Floor, Stage, hold_names
+from gui.lanes.paint import Frame
 from gui.lanes.readings import values_at
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
@@ -29,6 +30,9 @@ from gui.plots.numbers import decimals, number
 
 GRAB = 5
 """Pixels within which a cursor is grabbed."""
+
+BESIDE = 80
+"""Pixels between the cursors from which on their times stand below their lines."""
 
 LEAST_BOX = 10
 """Height from which on a zoom box is meant for the values, too, px."""
@@ -39,7 +43,7 @@ Places = list[tuple[LaneBox, float, float]]
 
 
 class Marks(pg.GraphicsObject):  # type: ignore[misc]
-    """What goes across all lanes: now, the cursors, the crosshair, the zoom box.
+    """What goes across all lanes: names of holds, now, cursors, crosshair, zoom box.
 
     Attributes:
         boxes: of the visible lanes, from the top.
@@ -65,18 +69,11 @@ class Marks(pg.GraphicsObject):  # type: ignore[misc]
         stage, tokens = self._stage, self._stage.tokens
         frame, source = stage.whole(), stage.source
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        hold_names(painter, stage)
         if source.running and frame.start <= source.reach <= frame.end:
             pen = paint.pen(tokens.border_strong)
             self._upright(painter, frame.x1(source.reach), pen)
-        colours = tokens.accent, tokens.V_C1
-        for name, time, colour in zip(
-            "AB", stage.view.cursors or (), colours, strict=False
-        ):
-            x = frame.x1(time)
-            if frame.left <= x <= frame.right:
-                pen = paint.pen(colour, Qt.PenStyle.DashLine)
-                self._upright(painter, x, pen)
-                self._name(painter, round(x) + 0.5, name, colour)
+        self._cursors(painter, frame)
         if self.pointer is not None and frame.left <= self.pointer.x() <= frame.right:
             self._cross(painter, self.pointer)
         if self.box is not None:
@@ -91,13 +88,29 @@ class Marks(pg.GraphicsObject):  # type: ignore[misc]
         painter.setPen(pen)
         painter.drawLine(QPointF(x, frame.top), QPointF(x, frame.bottom))
 
-    def _name(self, painter: QPainter, x: float, name: str, colour: str) -> None:
-        tokens = self._stage.tokens
-        box = QRectF(x - 8, self.boxes[0].geometry().bottom() - 14, 16, 17)
-        painter.fillRect(box, QColor(colour))
-        painter.setPen(QColor(tokens.on_accent))
-        painter.setFont(sized(11, QFont.Weight.Bold))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+    def _cursors(self, painter: QPainter, frame: Frame) -> None:
+        """A and B, with their names above and their times below."""
+        tokens, cursors = self._stage.tokens, self._stage.view.cursors or ()
+        across = [frame.x1(time) for time in cursors]
+        close = len(across) == 2 and abs(across[1] - across[0]) < BESIDE
+        colours = tokens.accent, tokens.V_C1
+        for name, time, x, colour in zip("AB", cursors, across, colours, strict=False):
+            if not frame.left <= x <= frame.right:
+                continue
+            self._upright(painter, x, paint.pen(colour, Qt.PenStyle.DashLine))
+            foot = self.boxes[0].geometry().bottom() if self.boxes else frame.bottom
+            box = QRectF(round(x) - 7.5, foot - 14, 16, 17)
+            painter.fillRect(box, QColor(colour))
+            painter.setPen(QColor(tokens.on_accent))
+            painter.setFont(sized(11, QFont.Weight.Bold))
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+            side = float(x == min(across)) if close else 0.5
+            self._tell(painter, QPointF(x, frame.bottom + 11), self._time(time), side)
+
+    def _time(self, time: float) -> str:
+        """A time as finely as the view tells it."""
+        step = self._stage.view.width / 2000
+        return f"{number(time, min(6, max(2, decimals(step))))} s"
 
     def _cross(self, painter: QPainter, at: QPointF) -> None:
         """Time and value under the pointer, and every lane's value at that time."""
@@ -106,9 +119,8 @@ class Marks(pg.GraphicsObject):  # type: ignore[misc]
         time = view.start + (at.x() - AXIS) / (stage.right - AXIS) * view.width
         pen = paint.pen(tokens.faint, Qt.PenStyle.DotLine)
         self._upright(painter, at.x(), pen)
-        places = min(6, max(2, decimals(view.width / 2000)))
-        words = f"{number(time, places)} s"
-        self._tell(painter, QPointF(at.x(), frame.bottom + 11), words, 0.5)
+        foot = QPointF(at.x(), frame.bottom + 11)
+        self._tell(painter, foot, self._time(time), 0.5)
         for box in self.boxes:
             place, lane = box.geometry(), box.lane
             inside = place.top() <= at.y() <= place.bottom()

@@ -17,6 +17,12 @@ from tactile_lab.quantity import show
 
 WIDTHS = (1.0, 5.0, 10.0)
 
+WIDE = 1150
+"""Width from which on there is room for words and the read-out of the cursors, px.
+
+The same with cursors and without: no button moves away under the pointer.
+"""
+
 
 class Tools(QWidget):
     """Buttons that change the view, and the cursors' times as text."""
@@ -55,7 +61,7 @@ class Tools(QWidget):
 
     def set_width(self, width: int) -> None:
         """Text beside the icons where there is room, else icons alone."""
-        wide = width > (1330 if self._view.cursors is not None else 960)
+        wide = width > WIDE
         for button in self.findChildren(IconButton):
             button.set_wide(wide)
 

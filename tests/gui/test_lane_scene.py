@@ -16,9 +16,11 @@ from gui.lanes.floor import AXIS
 from gui.lanes.lane import lanes_for
 from gui.lanes.source import LiveSource
 from gui.lanes.stack import LaneStack
+from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.look.tokens import DARK, LIGHT
+from gui.parts import IconButton
 from tactile_lab.trace import Trace
 
 LEFT = Qt.MouseButton.LeftButton
@@ -309,3 +311,28 @@ def test_lanes_that_cannot_be_painted_leave_the_window_alive(app, stack, qtbot):
         settle(app)
     assert len(told) >= 4 and {one[0] for one in told} == {ZeroDivisionError}
     assert not stack.scene.grab().isNull()
+
+
+@pytest.mark.parametrize("width", [700, 900, 1100, 1250, 1400])
+def test_cursors_move_no_button_and_tell_their_times(app, stack, width):
+    tools = Tools(stack, stack.view, Theme("light"))
+    tools.resize(width, 46)
+    tools.show()
+    settle(app)
+
+    def places() -> list[QRect]:
+        return [button.geometry() for button in tools.findChildren(IconButton)]
+
+    before, bare = places(), stack.scene.grab().toImage()
+    tools.cursors.click()
+    settle(app)
+    assert places() == before
+    shown, frame = stack.scene.grab().toImage(), stack.stage.whole()
+    for time in stack.view.cursors:
+        part = QRect(round(frame.x1(time)) - 20, round(frame.bottom) + 5, 40, 12)
+        assert shown.copy(part) != bare.copy(part)
+    if width >= 1250:
+        assert "Δt" in tools.readout.text() and "Hz" in tools.readout.text()
+    tools.close()
+    tools.deleteLater()
+    settle(app)

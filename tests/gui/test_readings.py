@@ -15,6 +15,7 @@ from gui.lanes.readings import (
     view_text,
 )
 from gui.lanes.source import LiveSource
+from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from tactile_lab.trace import HOLDS, Trace
 
@@ -119,3 +120,24 @@ def test_newest_rate_counts_a_spike_told_before_its_samples() -> None:
     source.add_bins({"V_C1": Trace.bins(np.array([0.0, 1.0]), *[np.zeros(2)] * 3, 1.0)})
     source.add_spikes((1.8, 1.9, 2.01))
     assert abs(newest(rate, source) - 1 / 0.11) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("ends", "told"), [(59.94, True), (59.97, True), (50.0, False)]
+)
+def test_a_run_seen_whole_has_values_though_its_record_ends_before_it(ends, told):
+    source, lane = LiveSource(None, 1.0), LANES["V_C1"]
+    for signal, end in (("V_C1", ends), ("V_C2", 60.0)):
+        time = np.arange(0.0, end, 1e-3)
+        flat = np.full(time.size, 1.25, np.float32)
+        source.add_bins({signal: Trace.bins(time, flat, flat, flat, 1e-3)})
+    whole = source.shown(lane, 0.0, 60.0, 800)
+    edge = source.right_edge(_seen(60.0))
+    found = values_at(lane, source, edge, Painted(0.0, 60.0, tuple(whole)))
+    assert found == ((1.25,) if told else (None,))
+
+
+def _seen(width: float) -> TimeView:
+    view = TimeView()
+    view.width = width
+    return view
