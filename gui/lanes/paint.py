@@ -20,12 +20,10 @@ from PySide6.QtGui import (
     QColor,
     QPainter,
     QPen,
-    QPixmap,
     QPolygonF,
     QStaticText,
     QTransform,
 )
-from PySide6.QtWidgets import QWidget
 
 from gui.look.fonts import sized
 from tactile_lab.trace import FloatArray, Trace, middle
@@ -72,22 +70,6 @@ class Frame:
         """Pixel of one value."""
         per = (self.bottom - self.top) / (self.high - self.low)
         return min(max(self.bottom - (value - self.low) * per, -FAR), FAR)
-
-    @property
-    def area(self) -> QRectF:
-        """The plot's rectangle."""
-        return QRectF(
-            self.left, self.top, self.right - self.left, self.bottom - self.top
-        )
-
-
-def canvas(widget: QWidget) -> QPixmap:
-    """A clear picture of a widget's size, as fine as its screen."""
-    ratio = widget.devicePixelRatio()
-    made = QPixmap(widget.size() * ratio)
-    made.setDevicePixelRatio(ratio)
-    made.fill(Qt.GlobalColor.transparent)
-    return made
 
 
 def polygon(x: FloatArray, y: FloatArray) -> QPolygonF:

@@ -52,6 +52,12 @@ def stroke(
     return pen
 
 
+class Line(pg.InfiniteLine):  # type: ignore[misc]
+    """A line across or upright that may fail alone."""
+
+    paint = guarded(pg.InfiniteLine.paint)
+
+
 class RoundAxis(pg.AxisItem):  # type: ignore[misc]
     """Numbers at 1-2-5 steps, so many that they can be read; a grid if asked for.
 

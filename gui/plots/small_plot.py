@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QMenu
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.look.tokens import Tokens
-from gui.plots.axis import RoundAxis, stroke
+from gui.plots.axis import Line, RoundAxis, stroke
 from gui.plots.numbers import nice_range
 from tactile_lab.plot import FloatArray, Guide, Panel, Plot, Series, y_scale
 
@@ -189,8 +189,9 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         super().__init__()
         self._plot, self._panel = plot, panel
         self._tokens, self._ratio = tokens, ratio
-        self._x_by, x_text = plot.x_scale()
-        self._y_by, y_text = y_scale(panel)
+        x_by, x_text = plot.x_scale()
+        y_by, y_text = y_scale(panel)
+        self._x, self._y = _shown(x_by, plot.x_log), _shown(y_by, panel.log)
         self.setContentsMargins(0, 0, 0, 0)
         self.setSpacing(0)
         self.box = Box()
@@ -211,7 +212,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         bottom.setHeight(foot)
         if foot >= FOOT:
             bottom.setLabel(_rich(x_text), color=tokens.muted, **{"font-size": "11px"})
-        named = [(float(self._x(x)), f"{x * self._x_by:.3g}") for x in plot.x_ticks]
+        named = [(float(self._x(x)), f"{x * x_by:.3g}") for x in plot.x_ticks]
         if named:
             bottom.setTicks([named])
         self.box.whole = [self._x_range(), self._y_range()]
@@ -225,16 +226,6 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             words.setParentItem(self.box)
             at = (1, 0) if panel.corner == "upper" else (1, 1)
             words.anchor(itemPos=at, parentPos=at)
-
-    def _x(self, values: ArrayLike) -> FloatArray:
-        shown = np.asarray(values, dtype=np.float64) * self._x_by
-        return np.log10(shown) if self._plot.x_log else shown
-
-    def _y(self, values: ArrayLike) -> FloatArray:
-        shown = np.asarray(values, dtype=np.float64) * self._y_by
-        if not self._panel.log:
-            return shown
-        return np.log10(np.where(shown > 0, shown, np.nan))
 
     def _x_range(self) -> list[float]:
         plot = self._plot
@@ -286,7 +277,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         colour = self._colour(guide.colour)
         style = Qt.PenStyle.DashLine if guide.dashed else Qt.PenStyle.SolidLine
         pen = stroke(colour, self._ratio, style)
-        self.box.addItem(pg.InfiniteLine(ends[0], 0 if across else 90, pen))
+        self.box.addItem(Line(ends[0], 0 if across else 90, pen))
         if guide.text:
             (left, right), (_, top) = self.box.whole
             far = not across and ends[0] > left + 0.6 * (right - left)
@@ -360,20 +351,16 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
     def _errors(self, s: Series, colour: str) -> None:
         """Bars of the 95 % intervals."""
         sides: dict[str, FloatArray] = {}
-        x, y = self._x(s.x), self._y(s.y)
-        if s.x_error is not None:
-            value, half = np.asarray(s.x), np.asarray(s.x_error)
-            sides |= {
-                "left": x - self._x(value - half),
-                "right": self._x(value + half) - x,
-            }
-        if s.y_error is not None:
-            value, half = np.asarray(s.y), np.asarray(s.y_error)
-            sides |= {
-                "bottom": y - self._y(value - half),
-                "top": self._y(value + half) - y,
-            }
+        for values, half, shown, ends in (
+            (s.x, s.x_error, self._x, ("left", "right")),
+            (s.y, s.y_error, self._y, ("bottom", "top")),
+        ):
+            if half is not None:
+                low, high = (np.asarray(values) + k * np.asarray(half) for k in (-1, 1))
+                sides[ends[0]] = shown(values) - shown(low)
+                sides[ends[1]] = shown(high) - shown(values)
         if sides:
+            x, y = self._x(s.x), self._y(s.y)
             bars = pg.ErrorBarItem(x=x, y=y, pen=stroke(colour, self._ratio), **sides)
             self.box.addItem(bars)
 
@@ -381,6 +368,16 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         tokens = self._tokens
         known = {"model": tokens.twin, "ink": tokens.text, "quiet": tokens.muted}
         return known.get(name) or tokens.trace(name)
+
+
+def _shown(by: float, log: bool) -> Callable[[ArrayLike], FloatArray]:
+    """From SI to what an axis shows; where it is logarithmic, the logarithm of that."""
+
+    def shown(values: ArrayLike) -> FloatArray:
+        found = np.asarray(values, dtype=np.float64) * by
+        return np.log10(np.where(found > 0, found, np.nan)) if log else found
+
+    return shown
 
 
 def _heights(plot: Plot) -> list[int]:

@@ -80,18 +80,20 @@ def wheel(stack: LaneStack, at: QPoint, held: str = "NoModifier") -> None:
     QApplication.sendEvent(view, event)
 
 
+def move(stack: LaneStack, at: QPointF, held: Qt.MouseButton) -> None:
+    view, none = stack.scene.viewport(), Qt.MouseButton.NoButton
+    QApplication.sendEvent(view, QMouseEvent(
+        QEvent.Type.MouseMove, at, view.mapToGlobal(at), none, held,
+        Qt.KeyboardModifier.NoModifier,
+    ))  # fmt: skip
+
+
 def drag(stack: LaneStack, a: QPoint, b: QPoint) -> None:
     """With the button held in between, as a hand does it."""
-    view = stack.scene.viewport()
-    QTest.mousePress(view, LEFT, pos=a)
+    QTest.mousePress(stack.scene.viewport(), LEFT, pos=a)
     for share in (0.3, 0.6, 1.0):
-        at = QPointF(a) + share * QPointF(b - a)
-        event = QMouseEvent(
-            QEvent.Type.MouseMove, at, view.mapToGlobal(at), Qt.MouseButton.NoButton,
-            LEFT, Qt.KeyboardModifier.NoModifier,
-        )  # fmt: skip
-        QApplication.sendEvent(view, event)
-    QTest.mouseRelease(view, LEFT, pos=b)
+        move(stack, QPointF(a) + share * QPointF(b - a), LEFT)
+    QTest.mouseRelease(stack.scene.viewport(), LEFT, pos=b)
 
 
 def span(lane: LaneBox) -> float:
@@ -158,7 +160,7 @@ def test_a_zoom_box_zooms_time_and_values_and_shows_the_data_in_it(app, stack):
     b = a + QPoint(200, 30)
     before, times = span(lane), (stack.scene.time_at(a.x()), stack.scene.time_at(b.x()))
     QTest.mousePress(stack.scene.viewport(), LEFT, pos=a)
-    QTest.mouseMove(stack.scene.viewport(), b)
+    move(stack, QPointF(b), LEFT)
     image = stack.scene.grab().toImage()
     inside = {image.pixelColor(x, a.y() + 15).name() for x in range(a.x(), b.x())}
     QTest.mouseRelease(stack.scene.viewport(), LEFT, pos=b)
@@ -223,7 +225,7 @@ def test_the_crosshair_tells_time_and_values_and_goes_with_the_pointer(app, stac
     bare = stack.scene.grab().toImage()
     choose(app, stack, "V_C1", "Crosshair")
     at = middle(stack, "V_C1")
-    QTest.mouseMove(stack.scene.viewport(), at)
+    move(stack, QPointF(at), Qt.MouseButton.NoButton)
     settle(app)
     crossed = stack.scene.grab().toImage()
     for key in ("V_C1", "V_K"):
