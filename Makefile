@@ -59,6 +59,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/python tests/benchmarks/serial_bench.py --out docs/serial-figures.md
 	$(BIN)/python tests/benchmarks/scope_stream.py --out docs/scope-figures.md
 	$(BIN)/python tests/benchmarks/fault_table.py --out docs/fault-figures.md
+	$(BIN)/python tests/benchmarks/fuzz.py --out docs/fuzz-figures.md
 	$(BIN)/python tests/benchmarks/window_figures.py --out docs/window-figures.md
 
 screenshots: $(DEV_STAMP)

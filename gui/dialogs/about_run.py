@@ -257,7 +257,7 @@ def settings_of(folder: Path) -> str:
 def log_of(folder: Path) -> str:
     """The run's own log, line by line."""
     found = []
-    for line in (folder / LOG).read_text(encoding="utf-8").splitlines():
+    for line in (folder / LOG).read_text("utf-8", "replace").splitlines():
         try:
             said = json.loads(line)
             clock = str(said["at"])[11:23]

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import fail, print_json, progress, refusing, say
+from tactile_lab.commands.terminal import fail, print_json, progress, reading, say
 
 FILES = {
     "csv": "csv",
@@ -59,7 +59,7 @@ def command(
     Signals with the force, rate and I_DS derived from them, spikes, trials with their
     holds, and the settings. An RO-Crate describes the run's folder itself.
     """
-    with refusing():
+    with reading(run):
         from tactile_lab.quantity import bytes_text
         from tactile_lab.store.run import Run
         from tactile_lab.store.selection import Selection
@@ -82,7 +82,9 @@ def command(
                 try:
                     written = exporter.export(loaded, target, selection, update)
                 except OSError as error:
-                    fail(f"{target} cannot be written: {error.strerror or error}.", 2)
+                    if error.errno is None:
+                        raise  # HDF5 could not read
+                    fail(f"{target} cannot be written: {error.strerror}.", 2)
                     return
     if as_json:
         print_json({"run": str(run), "files": [str(file) for file in written]})

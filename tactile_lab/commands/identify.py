@@ -11,7 +11,7 @@ from tactile_lab.commands.options import json_option, run_argument
 from tactile_lab.commands.terminal import (
     print_json,
     progress,
-    refusing,
+    reading,
     say,
     warn,
     working,
@@ -31,7 +31,7 @@ def command(run: Path, parameters: tuple[str, ...], as_json: bool) -> None:
     The others keep the values of the run's scene. Warns of parameters that the run does
     not determine.
     """
-    with refusing():
+    with reading(run):
         from tactile_lab.report.from_run import read
         from tactile_lab.report.identified import identify_run
 

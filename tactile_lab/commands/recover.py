@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import print_json, progress, refusing, say
+from tactile_lab.commands.terminal import print_json, progress, reading, say
 
 
 @click.command()
@@ -18,7 +18,7 @@ def command(run: Path, as_json: bool) -> None:
 
     Works on a copy; the file as the crash left it stays as data.killed.h5.
     """
-    with refusing():
+    with reading(run):
         from tactile_lab.store.recover import recover
 
         with progress("recovering") as update:

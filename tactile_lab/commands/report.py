@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tactile_lab.commands.options import run_argument
-from tactile_lab.commands.terminal import print_json, progress, refusing, say, warn
+from tactile_lab.commands.terminal import print_json, progress, reading, say, warn
 
 READ = 0.3
 """Part of the work until the run is read."""
@@ -24,7 +24,7 @@ READ = 0.3
 @click.option("--json", "as_json", is_flag=True, help="Print results.json to stdout.")
 def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
     """Write figure, report.html and results.json of RUN from its stored data."""
-    with refusing():
+    with reading(run):
         from tactile_lab.errors import RunFolderError
         from tactile_lab.report.from_run import read
         from tactile_lab.report.results import results
@@ -41,6 +41,8 @@ def command(run: Path, pdf: bool, out: Path | None, as_json: bool) -> None:
                     folder, data, pdf=pdf, progress=share(update, READ, 1.0)
                 )
         except OSError as reason:
+            if reason.errno is None:
+                raise  # HDF5 could not read
             raise RunFolderError(
                 f"{folder} cannot be written: {reason.strerror}. Name another folder "
                 "with --out."

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
-from tactile_lab.commands.terminal import print_json, refusing, say
+from tactile_lab.commands.terminal import print_json, reading, say
 
 FIGURES = (".png", ".svg", ".pdf", ".html")
 
@@ -20,7 +20,7 @@ FIGURES = (".png", ".svg", ".pdf", ".html")
 @json_option
 def command(run: Path, as_json: bool) -> None:
     """Show what RUN is, what it holds and where its figures are."""
-    with refusing():
+    with reading(run):
         summary = describe(run)
     if as_json:
         print_json(summary)

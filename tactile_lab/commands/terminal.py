@@ -11,11 +11,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import RunFolderError, TactileLabError
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -84,6 +85,29 @@ def refusing() -> Iterator[None]:
         yield
     except TactileLabError as error:
         fail(str(error), REFUSED)
+
+
+@contextmanager
+def reading(run: Path) -> Iterator[None]:
+    """As `refusing`, for what reads a run: whatever damage breaks is told as damage.
+
+    What fails in a run that is as it was written is a mistake of this program.
+    """
+    with refusing():
+        try:
+            yield
+        except (TactileLabError, click.exceptions.Exit):
+            raise
+        except Exception as error:
+            from tactile_lab.store.verify import verify
+
+            found = verify(run).findings
+            if not found:
+                raise
+            raise RunFolderError(
+                f"{run} is damaged ({found[0]}). `tactile-lab verify` lists all that "
+                "is not as it was written."
+            ) from error
 
 
 def let_go() -> None:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.quantity import show
-from tactile_lab.store.folder import INFO, write_json
+from tactile_lab.store.folder import digest, write_info
 from tactile_lab.store.run import Run
 
 PIECE = 1 << 22
@@ -156,9 +157,30 @@ def write_certificate(path: Path) -> Certificate:
     """
     with Run.load(path) as run:
         certificate = certify(run)
-        info = {**run.info, "loss": certificate.to_json()}
-    write_json(path / INFO, info)
+        info = {**run.info, "loss": certificate.to_json(), **constants(run)}
+    write_info(path, info)
     return certificate
+
+
+def constants(run: Run) -> dict[str, dict[str, str]]:
+    """For `run.json`: hashes of what says what the samples mean, by place in the file.
+
+    That is each dataset's type and the attributes of it and of every group: scales,
+    units, sample interval. HDF5 keeps no checksum of them.
+    """
+    found: dict[str, str] = {}
+
+    def take(name: str, item: h5py.HLObject) -> None:
+        said = [repr(item.dtype) if isinstance(item, h5py.Dataset) else "group"]
+        for key in sorted(item.attrs):
+            value = np.asarray(item.attrs[key])
+            said += [key, str(value.dtype), repr(value.tolist())]
+        found[name] = digest("\n".join(said).encode())[:16]
+
+    file = run.table("events").file
+    take("/", file)
+    file.visititems(lambda name, item: take(f"/{name}", item))
+    return {"constants": found}
 
 
 def redetect(run: Run) -> NDArray[Any] | None:

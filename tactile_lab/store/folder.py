@@ -21,6 +21,9 @@ Status = Literal["running", "complete", "aborted", "faulted", "recovered"]
 SCHEMA = 1
 """Version of the folder's layout; raised when old readers would misread it."""
 
+SEAL = "sha256"
+"""Key of `run.json` with the hash of all the others; runs of older versions lack it."""
+
 INFO, DATA, LOG, SCENE = "run.json", "data.h5", "log.jsonl", "scene.toml"
 
 INPUTS = "inputs"
@@ -79,7 +82,7 @@ class RunFolder:
                 "process": os.getpid(),
                 **info,
             }
-            write_json(path / INFO, content)
+            write_info(path, content)
             log = (path / LOG).open("a", encoding="utf-8")
         _lock(log)
         return cls(path, content, log)
@@ -87,7 +90,7 @@ class RunFolder:
     def update(self, **entries: Any) -> None:
         """Put further entries into `run.json`."""
         self.info.update(entries)
-        write_json(self.path / INFO, self.info)
+        write_info(self.path, self.info)
 
     def log(self, kind: str, text: str, **entries: Any) -> None:
         """Append one line to the log."""
@@ -137,6 +140,22 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
             file.flush()
             os.fsync(file.fileno())
         new.replace(path)
+
+
+def write_info(folder: Path, info: Mapping[str, Any]) -> None:
+    """Write `run.json` of a run folder, with the SHA-256 of what it says.
+
+    Raises:
+        RecordingError: the folder cannot be written.
+    """
+    said = {name: value for name, value in info.items() if name != SEAL}
+    write_json(folder / INFO, {**said, SEAL: seal(said)})
+
+
+def seal(info: Mapping[str, Any]) -> str:
+    """SHA-256 of what `run.json` says, however it is laid out."""
+    said = {name: value for name, value in info.items() if name != SEAL}
+    return digest(json.dumps(said, sort_keys=True, default=str).encode())
 
 
 def read_info(path: Path) -> dict[str, Any]:

@@ -18,12 +18,11 @@ from tactile_lab.store.certificate import redetect, write_certificate
 from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.folder import (
     DATA,
-    INFO,
     RESERVE,
     check_space,
     is_live,
     read_info,
-    write_json,
+    write_info,
 )
 from tactile_lab.store.layout import RECORDS, create_channel
 from tactile_lab.store.ledger import LEDGER, Written, goes_on, read_ledger
@@ -127,7 +126,7 @@ def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:
     if (path / DATA).exists():
         kept = (path / DATA).rename(path / KEPT)
     (path / LEDGER).unlink(missing_ok=True)
-    write_json(path / INFO, {**info, "status": "recovered", "samples": {}})
+    write_info(path, {**info, "status": "recovered", "samples": {}})
     return Recovered(0, 0, 0, kept)
 
 
@@ -242,6 +241,6 @@ def _derive(path: Path, samples: int, dropped: int) -> Recovered:
         }
     with h5py.File(path / DATA, "r+", libver="latest") as file:
         Column(file["spikes"]).put(0, rows)
-    write_json(path / INFO, info)
+    write_info(path, info)
     write_certificate(path)
     return Recovered(samples, dropped, rows.size, path / KEPT)

@@ -107,7 +107,7 @@ def add_note(path: Path, text: str, time: float | None = None) -> None:
 def _logged(log: Path) -> Iterator[Note]:
     """Notes in the log of a run that has no file of remarks."""
     try:
-        lines = log.read_text(encoding="utf-8").splitlines()
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return
     for line in lines:

@@ -17,11 +17,20 @@ from tactile_lab.quantity import show
 from tactile_lab.store.certificate import (
     Certificate,
     certify,
+    constants,
     redetect,
     unmatched,
 )
 from tactile_lab.store.columns import pyramid_of
-from tactile_lab.store.folder import DATA, INFO, digest, is_live, read_info
+from tactile_lab.store.folder import (
+    DATA,
+    INFO,
+    SEAL,
+    digest,
+    is_live,
+    read_info,
+    seal,
+)
 from tactile_lab.store.layout import BIN, RECORDS
 from tactile_lab.store.progress import Progress, counted, each, nothing
 from tactile_lab.store.run import Run
@@ -100,6 +109,7 @@ def verify(path: Path, progress: Progress = nothing) -> Verification:
             findings += _missing(run)
             for name, told in each(run.signals, progress, more=1):
                 findings += _channel(run, name, told)
+            findings += _constants(run)
             if not any(finding.where.startswith(DATA) for finding in findings):
                 findings += _counters(run)
                 certificate = certify(run)
@@ -110,7 +120,28 @@ def verify(path: Path, progress: Progress = nothing) -> Verification:
                     findings += _spikes(run)
         except (OSError, KeyError, RuntimeError, ValueError) as error:
             findings.append(Damage(DATA, f"its structure is damaged ({_brief(error)})"))
-    return Verification(tuple(findings), certificate, tuple(notes))
+    return Verification(
+        (*findings, *_sealed(info, findings)), certificate, tuple(notes)
+    )
+
+
+def _sealed(info: dict[str, Any], found: list[Damage]) -> Iterator[Damage]:
+    """Whether `run.json` is as it was written, where nothing else tells of it."""
+    known = any(finding.where.startswith(INFO) for finding in found)
+    if not known and SEAL in info and seal(info) != info[SEAL]:
+        yield Damage(INFO, "was changed after it was written (SHA-256 differs)")
+
+
+def _constants(run: Run) -> Iterator[Damage]:
+    """Attributes and types that are not as they were written."""
+    written = run.info.get("constants")
+    if not isinstance(written, dict):
+        return  # a run of an older version, or one that was cut short
+    found = constants(run)["constants"]
+    for place in sorted({*written} & {*found}):  # what is gone is told elsewhere
+        if written[place] != found[place]:
+            what = "what it says of itself (scale, unit, type) is not as it was written"
+            yield Damage(f"{DATA} {place}", what)
 
 
 def _files(path: Path, info: dict[str, Any]) -> Iterator[Damage]:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -78,6 +79,64 @@ def test_a_certificate_that_the_data_does_not_bear_out_is_damage(complete):
     (finding,) = verify(complete).findings
     assert finding.where == "run.json loss.spikes_offline"
     assert "says 8; counted again it is 7" in finding.what
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "value"),
+    [
+        ("samples/V_K", "gain", 10.0),
+        ("samples/V_K", "gain", float("nan")),
+        ("samples/V_C1", "unit", "A"),
+        ("/", "interval", 0.0),
+        ("/", "simulated", False),
+    ],
+)
+def test_a_scale_or_unit_that_was_changed_is_damage(complete, place, name, value):
+    """HDF5 has no checksum of an attribute; a gain ten times as large was sound."""
+    with h5py.File(complete / "data.h5", "r+") as file:
+        file[place].attrs[name] = value
+    wheres = [finding.where for finding in verify(complete).findings]
+    assert f"data.h5 /{place}".replace("//", "/") in wheres
+
+
+@pytest.mark.parametrize("name", ["simulated", "notes", "instruments", "started"])
+def test_what_run_json_says_is_damage_when_changed(complete, name):
+    info = json.loads((complete / "run.json").read_text())
+    info[name] = "another"
+    (complete / "run.json").write_text(json.dumps(info))
+    (finding,) = verify(complete).findings
+    assert str(finding).startswith("run.json: was changed after it was written")
+
+
+def test_a_run_of_an_older_version_is_no_damage(complete):
+    info = json.loads((complete / "run.json").read_text())
+    del info["sha256"], info["constants"]
+    (complete / "run.json").write_text(json.dumps(info))
+    assert verify(complete).sound
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_any_flipped_bit_is_found_or_changes_nothing(complete, seed):
+    """A slice of tests/benchmarks/fuzz.py."""
+    recorded = content(complete)
+    chance = random.Random(seed)
+    file = complete / chance.choice(("data.h5", "data.h5", "run.json"))
+    data = bytearray(file.read_bytes())
+    data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+    file.write_bytes(data)
+    if verify(complete).sound:
+        assert content(complete) == recorded
+
+
+def content(path):
+    """Everything that a person can read of a run."""
+    held = {"run.json": json.loads((path / "run.json").read_text())}
+    with Run.load(path) as run:
+        for name in run.signals:
+            signal = run.signal(name)
+            held[name] = (signal[:].tobytes(), signal.time().tobytes(), signal.unit)
+        held |= {name: run.records(name).tobytes() for name in ("spikes", "current")}
+    return held
 
 
 @pytest.mark.parametrize("chunk", [0, 2, 4])
