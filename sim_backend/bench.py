@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from sim_backend.plant.noise import SensorNoise
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
 from sim_backend.world import WiredInputs, World
@@ -12,6 +13,7 @@ from tactile_lab.bench import Bench, Channel, Followers
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.engine.bench import equipped
 from tactile_lab.instruments.registry import far_end
+from tactile_lab.model.specimen import specimen
 from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.scene import Scene
 
@@ -21,10 +23,10 @@ NO_FOLLOWERS = Followers(input_bias=0.0, bandwidth=0.0)
 
 def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
     """The physical world of a scene's simulated bench, or `world` with its sensor."""
-    true = scene.simulated.deviation.circuit(scene.sensor.circuit)
-    return Plant(
-        true, scene.bench.magnet, world or options(scene), scene.simulated.seed
-    )
+    simulated = scene.simulated
+    part = specimen(scene.sensor.circuit, simulated.specimen)
+    true = simulated.deviation.circuit(part)
+    return Plant(true, scene.bench.magnet, world or options(scene), simulated.seed)
 
 
 def options(scene: Scene) -> PlantOptions:
@@ -51,6 +53,12 @@ def options(scene: Scene) -> PlantOptions:
         offset=deviation.offset,
         bias=followers.input_bias,
         noise=simulated.noise,
+        sensor_noise=SensorNoise(
+            V_fire=simulated.V_fire_noise,
+            V_GS=simulated.V_GS_noise,
+            current=simulated.current_noise,
+            hum=simulated.V_GS_hum,
+        ),
         hum=simulated.hum,
         hysteresis=simulated.hysteresis,
         attraction=simulated.attraction,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from sim_backend.plant.chain import Follower
 from sim_backend.plant.electromagnet import Electromagnet
+from sim_backend.plant.noise import SensorNoise
 from sim_backend.plant.winding import Winding
 from tactile_lab.errors import ParameterError
 from tactile_lab.scene.tables import NOISE
@@ -31,6 +32,7 @@ class PlantOptions:
         bias: input bias current of the follower at V_C2, into the node, A.
         noise: standard deviation by signal at the scope's input, V; `SCOPE_NOISE`
             for signals that are not named.
+        sensor_noise: of the circuit and its sources.
         hum: amplitude of the mains hum at every input, V.
         mains: its frequency, Hz.
         coil_lag: L/R of the coil, s.
@@ -58,6 +60,7 @@ class PlantOptions:
     offset: float = 0.0
     bias: float = 65e-12
     noise: Mapping[str, float] = field(default_factory=dict)
+    sensor_noise: SensorNoise = field(default_factory=SensorNoise)
     hum: float = 0.0
     mains: float = 50.0
     coil_lag: float = 1.1e-3

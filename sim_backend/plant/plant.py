@@ -16,6 +16,7 @@ from sim_backend.plant.chain import Pulse
 from sim_backend.plant.coupling import Capacitor
 from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.plant.electromagnet import Electromagnet
+from sim_backend.plant.noise import NoiseSource, SensorNoise
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import FloatArray, Pieces
 from sim_backend.plant.render import noise_table
@@ -40,8 +41,13 @@ class _Drive:
     """Force on the cantilever as the electromagnet gives it."""
 
     def __init__(
-        self, electromagnet: Electromagnet, magnet: Magnet, options: PlantOptions
+        self,
+        electromagnet: Electromagnet,
+        magnet: Magnet,
+        options: PlantOptions,
+        noise: NoiseSource | None,
     ) -> None:
+        self._noise = noise
         self._electromagnet = electromagnet
         self._magnet = magnet
         self._attraction, self._scale = options.attraction, options.force
@@ -52,7 +58,8 @@ class _Drive:
     def force(self, start: float, end: float) -> Waveform:
         time, current = self._electromagnet.foreseen(start, end)
         drive = self._magnet.force(current * self._sign) * self._scale
-        return Waveform(time, drive + self._attraction)
+        force = Waveform(time, drive + self._attraction)
+        return force if self._noise is None else self._noise.on(force)
 
 
 class Plant(DrivenCoil):
@@ -77,8 +84,15 @@ class Plant(DrivenCoil):
         self.magnet = magnet
         self.seed = seed
         super().__init__(options.electromagnet())
-        self._drive = _Drive(self._electromagnet, magnet, options)
-        self._sensor = SimulatedSensor(self.circuit, self._drive)
+        irregular, noise = options.sensor_noise, None
+        if irregular != SensorNoise():
+            noise = NoiseSource(
+                irregular, seed, circuit.k_F, magnet.newtons_per_ampere, options.mains
+            )
+        acting = noise if irregular.of_force else None
+        self._drive = _Drive(self._electromagnet, magnet, options, acting)
+        fire = noise.V_fire if noise is not None and irregular.V_fire > 0 else None
+        self._sensor = SimulatedSensor(self.circuit, self._drive, fire)
         self._noise = noise_table(seed)
         swing = self.circuit.fire_voltage - self.circuit.reset_voltage
         self._spike = options.speed.spike(swing, self.circuit.tau_K)

@@ -8,7 +8,7 @@ the model goes on from there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -23,6 +23,10 @@ from tactile_lab.waveform import Waveform
 
 SHORTEST, LONGEST = 10e-3, 60.0
 """Length of a chunk just after a command, and long after one, s; it doubles between."""
+LONGEST_NOISY = 0.5
+"""The same where each spike has a V_fire of its own, and ends its chunk, s."""
+JUST = 1e-9
+"""After a spike, s: its chunk ends there."""
 WINDOW = 0.5
 """Part of a chunk that is sampled at once, s."""
 FINE, COARSE = 5e-5, 2.5e-4
@@ -63,6 +67,8 @@ class _Chunk:
     end: float
     spacing: float
     outputs: Outputs
+    circuit: Circuit
+    fired: int
     pieces: dict[tuple[str, int], Pieces] = field(default_factory=dict)
 
     @property
@@ -76,13 +82,25 @@ class SimulatedSensor:
     Only stages that something needed so far are solved. A stage first needed later
     starts from its equilibrium. Not thread-safe; the plant's lock is around it.
 
+    Args:
+        circuit: whose state it is.
+        drive: force on it.
+        V_fire: where V_fire is not the same at each spike: V_fire of spike number n,
+            from V_fire without noise and V_reset, V.
+
     Attributes:
         error_spike_time, error_V_C1: largest estimated error so far, s and V.
     """
 
-    def __init__(self, circuit: Circuit, drive: Drive) -> None:
+    def __init__(
+        self,
+        circuit: Circuit,
+        drive: Drive,
+        V_fire: Callable[[int, float, float], float] | None = None,
+    ) -> None:
         self.circuit = circuit
         self._drive = drive
+        self._V_fire, self._fired = V_fire, 0
         self.error_spike_time = 0.0
         self.error_V_C1 = 0.0
         self._keep: tuple[str, ...] = ()
@@ -97,7 +115,7 @@ class SimulatedSensor:
         self._keep = tuple(sorted(wanted | set(self._keep)))
         for i, chunk in enumerate(self._chunks):
             if chunk.end > time:
-                self._frontier = chunk.state
+                self._frontier, self._fired = chunk.state, chunk.fired
                 del self._chunks[i:]
                 break
         state = self._frontier
@@ -114,10 +132,10 @@ class SimulatedSensor:
         for i, chunk in enumerate(self._chunks):
             if chunk.end > time:
                 del self._chunks[i + (chunk.start < time) :]
-                self._frontier = chunk.state
+                self._frontier, self._fired = chunk.state, chunk.fired
                 if chunk.start < time:
                     chunk.end = time
-                    self._frontier = self._advance(chunk.state, time)[0]
+                    self._frontier = self._advance(chunk.circuit, chunk.state, time)[0]
                 return
         raise ParameterError(f"A command at {time:g} s lies before what is kept.")
 
@@ -175,20 +193,38 @@ class SimulatedSensor:
         state = self._frontier
         calm = state.time - self._drive.latest_command(state.time)
         end = state.time + min(max(calm, SHORTEST), LONGEST)
-        after, outputs = self._advance(state, end)
+        circuit = self._next_circuit()
+        if self._V_fire is not None:
+            end = min(end, state.time + LONGEST_NOISY)
+        after, outputs = self._advance(circuit, state, end)
         spacing = FINE if calm < LIVELY else COARSE
-        chunk = _Chunk(state, end, spacing, outputs)
+        chunk = _Chunk(state, end, spacing, outputs, circuit, self._fired)
         self._chunks.append(chunk)
-        command = self._drive.next_command(state.time)
-        if command < end:
-            chunk.end = command
-            after = self._advance(state, command)[0]
+        cut = self._drive.next_command(state.time)
+        spikes = outputs.spike_times
+        if self._V_fire is not None and spikes is not None and spikes.size:
+            one = float(spikes[0]) + JUST
+            self._fired += one <= cut
+            cut = min(cut, one)
+        if cut < end:
+            chunk.end = cut
+            after = self._advance(circuit, state, cut)[0]
         self._frontier = after
 
-    def _advance(self, state: State, until: float) -> tuple[State, Outputs]:
+    def _next_circuit(self) -> Circuit:
+        """The circuit with the V_fire of the next spike."""
+        if self._V_fire is None:
+            return self.circuit
+        fire, reset = self.circuit.fire_voltage, self.circuit.reset_voltage
+        volts = self._V_fire(self._fired, fire, reset)
+        return replace(self.circuit, V_fire=volts, V_reset=reset)
+
+    def _advance(
+        self, circuit: Circuit, state: State, until: float
+    ) -> tuple[State, Outputs]:
         force = self._drive.force(state.time, until)
         keep = self._keep or ("V_C1",)
-        after, outputs = advance(self.circuit, state, force, until, keep=keep)
+        after, outputs = advance(circuit, state, force, until, keep=keep)
         solved = outputs.solution
         self.error_V_C1 = max(self.error_V_C1, solved.error_V_C1)
         self.error_spike_time = max(self.error_spike_time, solved.error_spike_time)
@@ -218,5 +254,5 @@ class SimulatedSensor:
         spikes = spikes[(spikes > low) & (spikes <= high)]
         time = np.sort(np.concatenate([time, spikes, resets, resets]))
         value = outputs.sample(signal, time)
-        value[np.searchsorted(time, resets, side="left")] = self.circuit.fire_voltage
+        value[np.searchsorted(time, resets, side="left")] = chunk.circuit.fire_voltage
         return Pieces.through(time, value)

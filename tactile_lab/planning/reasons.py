@@ -86,7 +86,11 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
             found.append((name, "not recorded"))
     if any(step.trial.pause for step in drive.steps):
         found.append(("samples of pauses", "recovery is neither streamed nor stored"))
-    if not bench.simulated:
+    if bench.simulated:
+        off = "off in [simulated]: not computed"
+        world = scene.simulated
+        found += [(what, off) for what, on in world.irregular.items() if not on]
+    else:
         found.append(("simulated instruments", "the bench is real"))
     found.append(("window", "Qt is loaded by `tactile-lab gui` alone"))
     return tuple(found)

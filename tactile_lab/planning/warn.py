@@ -13,6 +13,7 @@ from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.ways import ways_used
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scene.tables import Simulated
 from tactile_lab.spikes.detection import DEVIATIONS
 
 SAMPLES_PER_DECAY = 6
@@ -201,6 +202,7 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
         lines.append(
             f"simulated source: {bench.coil.dialect}{baud}, wire and parse time pass"
         )
+    lines += _irregular(world)
     noise = ", ".join(f"{name} {show(sd, 'V')}" for name, sd in world.noise.items())
     codes = ""
     if needed.channels and bench.scope is not None:
@@ -230,3 +232,23 @@ def _followers(scene: Scene) -> Iterator[str]:
 def _band(half: float | None, unit: str) -> str:
     """An uncertainty behind its value."""
     return " (not stated how well)" if half is None else f" ±{show(half, unit)} (95 %)"
+
+
+def _irregular(world: Simulated) -> Iterator[str]:
+    """What makes the simulated sensor irregular, where it is on."""
+    parts = {
+        "V_fire": (world.V_fire_noise, "V"),
+        "V_GS": (world.V_GS_noise, "V"),
+        "the coil's source": (world.current_noise, "A"),
+        "mains on V_GS": (world.V_GS_hum, "V"),
+    }
+    told = [
+        f"{name} {show(size, unit)}" for name, (size, unit) in parts.items() if size
+    ]
+    if told:
+        yield f"noise of the sensor: {', '.join(told)}"
+    if world.specimen:
+        yield (
+            f"specimen {world.specimen}: R within 1 %, C within 5 %, V_GS within 2 mV, "
+            "V_th within 5 mV (two standard deviations)"
+        )

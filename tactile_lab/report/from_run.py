@@ -111,6 +111,7 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
         magnet=scene.bench.magnet,
         setpoint=Waveform.stairs(applied.steps, run.duration),
         followers=scene.bench.followers,
+        temperature=scene.sensor.temperature_uncertainty,
         clock=clock,
     )
 

@@ -12,6 +12,9 @@ from pydantic import BeforeValidator, Discriminator, Tag
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit
 from tactile_lab.model.state import Start
+from tactile_lab.model.temperature import at_temperature
+from tactile_lab.quantity import Unit
+from tactile_lab.scene.tables import Temperature
 
 PRESETS: Mapping[str, Mapping[str, str]] = {
     "table1": {},
@@ -41,6 +44,10 @@ class Sensor(Circuit):
     Args:
         preset: what stood in place of the defaults of `Circuit`, see `PRESETS`.
         start: voltages at time 0, or "equilibrium".
+        temperature: of the sensor, K: V_T, I_S and I_T1s follow from it; None: they
+            are as given.
+        temperature_uncertainty: half of the 95 % band of the temperature, K; None:
+            not stated.
 
     Raises:
         ParameterError: as `Circuit`, or a voltage at which it cannot start.
@@ -52,6 +59,8 @@ class Sensor(Circuit):
         Discriminator(_form),
         BeforeValidator(_start),
     ] = "equilibrium"
+    temperature: Temperature | None = None
+    temperature_uncertainty: Annotated[float, Unit("K", least=0.0)] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -60,8 +69,11 @@ class Sensor(Circuit):
 
     @cached_property
     def circuit(self) -> Circuit:
-        """The circuit alone."""
-        return Circuit(**{f.name: getattr(self, f.name) for f in fields(Circuit)})
+        """The circuit alone, at its temperature."""
+        made = Circuit(**{f.name: getattr(self, f.name) for f in fields(Circuit)})
+        if self.temperature is None:
+            return made
+        return at_temperature(made, self.temperature)
 
     def _check_start(self, start: Start) -> None:
         if start.V_C2 >= self.fire_voltage:

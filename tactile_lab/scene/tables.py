@@ -195,6 +195,12 @@ class Simulated(SceneTable):
         seed: of all noise; the same seed gives the same stored samples.
         noise: standard deviation per channel at the scope's input, V.
         field_noise: standard deviation of a teslameter's reading, T.
+        V_fire_noise: standard deviation of V_fire from spike to spike, V.
+        V_GS_noise: standard deviation of the gate's source, white up to 250 Hz, V.
+        current_noise: standard deviation of the coil's source, the same, A.
+        V_GS_hum: amplitude of 50 Hz mains hum on the gate, V.
+        specimen: number of a specimen whose parts lie within their tolerances; 0: all
+            are as marked.
         hum: amplitude of 50 Hz mains hum on every channel, V.
         hysteresis: half-width of the core's loop, A; 0.03 A to 0.07 A for mild steel.
         attraction: the magnet's pull on the core, N; the same at every current.
@@ -214,6 +220,11 @@ class Simulated(SceneTable):
         default_factory=lambda: dict(NOISE)
     )
     field_noise: FieldNoise = 2e-6
+    V_fire_noise: Noise = 0.0
+    V_GS_noise: Noise = 0.0
+    current_noise: HalfWidth = 0.0
+    V_GS_hum: Noise = 0.0
+    specimen: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
     hum: Noise = 0.0
     hysteresis: HalfWidth = 0.0
     attraction: Pull = 0.0
@@ -226,6 +237,16 @@ class Simulated(SceneTable):
     inverted_coil: bool = False
     coil_unplugged: Duration | None = None
     deviation: Deviation = field(default_factory=Deviation)
+
+    @property
+    def irregular(self) -> dict[str, float]:
+        """What makes one specimen and one spike unlike the next; 0: off."""
+        return {
+            "noise of V_fire": self.V_fire_noise,
+            "noise of the sources": max(self.V_GS_noise, self.current_noise),
+            "hum of the sensor": self.V_GS_hum,
+            "spread between specimens": self.specimen,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
