@@ -51,8 +51,10 @@ FEWEST = 3
 """Fewer data than this tell nothing."""
 BAND = 1.25
 """Of its 95 % band that a stated uncertainty may take to explain a misfit."""
-EXPLAINED = 3.0
-"""Times the noise that a misfit may have and still count as explained."""
+NOTICED = 3.0
+"""Times the noise from which a misfit is worth an explanation."""
+EXPLAINED = 1.5
+"""Times the noise that a suspect may leave and still explain it."""
 CLEARLY = 1.35
 """Times the misfit of the best that every other suspect must leave at least."""
 
@@ -165,7 +167,7 @@ def explain(
         weight[: problem.bins] = math.sqrt(_levels(V_C1) / problem.bins)
     trial = _Trial(belief, problem, noise, weight)
     misfit = trial.misfit(trial.freed(trial.plain))
-    if misfit < EXPLAINED:
+    if misfit < NOTICED:
         return None
     found = [s for name in SUSPECTS if (s := trial.fitted(name)) is not None]
     found.sort(key=lambda suspect: suspect.misfit)
@@ -248,7 +250,7 @@ class _Trial:
         parts = [part for part in (scaled[:bins], scaled[bins:]) if part.size]
         found = [float(np.sqrt(np.mean(part**2))) for part in parts]
         overused = float(np.max(taken, initial=0.0)) - 1
-        return max(*found, EXPLAINED * overused / (BAND - 1))
+        return max(*found, NOTICED * overused / (BAND - 1))
 
     def _told(self, slope: FloatArray, but: str) -> float:
         """What the data tell of a size, 1/step^2, each band's cause left free in it."""
