@@ -5,7 +5,6 @@ A list runs on when this program dies, so it is always finite and ends at 0 A.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,13 +13,12 @@ from drivers.coil.interlock import check_current
 from drivers.coil.wire import CoilWire
 from tactile_lab.bench import CoilLimits
 from tactile_lab.current_list import CurrentList
-from tactile_lab.errors import LimitError, RefusedError
+from tactile_lab.errors import BadReplyError, LimitError, NoReplyError, RefusedError
 from tactile_lab.instruments.serial_dialect import CoilDialect, ListMode
 from tactile_lab.quantity import show
 
-LOADS = 2
-"""Times a list is sent: a line is repeated where its answer was lost, and then its
-points stand twice in the memory."""
+TRIES = 3
+"""Times a line is sent whose answer is lost and which, as the count tells, was, too."""
 
 
 def check_list(points: CurrentList, limits: CoilLimits, row: CoilDialect) -> ListMode:
@@ -73,31 +71,52 @@ def load(wire: CoilWire, mode: ListMode, points: CurrentList) -> None:
 
     Raises:
         RefusedError: a line is refused, or the memory holds another number of points.
+        NoReplyError, BadReplyError: answers are lost.
     """
     digits = wire.dialect.digits
     currents = [f"{i:.{digits}f}" for i in points.currents]
     dwells = [f"{t:.{mode.dwell_digits}f}" for t in points.dwells]
     if np.all(points.dwells == points.dwells[0]):
         dwells = dwells[:1]  # one stands for all
-    held = math.nan
-    for _ in range(LOADS):
-        for line in mode.clear:
-            wire.command(line)
-        _send(wire, mode, mode.points, currents)
-        _send(wire, mode, mode.dwells, dwells)
-        wire.command(mode.count.format(n=1))
-        if mode.points_query is None:
-            return
-        held = wire.number(mode.points_query)
-        if held == len(points):
-            return
-    raise RefusedError(
-        f"The source holds {held:g} points of a list of {len(points)}: it was not "
-        "loaded as it was sent. Check the link, and try again."
-    )
+    for line in mode.clear:
+        wire.command(line)
+    _send(wire, mode, (mode.points, mode.points_query), currents)
+    _send(wire, mode, (mode.dwells, mode.dwells_query), dwells)
+    wire.command(mode.count.format(n=1))
 
 
-def _send(wire: CoilWire, mode: ListMode, template: str, values: Sequence[str]) -> None:
+def _send(
+    wire: CoilWire, mode: ListMode, how: tuple[str, str | None], values: Sequence[str]
+) -> None:
+    """Append values by a template, a line at a time; a query counts what is held.
+
+    A line whose answer was lost is sent again only if the count says that it never
+    came: sent twice, its points would stand twice in the memory.
+    """
+    template, query = how
     for first in range(0, len(values), mode.points_per_line):
         part = values[first : first + mode.points_per_line]
-        wire.command(template.format(values=",".join(part)))
+        line = template.format(values=",".join(part))
+        for _ in range(TRIES):
+            try:
+                wire.command_once(line)
+                break
+            except (NoReplyError, BadReplyError):
+                if query is None:
+                    raise
+                held = wire.number(query)
+                if held == first + len(part):
+                    break
+                if held != first:
+                    raise _torn(held, first) from None
+        else:
+            raise NoReplyError(f"The source answered nothing to {line!r}, thrice.")
+    if query is not None and (held := wire.number(query)) != len(values):
+        raise _torn(held, len(values))
+
+
+def _torn(held: float, wanted: int) -> RefusedError:
+    return RefusedError(
+        f"The source holds {held:g} points of a list of which it was sent {wanted}. "
+        "Check the link, and try again."
+    )

@@ -139,13 +139,31 @@ class Conversation(Generic[D]):
         Raises:
             RefusedError: the instrument reports an error.
         """
+        self._command(line, self.query)
+
+    def command_once(self, line: str) -> None:
+        """The same, of a line that must not be repeated where its answer is lost.
+
+        Raises:
+            RefusedError: the instrument reports an error.
+            NoReplyError, BadReplyError: the answer is lost; the line may have come.
+                The link is in step again.
+        """
+        try:
+            self._command(line, self.link.query)
+        except (NoReplyError, BadReplyError):
+            self.link.resynchronise()
+            self._empty_errors(self.link.query)
+            raise
+
+    def _command(self, line: str, query: Callable[[str], str]) -> None:
         if self.dialect.error is None:
             self.link.write(line)
             return
         *first, last = self.dialect.verified(line)
         for one in first:
             self.link.write(one)
-        answer = self.query(last)
+        answer = query(last)
         if re.search(self.dialect.error_ok, answer) is None:
             raise RefusedError(f"The instrument refused {line!r}: {answer}.")
 

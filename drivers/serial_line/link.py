@@ -74,6 +74,7 @@ class SerialLink:
         self._beat = beat
         self._transcript: Transcript | None = None
         self._serial: serial.Serial | None = None
+        self._sent = 0.0
         self._free_at = 0.0
         self._doubtful = False
         self._half_sent = False
@@ -281,7 +282,8 @@ class SerialLink:
         self._half_sent = False
         # a port takes all characters at once and sends them one by one
         sent = begun + len(data) * self.wire.character_time
-        self._rest_from(max(sent, self._clock.now()))
+        self._sent = max(sent, self._clock.now())
+        self._rest_from(self._sent)
 
     def _rest_from(self, time: float) -> None:
         """Send nothing for a while after clock time `time` s, if it wants that."""
@@ -295,8 +297,14 @@ class SerialLink:
         """
         end = self.wire.reply_end.encode("ascii")
         while True:
+            line = b""
             with self._mapped() as port:
                 line = port.read_until(end)
+                # a long line may have taken most of that time to get out
+                while not line.endswith(end) and (
+                    self._clock.now() < self._sent + self.wire.timeout
+                ):
+                    line += port.read_until(end)
             self._beat()
             self._rest_from(self._clock.now())
             if line:

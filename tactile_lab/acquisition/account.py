@@ -23,6 +23,7 @@ from tactile_lab.bench import Reading, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import show
+from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome, Trial
 
@@ -171,18 +172,20 @@ class Account:
             for reading in meter.take_readings():
                 self.field(self.axis(reading.time), reading.value)
 
-    def write_current(self, later: float = 0.0) -> None:
+    def write_current(self, later: float | None = None) -> None:
         """Write down what was applied; points of a list came `later`, s, than thought.
 
-        They wait for this until the samples have shown when the list began.
+        They wait for this until the samples have shown when the list began; None where
+        they did not.
         """
         if self.journal is None:
             return
+        told = BY_HOST if later is None else BY_SAMPLES
         for one in self._unwritten:
-            time = self.axis(one.time) + (later if one.listed else 0.0)
+            time = self.axis(one.time) + ((later or 0.0) if one.listed else 0.0)
             self._written = max(time, self._written)
             row = self._written, one.setpoint, one.measured, one.ratio
-            self.journal.current(*row, listed=one.listed)
+            self.journal.current(*row, listed=told if one.listed else 0)
         self._unwritten = []
 
     def field(self, time: float, tesla: float) -> None:

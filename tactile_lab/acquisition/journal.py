@@ -37,11 +37,12 @@ class Journal(Protocol):
         measured: float | None,
         ratio: float | None = None,
         *,
-        listed: bool = False,
+        listed: int = 0,
     ) -> None:
         """A set-point as applied, A; read-back and resistance over cold, if known.
 
-        `listed`: a point of a list, which the source took by its own clock.
+        `listed`: 0, or for a point of a list what told when that began:
+        `tactile_lab.store.applied.BY_SAMPLES` or `BY_HOST`.
         """
         return
 

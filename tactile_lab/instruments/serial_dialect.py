@@ -99,7 +99,8 @@ class ListMode(Strict):
         points: template, `{values}` A comma-separated; what is sent again is appended.
         dwells: the same for the dwells, s: one for each point, or one for all.
         count: template, `{n}` repetitions; never sent with 0, which means for ever.
-        points_query: how many points the memory holds; None where nobody can ask.
+        points_query, dwells_query: how many of them the memory holds; None where
+            nobody can ask.
         max_points, points_per_line: what the memory and one line hold.
         dwell_digits: decimals of a dwell on the wire.
         shortest, longest: dwell, s.
@@ -110,6 +111,7 @@ class ListMode(Strict):
     dwells: str
     count: str
     points_query: str | None = None
+    dwells_query: str | None = None
     start: Lines
     stop: Lines
     max_points: int = Field(ge=2)
@@ -312,13 +314,14 @@ class CoilDialect(SerialDialect):
                 (mode.dwells, [dwell] * mode.points_per_line),
             )
         )
-        others = (*mode.clear, mode.count, mode.points_query or "", *mode.start)
+        asked = [q for q in (mode.points_query, mode.dwells_query) if q]
+        others = (*mode.clear, mode.count, *asked, *mode.start)
         return ListCapability(
             points=mode.max_points,
             shortest=mode.shortest,
             longest=mode.longest,
             resolution=10.0**-mode.dwell_digits,
-            load_fixed=sum(self._exchange(line, baud) for line in others if line),
+            load_fixed=sum(self._exchange(line, baud) for line in others),
             load_point=per_line / mode.points_per_line,
         )
 

@@ -32,6 +32,10 @@ MOST_BINS = 1000
 """Bins read at once: of a longer stretch only the mean is asked for."""
 
 
+BY_SAMPLES, BY_HOST = 1, 2
+"""What told when a list began, of which a set-point was a point."""
+
+
 @dataclass(frozen=True, eq=False)
 class AppliedCurrent:
     """What the coil carried.
@@ -39,7 +43,7 @@ class AppliedCurrent:
     Attributes:
         steps: shape (n, 2): from that time on, s, the source gives this current, A.
         ends: shape (n,): when the host heard of what came after each step, s.
-        edges: number of steps whose time the shunt gave.
+        edges: number of steps whose time the shunt gave, points of lists among them.
         lead: by how much those came before the host heard of them, s (median): all
             others were moved by as much; 0 where there were too few.
     """
@@ -75,8 +79,9 @@ def applied_current(
         shunt: the recorded coil current; None where the run has none.
         coil_lag: L/R of the coil, s: the current passes half of a step ln 2 times
             that after the source stepped.
-        listed: which of them the source took by its own clock: they came when `time`
-            says, as the shunt showed while the run went on.
+        listed: which of them the source took by its own clock, so that they came when
+            `time` says: `BY_SAMPLES` where the shunt showed when their list began,
+            `BY_HOST` where only the host told, else 0.
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
@@ -86,7 +91,8 @@ def applied_current(
     level = np.array(
         [_level(sent[a], read[a:b]) for a, b in zip(first, last, strict=True)]
     )
-    own_clock = np.broadcast_to(np.asarray(listed, dtype=bool), t.shape)[first]
+    dated = np.broadcast_to(np.asarray(listed), t.shape)[first]
+    own_clock = dated > 0
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
     edges, lead = 0, 0.0
     if shunt is not None:
@@ -100,6 +106,8 @@ def applied_current(
         begin[1:] -= np.where(own_clock[1:], 0.0, lead)
         begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     steps = np.column_stack([begin, level])
+    by_host = bool(np.any(dated == BY_HOST))
+    edges = 0 if by_host else edges + int(np.sum(dated == BY_SAMPLES))
     return AppliedCurrent(steps, ends, edges, lead)
 
 

@@ -131,11 +131,11 @@ class Recorder:
         measured: float | None,
         ratio: float | None = None,
         *,
-        listed: bool = False,
+        listed: int = 0,
     ) -> None:
         """Store a set-point and its read-back, A, and the resistance over cold.
 
-        `listed`: the source took it by its own clock, so `time` needs no correction.
+        `listed`: as `tactile_lab.store.applied.applied_current` takes it.
         """
         known = _number(measured), _number(ratio)
         self._add("current", time, setpoint, *known, listed)

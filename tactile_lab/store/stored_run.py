@@ -16,6 +16,7 @@ from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.rate import rate_changes
 from tactile_lab.store.applied import (
     BIN_TIME,
+    BY_SAMPLES,
     MOST_BINS,
     AppliedCurrent,
     Shunt,
@@ -267,8 +268,26 @@ class StoredRun:
 
     @property
     def current(self) -> Records:
-        """Applied current: time (s), setpoint and measured (A; NaN where not read)."""
-        return self.records("current")
+        """Applied current: time (s), setpoint and measured (A; NaN where not read).
+
+        Points of a list that the samples dated lie where the samples are now: their
+        stretch was put in its place when it had ended.
+        """
+        rows = self.records("current")
+        if "listed" in (rows.dtype.names or ()):
+            dated = rows["listed"] == BY_SAMPLES
+            rows["time"][dated] = self._in_place(rows["time"][dated])
+        return rows
+
+    def _in_place(self, time: FloatArray) -> FloatArray:
+        """Where times of the samples as they came in lie, s; shape (n,)."""
+        found = self.records("segments")
+        if not found.size or not time.size:
+            return time
+        came_in = found["host"] - found["host"][0]
+        k = np.clip(np.searchsorted(came_in, time, side="right") - 1, 0, None)
+        since = (time - came_in[k]) * (1 + found["drift"][k])
+        return np.asarray(found["time"][k] + since)
 
     @property
     def read_back(self) -> FloatArray:

@@ -147,16 +147,21 @@ def test_a_memory_that_is_full_says_so(bench):
         play(bench.coil, SINE, 0.01)
 
 
-@pytest.mark.parametrize("kind", ["deaf", "missing"])
-def test_a_line_that_was_lost_or_doubled_is_noticed(bench, kind):
-    bench.end.faults.add(SerialFault(kind=kind, line="LIST:CURR "))
-    play(bench.coil, SINE, 0.01)
+@pytest.mark.parametrize("line", ["LIST:CURR ", "LIST:DWEL "])
+@pytest.mark.parametrize("kind", ["deaf", "missing", "garbled"])
+def test_no_point_is_lost_or_doubled_where_an_answer_is_lost(bench, kind, line):
+    """Twice as many in a row as were survived by loading it all again."""
+    dwells = np.linspace(0.02, 0.01, len(SINE))
+    for skip in (0, 2, 3):
+        bench.end.faults.add(SerialFault(kind=kind, line=line, skip=skip))
+    play(bench.coil, SINE, dwells)
     assert bench.source.list.points == pytest.approx(SINE, abs=1e-5)
+    assert bench.source.list.dwells == pytest.approx(dwells, abs=1e-5)
     bench.clock.sleep_until(bench.clock.now() + 2)
     bench.coil.end_list()
-    bench.end.faults.add(SerialFault(kind="missing", line="LIST:CURR ", times=None))
-    with pytest.raises((RefusedError, NoReplyError)):
-        play(bench.coil, SINE[1:], 0.01)
+    bench.end.faults.add(SerialFault(kind="deaf", line=line, times=None))
+    with pytest.raises(NoReplyError, match="thrice"):
+        play(bench.coil, SINE[1:], dwells[1:])
     assert not bench.source.list.playing
 
 

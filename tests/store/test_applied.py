@@ -5,13 +5,28 @@ import pytest
 
 from tactile_lab.bench import Block
 from tactile_lab.report.driven import shunt_over_source
-from tactile_lab.store.applied import applied_current
+from tactile_lab.store.applied import BY_HOST, BY_SAMPLES, applied_current
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.run import Run
 
 STEPS = np.array([0.0, 0.5, 1.0, 0.2])
 CAME = np.array([0.0, 1.0, 2.0, 3.0])
+
+
+def test_points_of_a_list_stand_where_they_are_told():
+    """None of them is an edge; where the host dated them, they date nothing."""
+    time, sent, read = rows()
+    ramp = np.arange(1, 40) * 0.02
+    later = time[-1] + 1 + np.arange(39) * 1e-3
+    times, levels = np.append(time, later), np.append(sent, ramp)
+    listed = np.append(np.zeros(time.size), np.full(39, BY_SAMPLES))
+    reads = np.append(read, np.full(39, np.nan))
+    found = applied_current(times, levels, reads, shunt(), listed=listed)
+    assert found.uncertainty is not None
+    assert np.array_equal(found.steps[-39:, 0], later)
+    listed[listed > 0] = BY_HOST
+    assert applied_current(times, levels, reads, shunt(), listed=listed).edges == 0
 
 
 def shunt(scale=1.0, late=0.0, noise=1e-3, blind=(0.0, 0.0)):

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.overrange import overrange, told
@@ -191,6 +192,24 @@ def test_alignment_moves_the_segment(bench, recorder, folder):
         time = run.signal("V_C1").time()
         assert time[1000] == pytest.approx(0.25 + 1.0001, abs=1e-12)
         assert run.records("segments")["uncertainty"].tolist() == [1e-5]
+
+
+def test_points_of_a_list_move_with_the_samples_that_dated_them(
+    bench, recorder, folder
+):
+    bench.play(recorder, bench.codes(2000), 500)
+    for time, listed in (
+        (0.4, 0),
+        (0.5, BY_SAMPLES),
+        (1.5, BY_SAMPLES),
+        (1.6, BY_HOST),
+    ):
+        recorder.current(time, time, None, listed=listed)
+    recorder.align(offset=0.25, drift=1e-4, uncertainty=1e-5)
+    recorder.close("complete", 2000)
+    with Run.load(folder.path) as run:
+        moved = [0.4, 0.75 + 0.5e-4, 1.75 + 1.5e-4, 1.6]
+        assert run.current["time"] == pytest.approx(moved, abs=1e-12)
 
 
 def test_over_range_is_flagged_per_block_and_channel(bench, recorder, folder):
