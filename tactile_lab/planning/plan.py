@@ -13,7 +13,7 @@ from tactile_lab.planning.ranges import beyond
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, warnings
-from tactile_lab.planning.ways import ways_used
+from tactile_lab.planning.ways import WayUsed, ways_used
 from tactile_lab.quantity import bytes_text, count, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY, SIGNALS
@@ -47,6 +47,12 @@ class Plan:
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
     preview: Result | None
+
+    @property
+    def ways(self) -> tuple[WayUsed, ...]:
+        """By which ways the coil plays the trials, and how near the force comes."""
+        magnet = self.scene.bench.magnet
+        return ways_used(self.timeline.steps, magnet.lag_uncertainty)
 
     def __repr__(self) -> str:
         cost = self.estimate
@@ -87,7 +93,7 @@ class Plan:
             "peak_current_A": cost.peak_current,
             "heat_A2s": {"used": cost.heat, "budget": cost.heat_budget},
             "coil_update": self._coil_update(),
-            "ways": [used.to_dict() for used in ways_used(self.timeline.steps)],
+            "ways": [used.to_dict() for used in self.ways],
             "resolution": dict(cost.resolution),
             "preview": self._preview(),
             "assumptions": list(self.assumptions),
@@ -212,14 +218,15 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         f"peak {show(cost.peak_current, 'A')} for {show(cost.peak_force, 'N')}, heat "
         f"{cost.heat:.2g} of {cost.heat_budget:g} A² s",
     )
-    if cost.update_interval is not None:
+    ways = {used.way for used in plan.ways}
+    if cost.update_interval is not None and ways != {"list"}:
         yield (
             "set-points",
             f"{1 / cost.update_interval:.3g} a second (one each "
             f"{show(cost.update_interval, 's', 3)}), steps up to "
             f"{show(cost.step_current, 'A', 3)} or {show(cost.step_force, 'N', 3)}",
         )
-    for used in ways_used(plan.timeline.steps):
+    for used in plan.ways:
         yield ("by set-points" if used.way == "set-points" else "by lists"), str(used)
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"

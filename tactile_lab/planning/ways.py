@@ -23,6 +23,8 @@ class WayUsed:
         why: of the trial whose force errs most.
         error: its largest difference from the force asked for, N.
         part: the same as a part of that force's range.
+        unsure: by how much the force may be off besides, N, as the lags of coil and
+            core are known to the bench's `lag_uncertainty` only; None without one.
         load: time to load all their lists, s.
     """
 
@@ -31,12 +33,16 @@ class WayUsed:
     why: str
     error: float
     part: float
+    unsure: float | None
     load: float
 
     def __str__(self) -> str:
+        lags = "; how well the lags are known is not stated"
+        if self.unsure is not None:
+            lags = f", and by {show(self.unsure, 'N', 2)} as lags are not known better"
         return (
             f"{count(self.trials, 'trial')}: {self.why}; the force errs by up to "
-            f"{show(self.error, 'N', 2)}, {100 * self.part:.2g} % of its range"
+            f"{show(self.error, 'N', 2)}, {100 * self.part:.2g} % of its range{lags}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -47,28 +53,44 @@ class WayUsed:
             "why": self.why,
             "error_N": self.error,
             "error_part": self.part,
+            "lags_N": self.unsure,
             "load_s": self.load,
         }
 
 
-def ways_used(steps: Sequence[Step]) -> tuple[WayUsed, ...]:
-    """The ways of all trials that ask for a force, in the order they come."""
+def ways_used(
+    steps: Sequence[Step], lag_uncertainty: float | None = None
+) -> tuple[WayUsed, ...]:
+    """The ways of all trials that ask for a force, in the order they come.
+
+    Args:
+        steps: of the plan.
+        lag_uncertainty: half of the 95 % band of coil's and core's lags together, s.
+    """
     found: dict[str, list[tuple[Step, Drive, float]]] = {}
     for step in steps:
         if step.drive is not None and step.drive.error is not None:
             if step.trial.force.peak > 0:
                 entry = step, step.drive, step.drive.error
                 found.setdefault(step.drive.way, []).append(entry)
-    return tuple(_used(way, trials) for way, trials in found.items())
+    return tuple(_used(way, trials, lag_uncertainty) for way, trials in found.items())
 
 
-def _used(way: str, trials: list[tuple[Step, Drive, float]]) -> WayUsed:
+def _used(
+    way: str, trials: list[tuple[Step, Drive, float]], lag_uncertainty: float | None
+) -> WayUsed:
     worst, drive, error = max(trials, key=lambda one: one[2])
+    range_ = float(np.ptp(np.append(worst.trial.force.value, 0.0)))
+    unsure = None
+    if lag_uncertainty is not None:
+        steepest = max(step.trial.force.steepest for step, _, _ in trials)
+        unsure = min(steepest * lag_uncertainty, range_) if lag_uncertainty else 0.0
     return WayUsed(
         way=way,
         trials=len(trials),
         why=drive.why,
         error=error,
-        part=error / float(np.ptp(np.append(worst.trial.force.value, 0.0))),
+        part=error / range_,
+        unsure=unsure,
         load=sum(drive.load for _, drive, _ in trials),
     )

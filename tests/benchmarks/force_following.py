@@ -44,10 +44,12 @@ def main() -> None:
         "whole program on the built-in bench (Kepco at 19200 baud, coil 1.1 ms, core "
         "3 ms, known to ±1 ms). `plan`: what the plan says. `true`: largest difference "
         "of the simulated magnet's force from the one asked for, as a part of its "
-        "range, where it lies best; `dated`: the same where the run says that the "
-        "force began. A vibration of ±20 mN on 100 mN, touches of 100 mN.",
+        "range, where it lies best; `started`: the same from where the host "
+        "took the trial to start; samples and applied current are dated by the shunt. "
+        "The range is 0 to 120 mN: three times as much of the vibration's own 40 mN. "
+        "A vibration of ±20 mN on 100 mN, touches of 100 mN.",
         "",
-        "| force | way | plan | true | dated | of it late, ms |",
+        "| force | way | plan | true | started | of it late, ms |",
         "|---|---|---|---|---|---|",
     ]
     for what, overrides, scene in rows():

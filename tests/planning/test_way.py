@@ -35,8 +35,12 @@ def test_the_plan_says_so_and_counts_the_time_to_load():
     planned = plan(load("demo", (*SHORT, "coil.way=list")), preview=False)
     told = text(planned)
     assert "by lists" in told and "the force errs by up to" in told
+    assert "set-points  " not in told
     (way,) = planned.to_dict()["ways"]
     assert (way["way"], way["trials"]) == ("list", 1)
+    # the built-in bench knows its lags to 1 ms, and the force rises by 0.8 N/s
+    assert way["lags_N"] == pytest.approx(0.8e-3)
+    assert "and by 800 µN as lags are not known better" in told
     assert planned.timeline.loading == pytest.approx(way["load_s"])
     assert planned.estimate.duration == pytest.approx(1.6 + way["load_s"])
 
