@@ -47,6 +47,7 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
         self._run_of: tuple[object, ...] = ()
         self._run_until = 0.0
         self.setFixedHeight(HEIGHT)
+        self.setCacheMode(pg.GraphicsView.CacheModeFlag.CacheNone)
         self.setAccessibleName("Whole run; arrow keys move the visible window")
         self._box = pg.ViewBox(enableMouse=False, enableMenu=False, defaultPadding=0)
         self._axis = RoundAxis("bottom", 80)

@@ -104,7 +104,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.plot: Plot | None = None
         self.panels: list[PanelItem] = []
         self.setFixedHeight(height) if height else self.setMinimumHeight(PANEL)
-        self.setBackground(None)
+        self.setCacheMode(pg.GraphicsView.CacheModeFlag.CacheNone)
         self.setAntialiasing(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.ci.setContentsMargins(0, 0, 8, 0)
@@ -143,6 +143,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             # at once: a collector that takes it apart piece by piece meets Qt in it
             shiboken6.delete(panel)
         self.panels, plot, tokens = [], self.plot, self._theme.tokens
+        self.setBackground(tokens.sunken if self._fixed else tokens.panel)
         if plot is None:
             words = self.nothing.replace("\n", "<br>")
             self.addLabel(words, color=tokens.muted, size="11px")

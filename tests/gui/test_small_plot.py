@@ -7,7 +7,7 @@ import numpy as np
 import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
-from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtGui import QColor, QImage, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -78,6 +78,22 @@ def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(app, key):
     QApplication.sendEvent(view.viewport(), event)
     zoomed = not np.allclose(view.panels[0].box.viewRange(), before)
     assert zoomed is event.isAccepted() is (key == "ControlModifier")
+
+
+@pytest.mark.parametrize("height", [None, 120])
+def test_the_ground_is_that_of_the_panel_it_stands_on_in_each_theme(app, height):
+    theme = Theme("light")
+    view = SmallPlot(theme, height=height)
+    view.resize(340, 260)
+    view.show_plot(rates(10.0))
+    view.show()
+    for name in ("light", "dark", "light"):
+        theme.choose(name)
+        app.processEvents()
+        ground = theme.tokens.panel if height is None else theme.tokens.sunken
+        image = view.grab().toImage()
+        corner = image.pixelColor(image.width() - 3, image.height() - 3)
+        assert corner == QColor(ground), name
 
 
 def test_the_first_and_the_last_number_stand_on_an_axis(app):
