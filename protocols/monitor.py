@@ -7,10 +7,14 @@ from typing import ClassVar
 from pydantic import Field
 
 from tactile_lab.conclusion import Conclusion
+from tactile_lab.errors import LimitError
 from tactile_lab.measurement import Measurement
 from tactile_lab.quantity import Duration, show
 from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
+
+MOST_PARTS = 10_000
+"""Parts that one run may have."""
 
 
 class NoForce(Protocol):
@@ -25,6 +29,12 @@ class NoForce(Protocol):
 
     def trials(self) -> Trials:
         """Equal parts without force."""
+        if self.duration > MOST_PARTS * self.part:
+            raise LimitError(
+                f"{show(self.duration, 's')} in parts of {show(self.part, 's')} are "
+                f"more than {MOST_PARTS} parts. Lengthen protocol.part, or shorten "
+                "protocol.duration."
+            )
         left, number = self.duration, 0
         while left > 1e-9:
             length, number = min(self.part, left), number + 1

@@ -16,6 +16,7 @@ from pathlib import Path
 from drivers.coil import guard_process
 from drivers.serial_line.port import port_settings
 from tactile_lab.errors import InstrumentError
+from tactile_lab.instruments.guard_log import default_log
 from tactile_lab.instruments.serial_dialect import CoilDialect, SerialSettings
 
 SILENCE = 0.5
@@ -166,10 +167,3 @@ def guard_settings(
         "off_match": row.off_match,
         "log": str(log),
     }
-
-
-def default_log() -> Path:
-    """Where guards write what they did."""
-    state = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
-    folder = Path(state) if state else Path.home() / ".local" / "state"
-    return folder / "tactile-lab" / "guard.log"

@@ -217,7 +217,8 @@ def main() -> int:
     killed = "silent" in reason and kill_hung(told["owner"])
     off = switch_off(told, port, log)
     log.write(
-        f"{reason}{'; it was killed' if killed else ''}; port {told['port']}, "
+        f"{reason}{'; it was killed' if killed else ''}; "
+        f"owner {told['owner']}, port {told['port']}, "
         f"{'off' if off else 'NOT verified off'} after {time.monotonic() - begun:.3f} s"
     )
     return 0 if off else 1

@@ -24,9 +24,8 @@ def streaming_interval(interval: float) -> tuple[int, float]:
     """
     if math.isfinite(interval) and interval >= _SHORTEST * (1 - 1e-9):
         for per_second in sorted(TIME_UNITS, reverse=True):
-            number = round(interval * per_second)
-            if number < 1 << 32:
-                return number, per_second
+            if interval * per_second < (1 << 32) - 0.5:
+                return round(interval * per_second), per_second
     raise LimitError(
         f"A sample interval of {interval:g} s is impossible; this scope takes 8 ns to "
         "4.2e6 s."

@@ -61,6 +61,13 @@ class Ending:
         return replace(self, state=RunState.FAULTED, reason=reason, failure=failure)
 
     @property
+    def told(self) -> str:
+        """How it ended and how the coil was left, in sentences."""
+        reason = self.reason or ""
+        stop = "" if not reason or reason.endswith((".", "!", "?")) else "."
+        return f"{self.state}: {reason}{stop} {self.off.text}"
+
+    @property
     def exit_code(self) -> int:
         """0 complete, 2 refused, 3 faulted, 4 safe state not verified, 128 + signal."""
         if not self.off.verified:

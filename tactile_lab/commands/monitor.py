@@ -70,7 +70,7 @@ def command(
     ending = run_attended(monitor, look, {RECORD: lambda: asked.put(RECORD)})
     sight.wipe()
     if ending.exit_code and ending.signal is None:
-        fail(f"{ending.state}: {ending.reason} {ending.off.text}", ending.exit_code)
+        fail(ending.told, ending.exit_code)
 
 
 def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:

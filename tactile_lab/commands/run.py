@@ -155,7 +155,7 @@ def command(
             for text in _overrange(done):
                 warn(text)
             if done.exit_code:
-                say(f"tactile-lab: {_why(done)}", sys.stderr)
+                say(f"tactile-lab: {done.told}", sys.stderr)
             report = None if no_report else _report(done)
             changed = None if again is None else _differences(again, done)
             if as_json:
@@ -384,7 +384,3 @@ def _unreported(done: Executed, failure: BaseException) -> None:
         f"the report was cut short ({text}). The run is kept in {done.folder}; "
         f"`tactile-lab report {done.folder}` writes it again."
     )
-
-
-def _why(done: Executed) -> str:
-    return f"{done.state}: {done.reason} {done.off.text}"

@@ -26,6 +26,7 @@ from tactile_lab.engine import commands
 from tactile_lab.engine.engine import Act, Engine, Reply, ServedTask, main
 from tactile_lab.engine.events import Ended, TaskEvent
 from tactile_lab.engine.threads import start
+from tactile_lab.instruments.guard_log import left_by_guard
 
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
@@ -250,7 +251,8 @@ class Link:
             tasks, asked = list(self._tasks), list(self._asked)
         if not self._closing:
             self._inbox.put((self._lost, why))
-        off = OffReport(False, None, "not verified")
+        off = self.pid and left_by_guard(self.pid)
+        off = off or OffReport(False, None, "not verified")
         for number in tasks:
             self._take(number, Ended(Ending(RunState.LOST, off, why)))
         for number in asked:

@@ -35,6 +35,10 @@ SCENES = {
     "not TOML": ("hello there", "not TOML"),
     "not text": (bytes(range(256)), "not text"),
     "empty": ("", "empty"),
+    "too many parts": (
+        '[protocol]\nname = "monitor"\nduration = "1e30 s"\n',
+        "more than 10000 parts",
+    ),
     "nested too deeply": ("a=" + "[" * 9000 + "]" * 9000, "deeply"),
     "no such option": (PULSES + '[sensor]\nt1 = "emiter"\n', "emitter_resistor"),
     "saturation": (PULSES + '[sensor]\nsaturation = "yes"\n', "saturation"),

@@ -19,6 +19,7 @@ from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InterlockError
 from tactile_lab.instruments.dialects import coil_dialect
+from tactile_lab.instruments.guard_log import left_by_guard
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 
@@ -136,6 +137,10 @@ def test_off_after_the_owner_is_killed(served, owner, tmp_path):
     wait_until_off(source)
     assert source.setpoint == 0.0
     assert "the owner died" in log_of(tmp_path)
+    log = tmp_path / "tactile-lab" / "guard.log"
+    told = left_by_guard(process.pid, log)
+    assert told.verified and "left the output verified off" in told.text
+    assert left_by_guard(process.pid + 1, log) is None
 
 
 def test_a_list_ends_with_its_owner(served, owner, tmp_path):

@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
+from drivers.picoscope.setup import streaming_interval
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
+from tactile_lab.errors import LimitError
 
 SINE = Voltages(
     {
@@ -207,3 +209,9 @@ def test_a_slow_delivery_is_no_loss() -> None:
         blocks = collect(scope, clock, polls=60, step=0.01)
         assert clock.now() > 0.9
     assert joined(blocks).shape[1] == pytest.approx(clock.now() * 1e5, rel=0.1)
+
+
+@pytest.mark.parametrize("interval", [1e300, 4.3e6, 7e-9, float("inf")])
+def test_an_interval_that_no_counter_holds_is_refused(interval: float) -> None:
+    with pytest.raises(LimitError, match="sample interval"):
+        streaming_interval(interval)
