@@ -227,11 +227,10 @@ class Narrator:
         """This is about to run; the model will run beside it."""
         self._progress = ProgressLine(execution.plan.estimate.duration, self._label)
         searched = execution.needs.detect_on is not None
-        if searched or "V_C1" in execution.needs.stored:
+        stored = "V_C1" in execution.needs.stored
+        if execution.scene.compared and (searched or stored):
             from tactile_lab.acquisition.model_comparison import ModelComparison
 
-            if execution.scene.protocol.moves_probes:
-                return
             self._model = ModelComparison(execution.scene, searched=searched)
 
     def __call__(self, event: Event) -> None:

@@ -32,7 +32,7 @@ def begin_run(
 
     scene = request.load()
     magnet = scene.bench.magnet
-    if MODELLED & set(scene.record.signals):
+    if scene.record.compare and MODELLED & set(scene.record.signals):
         from tactile_lab.acquisition.live_model import LiveModel
 
         served.model = LiveModel.of(scene)

@@ -119,6 +119,10 @@ class Plan:
             "spikes": None if spikes is None else int(spikes.size),
             "stages": dict(self.preview.stages),
             "left_out": list(self.preview.left_out),
+            "error": {
+                "spike_time_s": self.preview.error.spike_time,
+                "V_C1_V": self.preview.error.V_C1,
+            },
         }
 
 
@@ -212,7 +216,12 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         f"{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
         f"{show(plan.scene.record.sample_rate, 'S/s')}; {cost.samples_stored:,} stored",
     )
-    yield "disk", f"{bytes_text(cost.disk)} compressed, {bytes_text(cost.disk_raw)} raw"
+    disk = f"{bytes_text(cost.disk)} compressed, {bytes_text(cost.disk_raw)} raw"
+    signals = plan.needs.stored
+    if len(signals) > 1 and cost.disk:
+        each = bytes_text(cost.disk / len(signals))
+        disk += f"; {each} less without one of {', '.join(signals)}"
+    yield "disk", disk
     yield (
         "coil",
         f"peak {show(cost.peak_current, 'A')} for {show(cost.peak_force, 'N')}, heat "
@@ -230,6 +239,18 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         yield ("by set-points" if used.way == "set-points" else "by lists"), str(used)
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
+    if plan.preview is not None:
+        error = plan.preview.error
+        known = [
+            f"{what} within {show(value, unit, 2)}"
+            for what, value, unit in (
+                ("spike times", error.spike_time, "s"),
+                ("V_C1", error.V_C1, "V"),
+            )
+            if value is not None
+        ]
+        if known:
+            yield "numerics", f"{', '.join(known)}, by the solver's own estimate"
 
 
 def _grouped(rows: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:

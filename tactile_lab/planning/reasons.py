@@ -12,6 +12,8 @@ from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
 
 NOT_RECORDED = "field is not recorded, so it is not compared with the current"
 
+NOTHING_ALIKE = "nothing recorded is predicted by it"
+
 Reasons = tuple[tuple[str, str], ...]
 
 
@@ -49,6 +51,8 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
             found.append((name, f"detected on {needed.detect_on} as it streams"))
         elif name == "rate":
             found.append((name, "derived from the spikes"))
+    if scene.compared:
+        found.append(("model beside the run", "from the applied current; compared"))
     if bench.simulated:
         found.append(("plant", "computes coil, magnet, sensor and noise"))
     for path in scene.files:
@@ -86,6 +90,9 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
             found.append((name, "not recorded"))
     if any(step.trial.pause for step in drive.steps):
         found.append(("samples of pauses", "recovery is neither streamed nor stored"))
+    if not scene.compared:
+        why = "record.compare = false" if not scene.record.compare else NOTHING_ALIKE
+        found.append(("model beside the run", why))
     if bench.simulated:
         off = "off in [simulated]: not computed"
         world = scene.simulated

@@ -74,6 +74,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             traces=_traces(run, progress),
             circuit=scene.circuit,
             belief=_belief(run, scene),
+            compared=scene.compared,
             bias_uncertainty=_bias_uncertainty(scene),
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,

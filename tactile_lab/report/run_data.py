@@ -56,6 +56,7 @@ class RunData(Measurement):
         took: wall time the run needed, s, or None.
         belief: sensor and bench as they are believed to be, and how well; None where
             the run has no current.
+        compared: whether the model is computed and compared with it.
         start: voltages the circuit began with; None for the equilibrium.
         asks_I_DS: I_DS was asked for, and is derived from V_C1 where not measured.
         loss: counters, or None where nothing was acquired.
@@ -75,6 +76,7 @@ class RunData(Measurement):
     scene: str = ""
     took: float | None = None
     belief: Belief | None = None
+    compared: bool = True
     start: Start | None = None
     asks_I_DS: bool = True
     loss: Loss | None = None

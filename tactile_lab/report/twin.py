@@ -55,7 +55,7 @@ def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
         SolverError: the model cannot follow this force.
     """
     believed = run.belief
-    if run.circuit is None or believed is None:
+    if believed is None or not run.compared:
         return run, None
     voltages = tuple(
         measured(run, believed, trace)

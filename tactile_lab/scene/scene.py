@@ -80,6 +80,13 @@ class Scene:
         return self.coil.accuracy or self.protocol.accuracy
 
     @property
+    def compared(self) -> bool:
+        """Whether the model is computed beside a run, and compared with it."""
+        if not self.record.compare or self.protocol.moves_probes:
+            return False
+        return bool(self.asked & {"V_C1", "V_C2", "spikes", "rate", "I_DS"})
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Files beside the scene itself that it was made from; kept with a run."""
         named = [self.bench.path, self.protocol_source]

@@ -65,10 +65,12 @@ class Record(SceneTable):
         signals: names from `tactile_lab.signals.SIGNALS`; the protocol's own choice
             unless given.
         sample_rate: of every enabled scope channel, S/s.
+        compare: whether the model is computed beside the run and in its report.
     """
 
     signals: Annotated[tuple[str, ...], AfterValidator(_signals)] = ()
     sample_rate: SampleRate = 1e6
+    compare: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,10 +1,15 @@
 """Followers and lags are the bench's: plan, model and world know the same of them."""
 
+import re
+
 import numpy as np
 import pytest
 
 from sim_backend.bench import options, plant_of
-from tactile_lab.planning.plan import plan
+from tactile_lab.engine.execution import Execution
+from tactile_lab.planning.plan import plan, text
+from tactile_lab.report.findings import find
+from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
 
 
@@ -57,3 +62,23 @@ def test_a_scene_of_before_still_says_what_it_said():
 
 def test_a_sensor_alone_has_no_follower():
     assert load("demo").sensor_alone.circuit.I_bias == 0.0
+
+
+def test_the_model_beside_a_run_is_planned_and_can_be_left_out(tmp_path):
+    with_it = plan(load("demo"), preview=False)
+    assert "model beside the run" in dict(with_it.uses)
+    scene = load(
+        "v_c1_only",
+        {"record.compare": False, "protocol.levels": (0.1,), "protocol.hold": 0.3,
+         "protocol.rest": 0.1, "record.sample_rate": 20e3},
+    )  # fmt: skip
+    without = plan(scene, preview=False)
+    assert dict(without.leaves_out)["model beside the run"] == "record.compare = false"
+    data = read(Execution(scene, tmp_path).run().folder)
+    assert find(data).beside is None
+
+
+def test_a_plan_tells_its_numerical_error_and_what_a_signal_costs():
+    told = text(plan(load("demo")))
+    assert re.search(r"numerics +spike times within .* by the solver's own", told)
+    assert re.search(r"6 MB less without one of V_C1, V_C2, V_K, coil_current", told)
