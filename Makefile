@@ -57,6 +57,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/python tests/benchmarks/kill_store.py --kills 200 --out docs/kill-figures.md
 	$(BIN)/python tests/benchmarks/sustained.py --out docs/streaming-figures.md
 	$(BIN)/python tests/benchmarks/serial_bench.py --out docs/serial-figures.md
+	$(BIN)/python tests/benchmarks/force_following.py --out docs/force-figures.md
 	$(BIN)/python tests/benchmarks/scope_stream.py --out docs/scope-figures.md
 	$(BIN)/python tests/benchmarks/fault_table.py --out docs/fault-figures.md
 	$(BIN)/python tests/benchmarks/fuzz.py --out docs/fuzz-figures.md

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Generic, TypeVar
 
 from drivers.serial_line.link import SerialLink
@@ -147,13 +148,14 @@ class Conversation(Generic[D]):
         Raises:
             RefusedError: the instrument reports an error.
             NoReplyError, BadReplyError: the answer is lost; the line may have come.
-                The link is in step again.
+                The link is in step again if it can be.
         """
         try:
             self._command(line, self.link.query)
         except (NoReplyError, BadReplyError):
-            self.link.resynchronise()
-            self._empty_errors(self.link.query)
+            with suppress(NoReplyError, BadReplyError):
+                self.link.resynchronise()
+                self._empty_errors(self.link.query)
             raise
 
     def _command(self, line: str, query: Callable[[str], str]) -> None:

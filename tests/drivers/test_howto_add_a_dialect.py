@@ -4,6 +4,9 @@ import re
 import tomllib
 from pathlib import Path
 
+from tactile_lab.instruments.dialects import coil_dialect
+from tactile_lab.instruments.serial_dialect import ListMode
+
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "add-a-dialect.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -11,11 +14,14 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 def test_the_page_works(tmp_path, monkeypatch):
     blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
     kinds = [kind for kind, _ in blocks]
-    assert kinds == ["toml", "text", "python", "toml", "python", "python"]
+    assert kinds == ["toml", "text", "python", "toml", "python", "toml", "python"]
     monkeypatch.chdir(tmp_path)
     name = ""
     for kind, text in blocks:
-        if kind == "toml":
+        if kind == "toml" and text.startswith("[list]"):
+            shown = ListMode.model_validate(tomllib.loads(text)["list"])
+            assert shown == coil_dialect("kepco-bop").list
+        elif kind == "toml":
             name = tomllib.loads(text)["id"]
             Path(f"{name}.toml").write_text(text, encoding="utf-8")
         elif kind == "text":
