@@ -28,7 +28,7 @@ RESOLUTION = 2e-5
 """Set-points closer than this are the same to any source here, A."""
 
 
-ACTS = 0.85
+ACTS = 0.76
 """Part of an exchange after which a source acts: a line is longer than its answer."""
 
 
