@@ -133,10 +133,7 @@ class Window(QMainWindow):
         self._show_folds()
 
     def _show_folds(self) -> None:
-        """The header's buttons are down where their panel is seen."""
-        sides = (self.setup, self.review)
-        for button, side in zip(self.header.folds, sides, strict=True):
-            button.setChecked(not side.isHidden())
+        self.header.show_folded(self.setup.isHidden(), self.review.isHidden())
 
     # --- closing
 
@@ -246,9 +243,7 @@ class Window(QMainWindow):
         self.frames.told.connect(self.render_clock)
         self.actions_.fold_asked.connect(self.fold)
         sides = (self.setup, self.review)
-        self.header.fold_asked.connect(
-            lambda number: self.fold(sides[number], not sides[number].isHidden())
-        )
+        self.header.unfold_asked.connect(lambda n: self.fold(sides[n], False))
         session.log.added.connect(self.centre.log.add)
         session.plan.arrived.connect(self.screen_.plan_arrived)
         session.source_changed.connect(self.screen_.follow_run)

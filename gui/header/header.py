@@ -36,8 +36,8 @@ class Header(QFrame):
     picture_asked = Signal()
     menu_asked = Signal()
     help_asked = Signal()
-    fold_asked = Signal(int)
-    """Fold a side panel or unfold it: 0 the left one, 1 the right one."""
+    unfold_asked = Signal(int)
+    """Unfold a side panel: 0 the left one, 1 the right one."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -69,19 +69,23 @@ class Header(QFrame):
             button.clicked.connect(asked)
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.folds = [
-            IconButton(theme, icon, words, role="hflat", on_header=True, checkable=True)
+            IconButton(theme, icon, words, role="hflat", on_header=True)
             for icon, words in (
-                ("panel-left", "Protocol (F7)"),
-                ("panel-right", "Results, runs and manual control (F8)"),
+                ("panel-left", "Show protocol and form (F7)"),
+                ("panel-right", "Show results, runs and manual control (F8)"),
             )
         ]
         for number, button in enumerate(self.folds):
-            button.clicked.connect(partial(self._fold, number))
+            button.clicked.connect(partial(self.unfold_asked.emit, number))
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            button.hide()
         self._lay_out()
 
-    def _fold(self, number: int) -> None:
-        self.fold_asked.emit(number)
+    def show_folded(self, *folded: bool) -> None:
+        """Offer the side panels that are folded: the left one, the right one."""
+        for button, offered in zip(self.folds, folded, strict=True):
+            button.setVisible(offered)
+        self._fit_anew()
 
     @property
     def chips(self) -> list[Chip]:
@@ -113,7 +117,6 @@ class Header(QFrame):
             bare = room is Room.BARE
             self._buttons[0].setVisible(room is Room.FULL)
             self._buttons[2].setVisible(not bare)
-            self.folds[0].setVisible(not bare)  # F7, and wider windows, have it
             least = WHOLE if room is Room.FULL else SHORT
             self._title.setMinimumWidth(least)
             self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QLineF, QPointF, QRectF
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter
 
 from gui.lanes import paint
@@ -27,6 +27,9 @@ GUTTER = 56
 
 CLOSE = 3
 """Pixels for each hold below which they are painted as one."""
+
+FLAG = 190
+"""Longest text of a note in the lanes, px; the card about the run has all of it."""
 
 TIME_AXIS = 22
 """Height of the time axis below the last lane, px."""
@@ -99,6 +102,7 @@ class Floor(pg.GraphicsObject):  # type: ignore[misc]
             ahead = QRectF(x, frame.top, frame.right - x, frame.bottom - frame.top)
             painter.fillRect(ahead, QColor(tokens.ahead))
         _time_grid(painter, frame, tokens)
+        _flags(painter, frame, source.notes, tokens)
         for _, bottom in stage.lanes:
             # above it as much is left free as between a lane and the next
             painter.fillRect(QRectF(0, bottom - 2, stage.width, 2), QColor(tokens.plot))
@@ -133,6 +137,23 @@ def hold_names(painter: QPainter, stage: Stage) -> None:
             painter.setClipRect(QRectF(left, 0, right - left - 3, 20))
             paint.write(painter, QPointF(left + 5, 10), text, stage.tokens.muted)
             painter.restore()
+
+
+def _flags(
+    painter: QPainter, frame: Frame, notes: list[tuple[float, str]], tokens: Tokens
+) -> None:
+    """A flag at the time of each note, with as much of its text as there is room."""
+    inside = sorted(note for note in notes if frame.start <= note[0] <= frame.end)
+    places = [round(frame.x1(time)) + 0.5 for time, _ in inside]
+    for number, (_, text) in enumerate(inside):
+        x, following = places[number], [*places, frame.right][number + 1]
+        painter.setPen(paint.pen(tokens.accent, Qt.PenStyle.DashLine))
+        painter.drawLine(QLineF(x, frame.top, x, frame.bottom))
+        painter.fillRect(QRectF(x, frame.top + 17, 4, 12), QColor(tokens.accent))
+        painter.save()
+        painter.setClipRect(QRectF(x, 0, min(following - x, FLAG) - 4, 40))
+        paint.write(painter, QPointF(x + 8, frame.top + 23), text, tokens.accent)
+        painter.restore()
 
 
 def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:

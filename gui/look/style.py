@@ -86,8 +86,6 @@ QToolButton[role="flat"]:focus { border: 2px solid $accent; padding: 3px; }
 QToolButton[role="hflat"] { background: transparent; border: 1px solid transparent;
   padding: 4px; }
 QToolButton[role="hflat"]:hover { background: $header_chip; }
-QToolButton[role="hflat"]:checked { background: $header_chip;
-  border-color: $header_border; }
 QToolButton[role="hflat"]:focus { border: 2px solid #5AA9FF; padding: 3px; }
 QToolButton[role="toggle"] { background: transparent; border: 1px solid transparent;
   padding: 5px 9px; }

@@ -5,6 +5,7 @@ import shutil
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
+from gui.dialogs.saving import picture
 from gui.state import WindowState
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
@@ -61,6 +62,11 @@ def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
     assert "odd spike" in [n.text for n in read_remarks(folder).notes]
     assert (0.25, "odd spike") in window.screen_.run.notes, "a flag at cursor A"
     window.centre.view.clear_cursors()
+    run = window.screen_.run
+    kept, run.notes = run.notes, []
+    without = picture(window.centre.stack, "")
+    run.notes = kept
+    assert picture(window.centre.stack, "") != without, "which is drawn"
     entries = window.review.runs
 
     def found() -> bool:
