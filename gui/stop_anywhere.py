@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt
 from PySide6.QtGui import QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
@@ -19,6 +19,8 @@ class StopAnywhere(QObject):
     - Esc is STOP while anything drives the coil. In the question asked on closing it
       keeps running. Else it closes what is open; where nothing is, it is STOP.
     - A press on the button STOP acts, also where it would only close a menu.
+    - No dialog is modal, whoever opens it: Qt keeps from a covered window every click,
+      and does so with its own questions within a file dialog, too.
 
     Args:
         window: what has the button; cards cover it, menus and dialogs are its own.
@@ -39,6 +41,9 @@ class StopAnywhere(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Act, and keep the event from what is open; whether that was done."""
+        if event.type() == QEvent.Type.Polish and isinstance(watched, QDialog):
+            watched.setWindowModality(Qt.WindowModality.NonModal)
+            return False
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
             if event.key() == Qt.Key.Key_F12:
                 return self._act("STOP by F12")
