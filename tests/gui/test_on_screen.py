@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from served_source import Source
 
 NEEDED = ("Xvfb", "openbox", "xdotool")
 pytestmark = pytest.mark.skipif(
@@ -26,9 +27,12 @@ levels = ["120 mN"]
 hold = "600 s"
 
 [record]
-sample_rate = "20 kS/s"
+signals = ["force"]
 """
-"""A run that lasts until it is stopped, and so slow that a busy computer keeps pace."""
+"""A run that lasts until it is stopped."""
+
+MAIN = ".*Tactile Lab"
+"""Title of the window: it names run and bench, too."""
 
 LONGEST = 90.0
 
@@ -66,16 +70,17 @@ class OnScreen:
 
     def keys(self, *pressed: str) -> None:
         """Press keys in the program's main window."""
-        window = self.named("Tactile Lab")
+        window = self.named(MAIN)
         self.tool("windowactivate", "--sync", window, "key", *pressed)
 
-    def click(self, from_right: int) -> None:
-        """Click into the header, that many px from its right edge."""
-        window = self.named("Tactile Lab")
+    def click(self, from_right: int, down: int = 34, button: int = 1) -> None:
+        """Click that many px from the right edge, into the header unless told."""
+        window = self.named(MAIN)
         said = self.tool("getwindowgeometry", "--shell", window).split()
         width = dict(line.split("=") for line in said)["WIDTH"]
-        at = str(int(width) - from_right), "34"
-        self.tool("mousemove", "--sync", "--window", window, *at, "click", "1")
+        at = str(int(width) - from_right), str(down)
+        move = ("mousemove", "--sync", "--window", window, *at)
+        self.tool(*move, "click", str(button))
 
     def begin_run(self) -> None:
         """Have a run begin, as soon as bench and plan are there."""
@@ -103,7 +108,8 @@ def until(done: Callable[[], object], otherwise: str) -> None:
 
 
 @pytest.fixture
-def on_screen(tmp_path: Path) -> Iterator[OnScreen]:
+def on_screen(tmp_path: Path, source: Source) -> Iterator[OnScreen]:
+    """The window on a screen, its coil source at a port of its own."""
     read, write = os.pipe()
     screen = subprocess.Popen(
         ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24"],
@@ -121,15 +127,21 @@ def on_screen(tmp_path: Path) -> Iterator[OnScreen]:
         started.append(
             subprocess.Popen(["openbox"], env=environment, stderr=subprocess.DEVNULL)
         )
+        settings = tmp_path / "config" / "tactile-lab" / "Tactile Lab.conf"
+        settings.parent.mkdir(parents=True)
+        settings.write_text("[preferences]\nreports=false\n")  # each costs a process
         runs, scene = tmp_path / "runs", tmp_path / "slow.toml"
         scene.write_text(SCENE)
         program = subprocess.Popen(
-            [sys.executable, "-m", "tactile_lab", "gui", scene, "--out", runs],
+            [
+                *(sys.executable, "-m", "tactile_lab", "gui", scene, "--out", runs),
+                *("--bench", source.bench),
+            ],
             env=environment, cwd=tmp_path,
         )  # fmt: skip
         started.append(program)
         made = OnScreen(program, environment, runs)
-        until(lambda: made.named("Tactile Lab"), "no window came")
+        until(lambda: made.named(MAIN), "no window came")
         yield made
     finally:
         for process in reversed(started):
@@ -147,18 +159,39 @@ def test_run_stop_and_close_by_keys(on_screen: OnScreen) -> None:
     assert on_screen.program.wait(LONGEST) == 0
 
 
-STOP, MENU = 130, 440
-"""Where the button STOP and the menu are, px from the header's right edge."""
+STOP, MENU, NOTE, PROTOCOL = 130, 440, 170, 1100
+"""Where STOP, menu, field for notes and list of protocols are, px from the right."""
+
+HEIGHT, LOG = 760, 82
+"""Of the window, and how far the field for notes is above its lower edge, px."""
+
+DIALOGS = ("Export this view", "Open a scene", "Open a run", "Save the scene")
 
 
 @pytest.mark.timeout(900)
-def test_stop_acts_whatever_is_open(on_screen: OnScreen) -> None:
-    """One act on STOP ends the run, with a dialog, its question or a menu open."""
+def test_stop_acts_whatever_is_open(on_screen: OnScreen, source: Source) -> None:
+    """One act on STOP ends the run, with a dialog, its question or a menu open.
+
+    The witness is the source: what it was told, not what the window says.
+    """
     screen = on_screen
 
-    def export() -> None:
-        screen.keys("ctrl+e")
-        until(lambda: screen.named("Export this view"), "no dialog came")
+    def dialog(keys: str, title: str) -> Callable[[], None]:
+        def opened() -> None:
+            screen.keys(keys)
+            until(lambda: screen.named(title), f"no dialog came: {title}")
+
+        opened.__name__ = title
+        return opened
+
+    def card(keys: str) -> Callable[[], None]:
+        def opened() -> None:
+            screen.keys(keys)
+
+        opened.__name__ = f"card of {keys}"
+        return opened
+
+    export = dialog("ctrl+e", "Export this view")
 
     def replace() -> None:
         export()
@@ -172,6 +205,16 @@ def test_stop_acts_whatever_is_open(on_screen: OnScreen) -> None:
         screen.click(MENU)
         until(lambda: screen.seen() > alone, "no menu came")
 
+    def open_context_menu() -> None:
+        alone = screen.seen()
+        screen.click(NOTE, HEIGHT - LOG, 3)
+        until(lambda: screen.seen() > alone, "no context menu came")
+
+    def open_list() -> None:
+        alone = screen.seen()
+        screen.click(PROTOCOL, 143)
+        until(lambda: screen.seen() > alone, "no list came")
+
     (screen.runs.parent / "view.png").touch()
     cases: tuple[tuple[Callable[[], None], str, str], ...] = (
         (export, "click", "STOP in the window"),
@@ -181,9 +224,18 @@ def test_stop_acts_whatever_is_open(on_screen: OnScreen) -> None:
         (replace, "F12", "STOP by F12"),
         (open_menu, "click", "STOP in the window"),
         (open_menu, "Escape", "STOP by Esc"),
+        (open_list, "click", "STOP in the window"),
+        (open_context_menu, "click", "STOP in the window"),
+        (dialog("ctrl+o", "Open a scene"), "click", "STOP in the window"),
+        (dialog("ctrl+shift+o", "Open a run"), "click", "STOP in the window"),
+        (dialog("ctrl+s", "Save the scene"), "F12", "STOP by F12"),
+        (card("ctrl+k"), "click", "STOP in the window"),
+        (card("F1"), "Escape", "STOP by Esc"),
+        (card("ctrl+comma"), "F12", "STOP by F12"),
     )
     for number, (open_something, act, reason) in enumerate(cases):
         screen.begin_run()
+        until(lambda: source.output, "the output never came on")
         open_something()
         if act == "click":
             screen.click(STOP)
@@ -192,6 +244,7 @@ def test_stop_acts_whatever_is_open(on_screen: OnScreen) -> None:
         case = f"{act} with {open_something.__name__}: run goes on"
         until(lambda n=number: len(screen.stopped()) > n, case)
         assert screen.stopped()[-1] == reason
-        for title in ("Replace the file.", "Export this view"):
+        assert not source.output, f"{case}: the source was told nothing"
+        for title in ("Replace the file.", *DIALOGS):
             for window in screen.named(title).split():
                 screen.tool("windowactivate", "--sync", window, "key", "Escape")
