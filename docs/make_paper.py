@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from paper_page import page
+from paper_panels import panels
 
 from tactile_lab.analysis.transfer import Transfer, fit_transfer
 from tactile_lab.analysis.transfer_file import read_transfer
@@ -47,8 +48,9 @@ SATURATED = [
 ]
 SCENES["saturated"] = ("rate_force", SATURATED)
 PICTURES = (
-    "demo-figure", "rate_force-summary", "saturated-summary", "hold_10s-figure",
-    "fig5b-figure", "fig5b-summary", "repeat-summary", "bipolar-figure",
+    "demo-figure", "demo-twin", "rate_force-summary", "saturated-summary",
+    "hold_10s-figure", "fig5b-figure", "fig5b-summary", "fig5b-adrian",
+    "repeat-summary", "bipolar-summary",
 )  # fmt: skip
 
 
@@ -71,25 +73,30 @@ class Trimmed:
 
 def main() -> None:
     """Run all scenes and write the page."""
+    captions: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as scratch:
-        found = {name: run(name, Path(scratch)) for name in SCENES}
+        found = {name: run(name, Path(scratch), captions) for name in SCENES}
+    captions |= panels(DOCS / "paper")
+    swing, captions["transfer"] = transfer()
     ideal = [ideal_spikes(level) for level in (0.08, 0.12, 0.16, 0.2)]
-    text = page(found, transfer(), ideal, [trimmed(off) for off in OFFSETS])
+    text = page(found, captions, swing, ideal, [trimmed(off) for off in OFFSETS])
     (DOCS / "paper.md").write_text(wrapped(text), encoding="utf-8")
 
 
-def run(name: str, scratch: Path) -> dict[str, Any]:
-    """Run one scene, keep its figures, return its results."""
+def run(name: str, scratch: Path, captions: dict[str, str]) -> dict[str, Any]:
+    """Run one scene, keep its figures and their captions, return its results."""
     print(f"{name} ...", file=sys.stderr, flush=True)
     scene, overrides = SCENES[name]
     done = Execution(load(scene, overrides), scratch).run()
     if done.exit_code:
         raise SystemExit(f"{name} ended {done.state}: {done.reason}")
     report = write(done.folder, read(done.folder))
-    for stem in ("figure", "summary"):
-        picture = done.folder / f"{stem}.png"
-        if f"{name}-{stem}" in PICTURES:
-            shutil.copy(picture, DOCS / "paper" / f"{name}-{stem}.png")
+    for plot in report.findings.plots:
+        kept = f"{name}-{plot.name}"
+        if kept in PICTURES:
+            captions[kept] = plot.caption
+            picture = done.folder / f"{plot.name}.png"
+            shutil.copy(picture, DOCS / "paper" / f"{kept}.png")
     results: dict[str, Any] = json.loads(report.results.read_text(encoding="utf-8"))
     return results
 
@@ -137,8 +144,8 @@ def trimmed(off: float) -> Trimmed:
     )  # fmt: skip
 
 
-def transfer() -> Transfer:
-    """A fit to Table 1's own curve with noise and leakage, kept as a CSV, and drawn."""
+def transfer() -> tuple[Transfer, str]:
+    """A fit to Table 1's own curve with noise, kept as a CSV and drawn; its caption."""
     volts, circuit = np.linspace(0, 3.5, 71), Circuit()
     line = circuit.I_S * np.exp(np.minimum(volts, 2.75) / (circuit.m * circuit.V_T))
     noise = np.random.default_rng(1).normal(0, 0.05, volts.size)
@@ -155,7 +162,7 @@ def transfer() -> Transfer:
     plot = transfer_plot(curve, fit)
     save(draw(plot, "Transfer curve", name), DOCS / "paper" / "transfer")
     (DOCS / "paper" / "transfer.svg").unlink()
-    return fit
+    return fit, plot.caption
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ def command(run: Path, as_json: bool) -> None:
     Works on a copy; the file as the crash left it stays as data.killed.h5.
     """
     with reading(run):
+        from tactile_lab.quantity import count
         from tactile_lab.store.recover import recover
 
         with progress("recovering") as update:
@@ -35,7 +36,7 @@ def command(run: Path, as_json: bool) -> None:
         )
         return
     say(
-        f"{run}: {done.samples} samples per channel and {done.spikes} spikes "
+        f"{run}: {done.samples} samples per channel and {count(done.spikes, 'spike')} "
         f"recovered, {done.dropped} samples dropped because not all channels had them"
     )
     if done.original is not None:

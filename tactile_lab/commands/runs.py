@@ -36,6 +36,7 @@ def command(
 ) -> None:
     """List the runs in folder ROOT (./runs), oldest first."""
     with refusing():
+        from tactile_lab.quantity import count
         from tactile_lab.store.catalogue import catalogue
 
         entries = catalogue(
@@ -52,7 +53,7 @@ def command(
     for entry in entries:
         kind = {True: "sim", False: "real", None: "?"}[entry.simulated]
         length = "" if entry.duration is None else f"{entry.duration:.1f} s"
-        spikes = "" if entry.spikes is None else f"{entry.spikes} spikes"
+        spikes = "" if entry.spikes is None else count(entry.spikes, "spike")
         say(
             f"{entry.name:<44} {entry.status:<10} {kind:<4} {length:>9} {spikes:>12}"
             f"  {entry.trouble or entry.loss}".rstrip()

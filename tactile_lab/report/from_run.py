@@ -17,7 +17,7 @@ from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
-from tactile_lab.quantity import show
+from tactile_lab.quantity import exact, show
 from tactile_lab.report.driven import told
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
@@ -289,11 +289,20 @@ def _loss(info: Mapping[str, Any]) -> Loss | None:
 def _texts(scene: Scene, table: str) -> dict[str, str]:
     entries = scene.to_dict()[table]
     return {
-        name: ", ".join(map(str, value))
+        name: ", ".join(map(_readable, value))
         if isinstance(value, list | tuple)
-        else str(value)
+        else _readable(value)
         for name, value in entries.items()
     }
+
+
+def _readable(value: Any) -> str:
+    """An entry of a scene, a quantity with the prefix that suits it: "9.58 MOhm"."""
+    number, _, unit = str(value).partition(" ")
+    try:
+        return exact(float(number), unit) if unit else str(value)
+    except ValueError:  # a text, or a unit of its own
+        return str(value)
 
 
 def _doubts(

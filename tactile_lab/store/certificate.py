@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.quantity import show
+from tactile_lab.quantity import count, show
 from tactile_lab.store.folder import digest, write_info
 from tactile_lab.store.run import Run
 
@@ -85,9 +85,14 @@ class Certificate:
                 f"{self.streamed:.4g} s covered"
             )
         if self.differing is None:
-            spikes = f"{self.online} spikes, not possible to check (not stored)"
+            spikes = (
+                f"{count(self.online, 'spike')}, not possible to check (not stored)"
+            )
         else:
-            spikes = f"{self.spikes} of {max(self.online, self.offline or 0)} spikes"
+            spikes = (
+                f"{self.spikes} of "
+                f"{count(max(self.online, self.offline or 0), 'spike')}"
+            )
         return f"loss: {samples}, {spikes}"
 
     def to_json(self) -> dict[str, Any]:
@@ -114,7 +119,7 @@ def certify(run: Run) -> Certificate:
     missing = int(rows.sum())
     lost = missing if run.gapless else 0
     told = [(counters.get(name) or {}).get("produced") for name in run.signals]
-    delivered = [count + lost for count in told if count is not None]
+    delivered = [number + lost for number in told if number is not None]
     online = run.records("spikes")["sample"]
     found = redetect(run)
     offline = None if found is None else found["sample"]

@@ -401,3 +401,11 @@ def test_a_hung_loop_loses_its_lease_and_the_coil_is_made_safe(run_scene, short)
     assert ran.done.state is RunState.FAULTED
     assert "lease" in ran.done.reason
     assert ran.done.off.verified
+
+
+def test_settings_are_told_in_units_that_suit_them(run_scene, short):
+    run = read(run_scene(*short).folder)
+    assert run.sensor["R1"] == "9.58 MOhm"
+    assert run.sensor["C1"] == "680 pF"
+    assert run.sensor["tau"] == "8.69 s"
+    assert run.parameters["levels"] == "200 mN"

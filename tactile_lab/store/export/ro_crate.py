@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.errors import RunFolderError
+from tactile_lab.quantity import count
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.export.content import replacing
 from tactile_lab.store.progress import Progress, nothing
@@ -125,7 +126,7 @@ def crate(run: Run) -> dict[str, Any]:
         "name": f"{title}: {run.path.resolve().name}",
         "description": f"{title} on a spiking piezoelectric tactile sensor, {kind} "
         f"({info.get('bench')}), {run.status}; {run.duration:.4g} s, "
-        f"{len(run.table('spikes'))} spikes",
+        f"{count(len(run.table('spikes')), 'spike')}",
         "datePublished": info.get("started"),
         "keywords": ["tactile sensor", "spikes", kind],
         "hasPart": [{"@id": one["@id"]} for one in files],
