@@ -7,6 +7,7 @@ behind all others, so that a cut can spoil only the newest. `recover` reads it.
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections import defaultdict
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -79,17 +81,23 @@ class Written:
 
 def read_ledger(path: Path) -> Written:
     """Read every entry that is as it was written; nothing where there is no file."""
-    declared = b""
+    declared, records = b"", RECORDS
     rows: defaultdict[str, list[Any]] = defaultdict(list)
     chunks: defaultdict[str, Any] = defaultdict(lambda: defaultdict(list))
     for dataset, first, data in _entries(path) if path.exists() else ():
         if dataset == DECLARED:
-            declared = data
-        elif dataset in RECORDS:
-            rows[dataset][first:] = np.frombuffer(data, RECORDS[dataset]).tolist()
+            declared, records = data, _records(data)
+        elif dataset in records:
+            rows[dataset][first:] = np.frombuffer(data, records[dataset]).tolist()
         else:
             chunks[dataset][first] += np.frombuffer(data, CHUNK).tolist()
     return Written(declared, rows, chunks)
+
+
+def _records(declared: bytes) -> dict[str, np.dtype[Any]]:
+    """Types of the tables' rows as that file has them: those of an older version."""
+    with h5py.File(io.BytesIO(declared), "r") as file:
+        return {name: file[name].dtype for name in RECORDS if name in file}
 
 
 def goes_on(path: Path) -> bool:

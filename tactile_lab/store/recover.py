@@ -168,8 +168,8 @@ def _fill(
         column.write()
         column.write_pyramid()
     kept = min((column.written for column in columns), default=0)
-    for name, record in RECORDS.items():
-        rows = np.array(written.rows[name], record)
+    for name in (name for name in RECORDS if name in file):
+        rows = np.array(written.rows[name], file[name].dtype)
         if names and name in OF_SAMPLES:
             rows = rows[rows[OF_SAMPLES[name]] < max(kept, 1)]
         Column(file[name]).put(0, rows)

@@ -4,6 +4,7 @@ import os
 import random
 import shutil
 
+import h5py
 import numpy as np
 import pytest
 
@@ -11,7 +12,7 @@ from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
-from tactile_lab.store.ledger import LEDGER, read_ledger
+from tactile_lab.store.ledger import LEDGER, Ledger, read_ledger
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.recover import KEPT, recover
 from tactile_lab.store.run import Run
@@ -205,3 +206,15 @@ def test_a_disk_that_refuses_a_sync_ends_the_run(bench, folder):
     with Run.load(folder.path) as run:
         assert run.status == "faulted"
         assert run.samples >= 2048
+
+
+def test_a_ledger_of_an_older_version_is_read_with_the_columns_it_has(tmp_path):
+    older = np.dtype([("index", "u4"), ("start", "f8"), ("label", "S48")])
+    image = tmp_path / "declared.h5"
+    with h5py.File(image, "w") as file:
+        file.create_dataset("trials", (0,), older, maxshape=(None,))
+    ledger = Ledger(tmp_path / LEDGER, image.read_bytes())
+    rows = np.array([(0, 0.5, b"80 mN"), (1, 5.0, b"120 mN")], older)
+    ledger.note("trials", 0, rows)
+    ledger.close()
+    assert read_ledger(tmp_path / LEDGER).rows["trials"] == rows.tolist()
