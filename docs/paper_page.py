@@ -63,8 +63,8 @@ def page(
             f"{warm / 8.617333e-5 - 273.15:.0f} °C",
         ),
         (
-            "Fig. 1c, inset", "no numbers; mean and standard error of a few devices",
-            "eight specimens of the model", "-", "the paper's devices are not given",
+            "Fig. 1c, inset", "no numbers; mean and standard error of 3 devices",
+            "3 specimens of the model", "-", "the paper's devices are not given",
         ),
         (
             "Fig. 1d", "no numbers; I_DS under periodic stimuli",
@@ -91,7 +91,7 @@ def page(
             "force not given",
         ),
         (
-            "Fig. 5b", '"approximately 50 s" at "approximately 50 mN"',
+            "Fig. 5b", '"approximately 50 s"; of 5c "approximately 50 mN"',
             f"{lasted:.1f} s from first to last of {long['spikes']} spikes",
             f"{lasted - 50:+.1f} s",
             "V_GS tuned to it (`preset = \"fig5b\"`); Table 1's stays silent at 50 mN",
@@ -141,8 +141,9 @@ T_1's emitter.*
 
 - **R3, I_T1s, the reset voltage** are not in the text; our choices and their
   alternatives are in [model.md](model.md).
-- **Fig. 5b and 5c are one run** here: the paper says of both that about 50 mN were
-  applied, not that they are the same measurement.
+- **Fig. 5b and 5c are one run** here: the paper says of one that the spikes vanish
+  after about 50 s and of the other that about 50 mN were applied, not that they are the
+  same measurement.
 - **The 50 s** are read as a sensor that sits within 1 mV of its threshold and leaks
   exponentially with Table 1's 8.69 s. The other reading is a film that leaks more
   slowly than an exponential, as dielectrics with many relaxation times do; then V_GS
@@ -155,9 +156,9 @@ T_1's emitter.*
   {0.15 / printed.newtons_per_ampere:.2f} A, beyond the coil's 2 A. The simulated bench
   uses the printed one, so that its forces are the paper's; `plan` and every report say
   so. `tactile-lab run force_check` compares with a force you read.
-- **Fig. 1d** is read as the text of section 2 has it, I_DS under periodic stimuli;
-  "Fig. 1d" near Adrian means 5d. Other misprints: "Eqs. (12) and (13)" and "Eq. (6)" at
-  Fig. 2c mean (7) and (8).
+- **Fig. 1d** is read as its caption has it, the mean of the current's responses to
+  periodic stimuli; "Fig. 1d" near Adrian means 5d. Other misprints: "Eqs. (12)
+  and (13)" and "Eq. (6)" at Fig. 2c mean (7) and (8).
 
 ## Fig. 1c: transfer curve
 
@@ -225,7 +226,7 @@ Eqs. (16)-(18) let the rate rise to 88 Hz. A real T1 saturates when V_C2 is 0.4 
 V_C1. With `saturation = true` (Ebers and Moll, compared with transistors in
 ngspice in [saturation.md](saturation.md)) the same protocol gives, within the holds,
 {rates(found["saturated"])}. Spikes during the hold: {held(found["saturated"])}. Above
-0.2 N what remains of firing falls into the ramps, where V_C1 passes through the range
+0.225 N what remains of firing falls into the ramps, where V_C1 passes through the range
 that fires. The paper's Fig. 4d is numerical and cannot show this. When the complete
 circuit falls silent, held or adapting, stands in [saturation.md](saturation.md).
 
