@@ -108,7 +108,7 @@ def resolve(
             )
         if not isinstance(table, dict):
             raise complaint((name,), "this must be a table, not a value.", blame)
-    _refuse_not_finite(data, blame)
+    _refuse_impossible(data, blame)
     frozen = _moved(_lists_to_tuples(data))
     folder = path.parent
     spec = _bench(frozen.get("bench", {}), folder, blame)
@@ -205,12 +205,14 @@ def _blame(name: str, origins: Mapping[str, str]) -> Blame:
     return origin
 
 
-def _refuse_not_finite(data: Any, blame: Blame, at: tuple[str, ...] = ()) -> None:
+def _refuse_impossible(data: Any, blame: Blame, at: tuple[str, ...] = ()) -> None:
     for key, value in _items(data):
         here = (*at, key)
         if isinstance(value, float) and not math.isfinite(value):
             raise complaint(here, f"{value} is not finite; give a finite value.", blame)
-        _refuse_not_finite(value, blame, here)
+        if isinstance(value, str) and "\0" in value:
+            raise complaint(here, "a text may not hold a NUL character.", blame)
+        _refuse_impossible(value, blame, here)
 
 
 def _items(data: Any) -> Iterator[tuple[str, Any]]:
@@ -286,7 +288,7 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
         under = _read(path, "Bench file")
         if "file" in under:
             raise SceneError(f'{path}: a bench file has no key "file".')
-        _refuse_not_finite(under, _blame(str(path), {}))
+        _refuse_impossible(under, _blame(str(path), {}))
         whole = under = _living(_lists_to_tuples(under))
         validated(BenchSpec, whole, (), _blame(str(path), {}), None)
         if inline.get("simulated") is False and under.get("simulated") is True:

@@ -58,7 +58,7 @@ class Row:
 def coil_end(bench: Bench) -> FarEnd:
     """The simulated source behind the bench's coil."""
     source: Any = bench.coil
-    end: FarEnd = source._wire.talk.link.port.far_end
+    end: FarEnd = source._wire.link.port.far_end
     return end
 
 
@@ -213,6 +213,8 @@ SERIAL = [
         [_gone_again(f) for f in UNPLUGGED]),
     Row("serial: unplugged and back, on every form",
         [_serial(kind="unplug", form=f, amount=0.5) for f in UNPLUGGED]),
+    Row("serial: held by flow control, its XON lost",
+        [_serial(kind="xoff"), _serial(kind="xoff", times=2)]),
     Row("teslameter: unplugged",
         [_serial("meter", kind="unplug", form=f) for f in UNPLUGGED]),
     Row("instrument off, adapter alive (only silence)",

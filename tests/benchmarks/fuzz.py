@@ -26,7 +26,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from fuzz_inputs import KINDS, Case, make  # beside it
+from fuzz_inputs import KINDS, Case, make, prepare  # beside it
 from provenance import provenance
 
 LONGEST = 30.0
@@ -166,6 +166,7 @@ def main() -> int:
     shares = {chosen.kind: 1.0} if chosen.kind else KINDS
     cases = {kind: round(share * chosen.cases) for kind, share in shares.items()}
     found: dict[str, Counter[str]] = {kind: Counter() for kind in cases}
+    prepare()
     worker = Worker(chosen.seed)
     for entry in campaign(cases, chosen.seed, chosen.done, worker.judge):
         found[entry["kind"]][entry["outcome"]] += 1

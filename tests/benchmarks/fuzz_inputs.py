@@ -59,6 +59,9 @@ NUMBERS = (
     "0.5", " ", "\u22121", "1_000", "0x10", '"1"', "\0", "1e5000000",
 )  # fmt: skip
 
+WHOLE, CUT_SHORT, MENDED = "FUZZ_WHOLE", "FUZZ_CUT_SHORT", "FUZZ_MENDED"
+"""Environment variables that name the runs to be damaged."""
+
 SHORT = (
     *("--set", 'protocol.levels=["120 mN", "180 mN"]'),
     *("--set", "protocol.ramp=0.2 s"),
@@ -206,9 +209,17 @@ def damaged_table(text: str, chance: random.Random) -> tuple[bytes, str]:
     return "\n".join(lines).encode("utf-8", "replace"), "; ".join(told)
 
 
+def prepare() -> None:
+    """Record the runs to be damaged; processes started from now on share them."""
+    for name, make in ((WHOLE, _whole), (CUT_SHORT, _cut_short), (MENDED, _mended)):
+        os.environ[name] = str(make())
+
+
 @cache
 def _whole() -> Path:
-    """A run recorded once, for all cases of this process."""
+    """A run recorded once."""
+    if WHOLE in os.environ:
+        return Path(os.environ[WHOLE])
     out = Path(tempfile.mkdtemp())
     made = [sys.executable, "-m", "tactile_lab", "run", "demo", "--out", str(out)]
     subprocess.run([*made, *SHORT], check=True, capture_output=True)
@@ -218,6 +229,8 @@ def _whole() -> Path:
 @cache
 def _cut_short() -> Path:
     """The same, killed while it was recorded."""
+    if CUT_SHORT in os.environ:
+        return Path(os.environ[CUT_SHORT])
     out = Path(tempfile.mkdtemp())
     made = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime"]
     run = subprocess.Popen(
@@ -265,13 +278,21 @@ def _killed(chance: random.Random, place: Path) -> Case:
 @cache
 def _recovered() -> dict[str, Any]:
     """What the killed run holds where nothing else happened to it."""
+    return content(_mended())
+
+
+@cache
+def _mended() -> Path:
+    """The killed run, recovered."""
+    if MENDED in os.environ:
+        return Path(os.environ[MENDED])
     folder = Path(tempfile.mkdtemp()) / "run"
     shutil.copytree(_cut_short(), folder)
     subprocess.run(
         [sys.executable, "-m", "tactile_lab", "recover", str(folder)],
         check=True, capture_output=True,
     )  # fmt: skip
-    return content(folder)
+    return folder
 
 
 def damaged_folder(folder: Path, chance: random.Random) -> str:

@@ -35,6 +35,7 @@ SCENES = {
     "not TOML": ("hello there", "not TOML"),
     "not text": (bytes(range(256)), "not text"),
     "empty": ("", "empty"),
+    "NUL in a file's name": (TABLE.replace("force.csv", "\\u0000"), "NUL"),
     "too many parts": (
         '[protocol]\nname = "monitor"\nduration = "1e30 s"\n',
         "more than 10000 parts",
