@@ -44,6 +44,7 @@ fast: $(DEV_STAMP)
 # hours on two cores, alone on the machine; every table states commit and date
 reports: $(DEV_STAMP)
 	$(BIN)/tactile-lab validate accuracy --out docs
+	$(BIN)/tactile-lab validate sweeps --out docs
 	$(BIN)/tactile-lab validate honesty --scenes 1000 --out docs
 	$(BIN)/tactile-lab validate stability --out docs
 	$(BIN)/python docs/make_fit_recovery.py

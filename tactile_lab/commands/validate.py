@@ -74,6 +74,24 @@ def accuracy(
 
 
 @command.command()
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    metavar="DIR",
+    help="Write sweeps.md, sweeps.csv and sweeps.svg there.",
+)
+@cap_option(5.0)
+def sweeps(out: Path, cap: float) -> None:
+    """Time and error as stiffness, grazing and the number of spikes grow."""
+    with refusing():
+        from tactile_lab.validation.sweeps import sweep, write
+
+        write(sweep(cap, 5, _say), cap, out)
+        say(f"Wrote {out / 'sweeps.md'}, sweeps.csv and sweeps.svg.")
+
+
+@command.command()
 @out_option
 @click.option(
     "--scenes",
@@ -84,11 +102,19 @@ def accuracy(
     help="How many; a fifth as many with T1 saturated.",
 )
 def honesty(out: Path | None, scenes: int) -> None:
-    """Is the error estimate above the true error, on random scenes and parameters?"""
-    with refusing():
-        from tactile_lab.validation.honesty import report
+    """Is the error estimate above the true error, on random scenes and parameters?
 
-        _write(report(scenes, _say), out, "honesty.md")
+    With --out, what is measured is kept in honesty.csv: a campaign that was stopped
+    goes on where it was, unless the solver has changed since.
+    """
+    with refusing():
+        from tactile_lab.validation.honesty import campaign, report, scatter
+
+        rows = campaign(scenes, out, _say)
+        _write(report(scenes, rows), out, "honesty.md")
+        if out is not None:
+            scatter(rows, out / "honesty.svg")
+            say(f"Wrote honesty.svg to {out}.")
 
 
 @command.command()

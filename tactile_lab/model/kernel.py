@@ -351,16 +351,17 @@ def _build(stamp: int) -> Callable[..., Any]:
                                 piece_rows[n, 6 + i] = P[i]
                             counts[ROWS_2] += 1
                         # what a series misses changes its sign at every node, and C2
-                        # sums it up
-                        averaged = min(1.0, 0.02 + 0.05 * r)
-                        Q_error = (
-                            gain * (Q_error_y + averaged * left)
-                            + averaged * left_q
-                            + 2.5e-16 * largest_Q
-                        )
+                        # sums it up; over a whole step that is nothing, as Radau's
+                        # rule integrates twice its degree
+                        inside = min(1.0, 0.04 + 0.06 * r) * (gain * left + left_q)
+                        over = inside
+                        if width == 1.0:
+                            over *= min(1.0, 0.02 + (0.1 * r) ** 4)
+                        Q_error = gain * Q_error_y + 2.5e-16 * largest_Q
                         spikes = run_piece(
                             t, s + u * h, piece, q, P, degree, piece_fires, Q_error,
-                            values[ORDER], par, S, spikes, keep_spikes, most,
+                            inside, over, values[ORDER], par, S, spikes, keep_spikes,
+                            most,
                         )  # fmt: skip
                         if S[TOO_FAST] != 0.0:
                             status = FAST

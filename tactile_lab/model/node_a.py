@@ -155,7 +155,7 @@ def collocate(
     # by the square of this one's change over 2 V_T
     slope = 0.0
     if linear:
-        enough = 1e-3 * wanted / max(closing, 1e-12)
+        enough = 1e-3 * wanted / max(closing, 2e-14)
     else:
         enough = math.sqrt(2e-3 * wanted * par[V_T])
         slope = h * slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y0, par)
@@ -193,6 +193,6 @@ def collocate(
             W[i] += change if V in (low, high) else right[i]
             largest = max(largest, abs(right[i]))
         if largest < enough:
-            share = max(closing, 1e-12) if linear else 0.5 * largest / par[V_T]
+            share = max(closing, 2e-14) if linear else 0.5 * largest / par[V_T]
             return iteration + 1, largest * share
     return -1, 0.0

@@ -71,6 +71,8 @@ def run_piece(
     degree: int,
     fires: FloatArray,
     Q_error: float,
+    inside: float,
+    over: float,
     y: float,
     par: FloatArray,
     S: FloatArray,
@@ -81,7 +83,9 @@ def run_piece(
     """Carry V_C2 through a piece that starts s after the segment's start at t.
 
     `fires` holds pairs (from, to) of the intervals with Q > V_fire, s after the piece's
-    start, empty ones with to <= from. Returns the array of spikes, grown if need be.
+    start, empty ones with to <= from. Q is wrong by `Q_error` for long, and by what its
+    average over a part of the piece (`inside`) or over all of it (`over`) leaves of the
+    series' own error, V. Returns the array of spikes, grown if need be.
     """
     tau = par[TAU_L]
     to_x = 2.0 / length
@@ -164,7 +168,9 @@ def run_piece(
                 if missed:
                     known = False
                     e = math.expm1(-left / tau)
-                    error = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V_f)
+                    error = (
+                        S[ERROR] * (1.0 + e) - (Q_error + inside) * e + EPS * abs(V_f)
+                    )
                     if margin < error:
                         S[DOUBT] = 1.0
                     break
@@ -178,7 +184,7 @@ def run_piece(
                 Q, P_now = both_at(q, P, degree, v * to_x - 1.0)
             known = True
             slope = (Q - V_f) / tau
-            error = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V_f)
+            error = S[ERROR] * (1.0 + e) - (Q_error + inside) * e + EPS * abs(V_f)
             time_error = error / max(slope, 1e-300)
             time_error += EPS * d
             if b - v < 2.0 * time_error and b < length:
@@ -213,6 +219,7 @@ def run_piece(
         for n in range(1, degree + 1):
             P_end += P[n]
         S[VOLTAGE] = V + (V - P_now) * e + (P_end - P_now)
-        S[ERROR] = S[ERROR] * (1.0 + e) - Q_error * e + EPS * abs(V)
+        averages = over if S[REF] == 0.0 else inside
+        S[ERROR] = S[ERROR] * (1.0 + e) - (Q_error + averages) * e + EPS * abs(V)
     S[REF] = S[REF_LOW] = 0.0
     return spikes

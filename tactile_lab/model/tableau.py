@@ -55,11 +55,13 @@ def real_schur(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     For matrices whose eigenvalues are distinct complex pairs, as `DIFFERENTIATE` is.
     """
-    values, vectors = np.linalg.eig(matrix)
-    upper = vectors[:, values.imag > 0]
-    pairs = np.stack([upper.real, upper.imag], axis=2).reshape(matrix.shape)
-    Q, _ = np.linalg.qr(pairs)
-    T = Q.T @ matrix @ Q
+    Q, T = np.eye(len(matrix)), matrix
+    for _ in range(2):  # eigenvectors are known to 1e-11 only: again, of what is left
+        values, vectors = np.linalg.eig(T)
+        upper = vectors[:, values.imag > 0]
+        pairs = np.stack([upper.real, upper.imag], axis=2).reshape(matrix.shape)
+        Q, _ = np.linalg.qr(Q @ np.linalg.qr(pairs)[0])
+        T = Q.T @ matrix @ Q
     rows, columns = np.indices(T.shape)
     T[rows // 2 > columns // 2] = 0.0
     return np.ascontiguousarray(Q), np.ascontiguousarray(T)

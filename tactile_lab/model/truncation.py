@@ -70,7 +70,7 @@ def carried(a: FloatArray, left: float) -> float:
 
     That is its order's gain, unless the coefficients end before they fall.
     """
-    return left if abs(a[ORDER]) > 0.2 * abs(a[ORDER - 1]) else 0.03 * left
+    return left if abs(a[ORDER]) > 0.3 * abs(a[ORDER - 1]) else 3e-3 * left
 
 
 @inner

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import csv
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from pathlib import Path
 
 import numpy as np
 
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.compiled import source_stamp
 from tactile_lab.model.simulate import simulate
 from tactile_lab.model.state import Start
 from tactile_lab.validation.reference import reference
@@ -137,31 +141,121 @@ def _largest_gap(found: list[float], exact: tuple[Decimal, ...]) -> float:
     return max((abs(float(Decimal(a) - b)) for a, b in pairs), default=0.0)
 
 
-def report(count: int, say: Callable[[str], None]) -> str:
-    """honesty.md: `count` random scenes, and a fifth as many where T1 saturates."""
+Measured = dict[str, list[HonestyRow]]
+KINDS = {"cascade": random_case, "saturated": saturated_case}
+NUMBERS = (
+    "spikes", "spikes_reference", "spike_time", "spike_time_estimate", "V_C1",
+    "V_C1_estimate",
+)  # fmt: skip
+
+
+def campaign(count: int, out: Path | None, say: Callable[[str], None]) -> Measured:
+    """`count` random scenes, and a fifth as many where T1 saturates.
+
+    With `out`, each is written to honesty.csv as it is measured, with a stamp of the
+    solver's sources; those measured by the same solver before are read from it.
+    """
+    stamp = str(source_stamp())
+    file = None if out is None else out / "honesty.csv"
+    known: dict[tuple[str, int], list[str]] = {}
+    if file is not None and file.exists():
+        with file.open(encoding="utf-8") as lines:
+            for scenes, number, by, *numbers in csv.reader(lines):
+                if by == stamp:
+                    known[scenes, int(number)] = numbers
+    found: Measured = {}
+    with ExitStack() as stack:
+        writer = None
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            writer = csv.writer(
+                stack.enter_context(file.open("w", newline="", encoding="utf-8")),
+                lineterminator="\n",
+            )
+            writer.writerow(("scenes", "seed", "solver", *NUMBERS))
+            # all of it at once: a campaign stopped early keeps what it had
+            writer.writerows((*key, stamp, *known[key]) for key in sorted(known))
+        for kind, draw in KINDS.items():
+            found[kind] = []
+            for seed in range(count if kind == "cascade" else -(-count // 5)):
+                case = draw(seed)
+                old = known.get((kind, seed))
+                if old is not None:
+                    row = HonestyRow(
+                        case, int(old[0]), int(old[1]), *map(float, old[2:])
+                    )
+                else:
+                    row = compare(case)
+                    if writer is not None:
+                        kept = (getattr(row, name) for name in NUMBERS)
+                        writer.writerow((kind, seed, stamp, *kept))
+                found[kind].append(row)
+                if (seed + 1) % 50 == 0:
+                    say(f"{kind}: {seed + 1} random scenes")
+    return found
+
+
+def report(count: int, rows: Measured) -> str:
+    """honesty.md."""
     return "\n".join(
         [
             "# Is the error estimate honest?\n",
             f"Written by `tactile-lab validate honesty --scenes {count} --out docs`. "
             "Random scenes and parameters (`tactile_lab/validation/honesty.py`), half "
             "at random tolerances, against the 40-digit reference.\n",
+            f"{provenance()}\n",
+            "![estimate against true error](honesty.svg)\n",
             "## The cascade, Eqs. (16) to (18)\n",
-            *_section(random_case, count, say),
+            *_section(rows["cascade"]),
             "\n## T1 saturates\n",
-            *_section(saturated_case, -(-count // 5), say),
+            *_section(rows["saturated"]),
             "",
         ]
     )
 
 
-def _section(
-    draw: Callable[[int], Case], count: int, say: Callable[[str], None]
-) -> list[str]:
-    found = []
-    for seed in range(count):
-        found.append(compare(draw(seed)))
-        if (seed + 1) % 50 == 0:
-            say(f"{seed + 1} of {count} random scenes")
+def scatter(rows: Measured, path: Path) -> None:
+    """Estimate against true error, with the 1:1 line: below it an estimate lies."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    plot, axes = plt.subplots(1, 2, figsize=(9, 4.4), layout="constrained")
+    for axis, name, unit in zip(axes, ("spike_time", "V_C1"), "sV", strict=True):
+        for kind, some in rows.items():
+            pairs = [
+                (max(getattr(row, name), 1e-18), getattr(row, f"{name}_estimate"))
+                for row in some
+                if row.spikes or name == "V_C1"
+            ]
+            if pairs:
+                axis.plot(
+                    *zip(*pairs, strict=True), "o" if kind == "cascade" else "s",
+                    markersize=3, alpha=0.6,
+                    label={"saturated": "T1 saturates"}.get(kind, kind),
+                )  # fmt: skip
+        axis.set(xscale="log", yscale="log", aspect="equal")
+        low = min(axis.get_xlim()[0], axis.get_ylim()[0])
+        high = max(axis.get_xlim()[1], axis.get_ylim()[1])
+        axis.plot([low, high], [low, high], color="black", linewidth=1, label="1:1")
+        axis.plot(
+            [low, high], [30 * low, 30 * high], ":", color="0.5", label="30 times"
+        )
+        what = "a spike time" if name == "spike_time" else "V_C1"
+        axis.set(
+            xlim=(low, high), ylim=(low, high),
+            xlabel=f"true error of {what} ({unit})",
+            ylabel=f"estimated error of {what} ({unit})",
+        )  # fmt: skip
+        axis.grid(visible=True, color="0.92")
+    axes[0].legend(frameon=False, loc="lower right")
+    plot.savefig(path, metadata={"Date": None})
+    plt.close(plot)
+
+
+def _section(found: Sequence[HonestyRow]) -> list[str]:
+    count = len(found)
     honest = sum(c.honest for c in found)
     spiking = [c for c in found if c.spikes]
     ratios = (
@@ -171,7 +265,6 @@ def _section(
     time_ratio, V_ratio = (f"{np.median(r):.0f}" if r else "unknown" for r in ratios)
     default = [c for c in found if c.case.tolerance == 1e-9]
     lines = [
-        f"{provenance()}\n",
         f"- {count} scenes, {len(spiking)} of them with spikes",
         f"- count right and true errors below the estimates: {honest} of {count} "
         f"({honest / count:.1%})",

@@ -6,9 +6,10 @@ import pytest
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.state import Start
-from tactile_lab.validation import general, rivals, spice
+from tactile_lab.validation import general, rivals, spice, sweeps
 from tactile_lab.validation.accuracy import fastest, order, table, write_csv
 from tactile_lab.validation.contest import COMPILED, Method, Row, Truth, judge, ours
+from tactile_lab.validation.extremes import formula, grazing
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem
 from tactile_lab.waveform import Waveform
 
@@ -127,3 +128,19 @@ def test_verdicts(exact, tmp_path):
     assert fastest(rows, ours=True) is None
     write_csv(rows, tmp_path / "rows.csv")
     assert (tmp_path / "rows.csv").read_text().count("\n") == 5
+
+
+def test_a_sweep_tells_who_is_right(tmp_path, monkeypatch):
+    near = grazing(1e-9).problem
+    places = [("grazing", 1e-9, near, Truth(ours(near, 9.0, 1e-13).spike_times, 0.0))]
+    firing = Problem("", Circuit(V_GS=1.6), Waveform.constant(0.0), 1.0)
+    count, last = formula(firing)
+    places.append(("spikes", count, firing, Truth(np.array([last]), 0.0)))
+    monkeypatch.setattr(sweeps, "problems", lambda: iter(places))
+    points = sweeps.sweep(5.0, 1, print)
+    verdicts = {(p.sweep, p.row.method): p.row.verdict for p in points}
+    assert verdicts["grazing", "tactile_lab"] == "right"
+    assert verdicts["grazing", "Rodas5P"] == "wrong count"
+    assert verdicts["spikes", "tactile_lab"] == verdicts["spikes", "Rodas5P"] == "right"
+    sweeps.write(points, 5.0, tmp_path)
+    assert "| Rodas5P | tol 1e-09 |" in (tmp_path / "sweeps.md").read_text()

@@ -8,6 +8,7 @@ import pytest
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.model.state import Start
+from tactile_lab.validation import honesty
 from tactile_lab.validation.extremes import grazing
 from tactile_lab.validation.honesty import Case, compare, random_case
 from tactile_lab.validation.reference import constant_firing, reference
@@ -18,6 +19,29 @@ from tactile_lab.waveform import Waveform
 def test_random_scenes_have_errors_below_the_estimate(seed):
     comparison = compare(random_case(seed), samples=15)
     assert comparison.honest, comparison
+
+
+def test_a_campaign_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(honesty, "KINDS", {"cascade": random_case})
+    first = honesty.campaign(2, tmp_path, print)
+    monkeypatch.setattr(honesty, "compare", None)  # what is known is not measured again
+    again = honesty.campaign(2, tmp_path, print)
+    assert again == first
+    text = honesty.report(2, again | {"saturated": again["cascade"]})
+    assert "2 of 2 (100.0%)" in text
+    honesty.scatter(again, tmp_path / "honesty.svg")
+    assert (tmp_path / "honesty.svg").stat().st_size > 1000
+    (tmp_path / "honesty.csv").write_text("cascade,0,another solver,1,1,0,0,0,0\n")
+    with pytest.raises(TypeError):
+        honesty.campaign(1, tmp_path, print)
+
+
+def test_a_call_undercuts_its_tolerance_by_less_than_it_did():
+    """V_C1 at 1e-9: the estimate was below 1e-12, six digits for nothing."""
+    force = Waveform.through([(0, 0), (0.01, 0.15)])
+    found = simulate(Circuit(), force, until=2.0)
+    assert 1e-12 < found.error.V_C1 < 1e-9
+    assert found.solution.evaluations < 700
 
 
 def error_of(circuit, force, until, start=None):
