@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.analysis.estimate import Z95
 from tactile_lab.deviation import Deviation, DrivenCircuit
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import TactileLabError
@@ -41,7 +42,6 @@ from tactile_lab.waveform import Waveform
 DOCS = Path(__file__).parent
 KEPT = DOCS.parent / "runs" / "bench-coverage.jsonl"
 REPEATS = 1000
-Z = 1.959963984540054
 GEOMETRY = 0.04
 """Half of the 95 % band of the force that the bench file states here."""
 Told = Iterator[tuple[str, float, float, float, float]]
@@ -69,11 +69,11 @@ def drawn(case: Case, seed: int) -> tuple[list[str], Deviation]:
     """What is wrong in the believed bench with that seed, as changes to the scene."""
     rng = np.random.default_rng([seed, 2026])
     deviation = Deviation(
-        input_bias=rng.normal(0, 20e-12 / Z),
-        offset=rng.normal(0, case.code / Z),
+        input_bias=rng.normal(0, 20e-12 / Z95),
+        offset=rng.normal(0, case.code / Z95),
         V_GS=rng.normal(0, 3e-3),
-        force=rng.normal(0, GEOMETRY / Z),
-        lag=rng.normal(0, 1e-3 / Z),
+        force=rng.normal(0, GEOMETRY / Z95),
+        lag=rng.normal(0, 1e-3 / Z95),
     )
     units = {"input_bias": "A", "offset": "V", "V_GS": "V", "lag": "s"}
     changes = [
@@ -296,8 +296,9 @@ def table(rows: list[dict[str, Any]], version: str) -> str:
             inside = 100 * np.mean([hit for hit, _ in seen])
             errors = np.array([error for _, error in seen])
             lines.append(
-                f"| {case} | {name} | {len(seen)} | {inside:.1f} % | "
-                f"{np.mean(errors):+.2f} | {Z * np.std(errors):.2f} | {refused[case]} |"
+                f"| {case} | {name} | {len(seen)} | {inside:.1f} % "
+                f"| {np.mean(errors):+.2f} | {Z95 * np.std(errors):.2f} "
+                f"| {refused[case]} |"
             )
     today = datetime.date.today().isoformat()
     body = "\n".join(lines)

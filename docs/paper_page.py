@@ -37,7 +37,8 @@ def page(
     search, rated = found["threshold_search"]["conclusion"], found["rate_force"]
     bipolar, repeat = found["bipolar"]["conclusion"], found["repeat"]["conclusion"]
     ratios = rated["conclusion"]["peak_rate_over_eq15"]
-    slope, twin = rated["conclusion"]["slope_Hz_per_N"], rated["twin"]
+    low, high = (s["slope_Hz_per_N"] for s in rated["conclusion"]["slopes"])
+    twin = rated["twin"]
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"],
         cwd=Path(__file__).parent, capture_output=True, text=True, check=False,
@@ -205,10 +206,10 @@ and the rate falls during each hold.
 Separate steps from rest with recovery until |V_P| < 1 mV between them: {rates(rated)}.
 That is {min(ratios):.2f} to {max(ratios):.2f} of Eq. (15) for the current at the end of
 the ramp (at 200 mN Eq. (15) gives {eq15_rate(table_1, 0.2, 0.25):.3g} Hz); the rest
-is adaptation within the first intervals. On average the rate rises by
-{slope["value"] * 1e-3:.2g} Hz/mN ({slope["low_95"] * 1e-3:.2g} to
-{slope["high_95"] * 1e-3:.2g}); the curve bends. Bisection (`tactile-lab run
-threshold_search`) puts the critical force at {critical:.2f} mN
+is adaptation within the first intervals. By Eq. (15) fitted
+to the intervals the rate rises by {low["value"] * 1e-3:.3g} Hz/mN at the least force
+that gave a rate and by {high["value"] * 1e-3:.3g} Hz/mN at the largest. Bisection
+(`tactile-lab run threshold_search`) puts the critical force at {critical:.2f} mN
 (±{search["critical_force_half_width_N"] * 1e3:.2f} mN) for a 0.25 s ramp and a 1 s
 hold; the quasi-static value of the equations is 92.60 mN without the follower's bias.
 

@@ -113,8 +113,9 @@ class CalibrateField(Protocol):
             return Conclusion((f"No calibration: {reason}.",))
         slope, loop = found.slope, show(found.half_width, "T", 3)
         sentences = (
-            f"B2 rises by {show(slope.value, 'T')}/A (±{show(slope.half, 'T', 2)}/A, "
-            f"95 %), from {show(found.offset.value, 'T', 3)} at 0 A.",
+            f"B2 rises by {show(slope.value, 'T', 6)}/A "
+            f"(±{show(slope.half, 'T', 2)}/A, 95 %), from "
+            f"{show(found.offset.value, 'T', 3)} at 0 A.",
             f"The loop is {loop} or {show(found.half_width_current, 'A', 3)} to either "
             f"side; one field value is known to ±{show(found.uncertainty, 'T', 3)} "
             "(95 %).",

@@ -8,11 +8,15 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from tactile_lab.conclusion import Conclusion
+from tactile_lab.analysis.estimate import Estimate, student_95
+from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.quantity import Duration, Force, Pause, show
 from tactile_lab.stimulus.force import ForceProtocol, pause, step
 from tactile_lab.trial import Trials
+
+HALF_A_DIGIT = 5e-6
+"""Error of a field read off a display that shows 0.01 mT, T."""
 
 
 class ForceCheck(ForceProtocol):
@@ -59,7 +63,7 @@ class ForceCheck(ForceProtocol):
         """F(I) - F(0) by Eq. (2) from current and field, and independent readings."""
         trials = run.results
         by_field = [_force_by_field(run, t) for t in trials]
-        bands = [run.uncertain(force) for force in by_field]
+        bands = [_band(run, t, f) for t, f in zip(trials, by_field, strict=True)]
         values: dict[str, Any] = {
             "F_minus_F0_by_field_N": by_field,
             "F_minus_F0_uncertainty_N_95": bands,
@@ -72,8 +76,13 @@ class ForceCheck(ForceProtocol):
         ]
         field = Conclusion(values=values)
         if known:
-            said = f"F(I) − F(0) by Eq. (2) from the field read: {', '.join(known)}."
+            said = (
+                f"F(I) − F(0) by Eq. (2) from the field read: {', '.join(known)} (95 "
+                "%: scatter of the readings, and what the bench states of Eq. (2))."
+            )
             field = Conclusion((said,), values)
+            if run.force_uncertainty is None:
+                field += Conclusion((NOT_STATED,))
         return field + self._read_over_eq2(run)
 
     def _read_over_eq2(self, run: Measurement) -> Conclusion:
@@ -93,13 +102,21 @@ class ForceCheck(ForceProtocol):
         left = readings - scale * levels
         freedom = max(1, levels.size - 1)
         error = float(np.sqrt(np.sum(left**2) / freedom / strength))
-        said = f"The force read is {scale:.3g} ± {2 * error:.2g} times that of Eq. (2)."
+        known = Estimate.of(scale, error, freedom)
+        said = (
+            f"The force read is {scale:.3g} ± {known.half:.2g} (95 %) times that of "
+            "Eq. (2)."
+        )
         if 0.05 < scale < 0.2:
             said += (
                 " A factor near 0.1 is the area A2: Table 1 prints 2.25e-3 m², a core "
                 "of 15 mm x 15 mm has 2.25e-4 m²."
             )
-        found = {"read_over_eq2": scale, "standard_error": error}
+        found = {
+            "read_over_eq2": scale,
+            "standard_error": error,
+            "read_over_eq2_uncertainty_95": known.half,
+        }
         if run.force_uncertainty is not None:
             shared = run.force_uncertainty
             offset = shared.absolute * abs(float(levels.sum())) / strength
@@ -110,6 +127,20 @@ class ForceCheck(ForceProtocol):
                 f"±{open_:.2g} (95 %)."
             )
         return Conclusion((said,), found)
+
+
+def _band(run: Measurement, trial: MeasuredTrial, force: float | None) -> float | None:
+    """Half of the 95 % band of a force by the field, N: readings and Eq. (2)."""
+    if force is None or trial.held is None or run.newtons_per_tesla is None:
+        return None
+    start, end = trial.held
+    scatter = 0.0
+    for part in ((start + end) / 2, end), (trial.start - 1.0, trial.start):
+        read = run.field_between(*part)
+        one = float(read.std(ddof=1)) if read.size > 1 else HALF_A_DIGIT
+        scatter = math.hypot(scatter, student_95(read.size - 1) * one / read.size**0.5)
+    stated = run.uncertain(force) or 0.0
+    return math.hypot(stated, scatter * run.newtons_per_tesla)
 
 
 def _force_by_field(run: Measurement, trial: MeasuredTrial) -> float | None:

@@ -9,12 +9,15 @@ import numpy as np
 from pydantic import Field
 
 from protocols.threshold_search import critical_force, rate_against_force
-from tactile_lab.analysis.rate_force import eq15_rate, mean_slope
+from tactile_lab.analysis.circuit_adaptation import FOLLOWED
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.rate_force import eq15_rate, fit_rate_law
+from tactile_lab.analysis.spike_train import within
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.measurement import Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause
+from tactile_lab.quantity import Duration, Force, Pause, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.levels import Levels
 from tactile_lab.stimulus.recovery import Recovering, first_rest
@@ -76,25 +79,60 @@ class RateForce(Recovering, Levels):
 
 
 def _slope(run: Measurement) -> Conclusion:
-    """The mean slope of rate over force above onset."""
-    levelled = [
-        (t.level, t.response.peak_rate)
-        for t in run.results
-        if t.level is not None and t.response.peak_rate is not None
-    ]
+    """The local slope of rate over force by Eq. (15), at the least and largest force.
+
+    V_GS and the force's scale are fitted to the intervals in the holds.
+    """
+    from tactile_lab.model.simulate import simulate
+
+    rated = [
+        t for t in run.results
+        if t.level is not None and t.hold is not None
+        and t.response.peak_rate is not None
+    ]  # fmt: skip
+    if run.circuit is None or not rated:
+        why = "No slope: no force made the sensor fire twice within a hold."
+        return Conclusion((), {"slopes": None}, (why,))
+    trains = []
+    for t in rated:
+        arrived, end = run.applied_edge(t), t.held[1] if t.held else 0.0
+        spikes = t.spike_times + t.start
+        trains.append(within(spikes, ((arrived or t.start) + FOLLOWED, end)))
+    believed = simulate(run.circuit, run.force, keep=("V_P",), until=run.duration)
     try:
-        slope = mean_slope(
-            [level for level, _ in levelled],
-            [rate for _, rate in levelled],
-            run.force_uncertainty,
-        )
+        law = fit_rate_law(
+            run.circuit, lambda time: believed.sample("V_P", time), trains,
+            run.bias_uncertainty,
+        )  # fmt: skip
     except NotIdentifiableError as reason:
-        return Conclusion((), {"slope_Hz_per_N": None}, (f"No slope: {reason}.",))
-    said = (
-        f"Above onset the highest rate rises by {slope.text('Hz/mN', 1e-3)} on "
-        "average; the curve bends."
+        return Conclusion((), {"slopes": None}, (f"No slope: {reason}.",))
+    found: list[tuple[float, Estimate]] = []
+    for t in (min(rated, key=_level), max(rated, key=_level)):
+        level, hold = _level(t), t.hold or (0.0, 0.0)
+        slope, known = law.slope(level, hold[0]), run.uncertain(level)
+        if known is not None:
+            slope = slope.widened(slope.value * known / level)
+        found.append((level, slope))
+    told = " and ".join(
+        f"{slope.text('Hz/mN', 1e-3)} at {show(level, 'N')}" for level, slope in found
     )
-    return Conclusion((said,), {"slope_Hz_per_N": slope})
+    said = (
+        f"The rate at the end of the ramp rises by {told}: the slope of Eq. (15) with "
+        f"a V_GS of {law.V_GS.value:.4f} V ± {show(law.V_GS.half, 'V', 2)} and "
+        f"{law.scale.value:.3f} ± {law.scale.half:.2g} of the stated force, fitted to "
+        f"the {law.intervals} intervals in the holds."
+    )
+    values = {
+        "slopes": [
+            {"force_N": level, "slope_Hz_per_N": slope} for level, slope in found
+        ],
+        "rate_law_V_GS_V": law.V_GS, "rate_law_scale": law.scale,
+    }  # fmt: skip
+    return Conclusion((said,), values)
+
+
+def _level(trial: MeasuredTrial) -> float:
+    return trial.level or 0.0
 
 
 def _beside_eq15(run: Measurement) -> Conclusion:

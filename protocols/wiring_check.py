@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from tactile_lab.analysis.estimate import Z95
 from tactile_lab.analysis.wiring import (
     NODES,
     ChannelCalibration,
@@ -102,11 +103,7 @@ class WiringCheck(Protocol):
                 f"{verdict.signal}: {'as wired' if verdict.ok else 'WRONG'}, "
                 f"{verdict.text}{said}."
             )
-        sentences += [
-            f"{name}: offset {show(c.offset, 'V', 2)}, gain {c.gain:.3f} by 0 V and "
-            f"V_S, then known to ±{show(2 * c.error, 'V', 2)} (95 %)."
-            for name, c in calibrations.items()
-        ]
+        sentences += [f"{name}: {c.text}." for name, c in calibrations.items()]
         found = Conclusion(tuple(sentences), {"channels": channels})
         if "V_C1" in rest and all(v.ok for v in verdicts if v.signal == "V_C1"):
             found += _gate(run, run.circuit, rest["V_C1"], calibrations.get("V_C1"))
@@ -138,6 +135,11 @@ def _window(trial: MeasuredTrial) -> Window:
     return (start + end) / 2, end
 
 
+def _known(run: Measurement, trace: RecordedSignal) -> float:
+    """Half of the 95 % band of a mean: what a converter's steps may leave, V."""
+    return run.step_bias(trace.signal) if trace.code else CODE / 2
+
+
 def _calibrated(
     run: Measurement, circuit: Circuit, windows: Mapping[str, Window]
 ) -> tuple[dict[str, ChannelCalibration], dict[str, str]]:
@@ -154,7 +156,7 @@ def _calibrated(
         )
         try:
             found[trace.signal] = calibrate_channel(
-                low, high, circuit.V_S, trace.code or CODE
+                low, high, circuit.V_S, _known(run, trace)
             )
         except NotIdentifiableError as reason:
             faults[trace.signal] = str(reason)
@@ -211,8 +213,9 @@ def _gate(
     from tactile_lab.model.equations import rest_V_C1
 
     trace = run.trace("V_C1")
-    code = (trace.code if trace else None) or CODE
-    error = math.hypot(code / math.sqrt(12), known.error if known else code)
+    one = CODE if trace is None else _known(run, trace)
+    # without a calibration the channel's offset may be a code
+    error = math.hypot(one, one) / Z95 if known else math.hypot(one, CODE) / Z95
     try:
         gate = explaining_V_GS(circuit, V_C1, error)
     except NotIdentifiableError as reason:

@@ -177,6 +177,22 @@ class Waveform:
         there = self.time[inside][away[-1] + 1 :]
         return float(there[0]) if there.size else at
 
+    def departure(self, since: float, until: float, within: float = 0.01) -> float:
+        """When it begins to leave the value it has at `since` s; or that, if never.
+
+        Args:
+            since: s.
+            until: nothing beyond is looked at, s.
+            within: part of the largest change that is none yet.
+        """
+        inside = (self.time >= since) & (self.time <= until)
+        apart = np.abs(self.value[inside] - float(self.at(since)))
+        if not apart.size or apart.max() == 0:
+            return since
+        first = int(np.argmax(apart > within * apart.max()))
+        times = self.time[inside]
+        return float(times[max(first - 1, 0)])
+
     def segments(self) -> Iterator[tuple[float, float, float, float]]:
         """Each (start s, end s, value at start, value at end); jumps have no length."""
         for i in range(self.time.size - 1):

@@ -121,3 +121,13 @@ def test_a_waveform_cannot_be_changed_and_keeps_its_own_numbers():
     assert wave.end == 1.0
     with pytest.raises(ValueError, match="read-only"):
         wave.value[0] = 3.0
+
+
+def test_when_a_late_staircase_leaves_and_arrives():
+    late = Waveform.through(
+        [(0, 0), (0.07, 0), (0.07, 0.05), (0.12, 0.05), (0.12, 0.1), (5, 0.1), (5, 0)]
+    )
+    assert late.departure(0.0, 4.0) == pytest.approx(0.07)
+    assert late.arrival(2.5, 0.0) == pytest.approx(0.12)
+    assert late.departure(1.0, 4.0) == 1.0, "it never leaves"
+    assert late.arrival(2.5, 1.0) == 1.0, "it was there"

@@ -16,7 +16,7 @@ from gui.lanes.lane import BAND
 from gui.lanes.source import Source
 from gui.plots.numbers import number
 from tactile_lab.analysis.adaptation import fit_adaptation
-from tactile_lab.analysis.rate_force import mean_slope, onset
+from tactile_lab.analysis.rate_force import onset, slopes
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial
@@ -204,11 +204,12 @@ def _onset(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
 
 def _slope(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
     rated = [f for f in steps if f.response.peak_rate is not None]
-    found = mean_slope(
+    found = slopes(
         [f.level or 0.0 for f in rated], [f.response.peak_rate or 0.0 for f in rated]
     )
-    half = (found.high - found.value) / 1e3
-    return f"{number(found.value / 1e3, 3)} Hz/mN", f"± {number(half, 3)}"
+    low, high = (number(float(v) / 1e3, 3) for v in (found.min(), found.max()))
+    middle = number(float(np.median(found)) / 1e3, 3)
+    return f"{middle} Hz/mN", f"{low} to {high}"
 
 
 def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Card:

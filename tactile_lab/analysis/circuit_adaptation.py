@@ -18,24 +18,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_lab.analysis.charging import REACH, Charging, Drive
 from tactile_lab.analysis.estimate import Estimate, correlated
 from tactile_lab.analysis.spike_train import within
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.equations import I_C, rest_V_C1
 
 FloatArray = NDArray[np.float64]
 
 FEWEST_INTERVALS = 6
 FOLLOWED = 0.03
 """Time after the force is there until the core's field and node A have followed, s."""
-REACH = 1.2
-"""V_GS + V_P is known from so much below V_GS to as much above it, V."""
-GRID = 1201
-"""Points at which T1's current is computed; straight between them."""
 SMALLEST_SCATTER = 1e-5
 """V_fire is told no better than a detector's microsecond lets it, V."""
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,8 +62,8 @@ class CircuitAdaptation:
     def rate(self, time: ArrayLike) -> FloatArray:
         """Eq. (15) with V_P(t) at `time`, s on the axis of the spike times, Hz."""
         t = np.asarray(time, dtype=np.float64) - self.hold[0]
-        theta = np.array([self.V_GS.value, self.V_P.value, math.log(self.tau.value)])
-        return _Charging(self.circuit).rate(theta, t)
+        decayed = self.V_P.value * np.exp(-t / self.tau.value)
+        return Charging(self.circuit).rate(self.V_GS.value + decayed)
 
 
 def fit_circuit_adaptation(
@@ -102,7 +97,7 @@ def fit_circuit_adaptation(
             f"{max(count, 0)} intervals in the hold, {FEWEST_INTERVALS} are needed"
         )
     length = hold[1] - hold[0]
-    law = _Charging(circuit)
+    law = _Law(circuit)
     theta, residual, jacobian, scatter = law.fit(times, length)
     alike = correlated(residual)
     freedom = max(1, int(count / alike) - theta.size)
@@ -113,7 +108,7 @@ def fit_circuit_adaptation(
         for v, e in zip(theta, errors, strict=True)
     ]
     if bias_uncertainty:
-        other = _Charging(replace(circuit, I_bias=circuit.I_bias + bias_uncertainty))
+        other = _Law(replace(circuit, I_bias=circuit.I_bias + bias_uncertainty))
         moved = other.fit(times, length, theta)[0] - theta
         found = [f.widened(abs(float(m))) for f, m in zip(found, moved, strict=True)]
     V_GS, V_P, log_tau = found
@@ -141,44 +136,23 @@ def fit_circuit_adaptation(
     )
 
 
-class _Charging:
-    """C2 between spikes, for (V_GS, V_P at the start, ln tau)."""
+def _drive(theta: FloatArray) -> Drive:
+    """V_GS + V_P(t) for (V_GS, V_P at the hold's start, ln tau)."""
+    return lambda time: theta[0] + theta[1] * np.exp(-time / math.exp(theta[2]))
+
+
+class _Law:
+    """The law of one circuit for (V_GS, V_P at the hold's start, ln tau)."""
 
     def __init__(self, circuit: Circuit) -> None:
         self._circuit = circuit
-        self._drive = circuit.V_GS + np.linspace(-REACH, REACH, GRID)
-        V_C1 = [rest_V_C1(circuit, float(u - circuit.V_GS)) for u in self._drive]
-        self._current = I_C(circuit, np.array(V_C1)) + circuit.I_bias
-
-    def current(self, theta: FloatArray, time: FloatArray) -> FloatArray:
-        """Into C2 at `time` s from the hold's start, A."""
-        drive = theta[0] + theta[1] * np.exp(-time / math.exp(theta[2]))
-        current: FloatArray = np.interp(drive, self._drive, self._current)
-        return current
-
-    def rate(self, theta: FloatArray, time: FloatArray) -> FloatArray:
-        """Eq. (15), Hz; 0 where the current never charges C2 to V_fire."""
-        c = self._circuit
-        target = c.R_L * self.current(theta, time)
-        above = np.maximum(target - c.fire_voltage, 0.0)
-        with np.errstate(divide="ignore"):
-            charging = c.tau_L * np.log((target - c.reset_voltage) / above)
-        rate: FloatArray = 1 / (c.reset_time + charging)
-        return rate
+        self._charging = Charging(circuit)
 
     def charged(
         self, theta: FloatArray, start: FloatArray, end: FloatArray
     ) -> FloatArray:
         """V_C2 at `end` after a spike at `start`, V; without firing meanwhile."""
-        c = self._circuit
-        begin = start + c.reset_time
-        half = (end - begin) / 2
-        at = (begin + half)[:, None] + half[:, None] * _NODES
-        left = np.exp((at - end[:, None]) / c.tau_L)
-        charge = np.sum(_WEIGHTS * self.current(theta, at) * left, axis=1) * half
-        kept = c.reset_voltage * np.exp((begin - end) / c.tau_L)
-        voltage: FloatArray = charge / c.C2 + kept
-        return voltage
+        return self._charging.charged(_drive(theta), start, end)
 
     def residual(
         self, theta: FloatArray, times: FloatArray, length: float, scatter: float
@@ -228,7 +202,7 @@ class _Charging:
         left = np.exp(-isi / c.tau_L)
         # the constant current that charges C2 in each interval, and its drive
         needed = (c.fire_voltage - c.reset_voltage * left) / (c.R_L * (1 - left))
-        drive = np.interp(needed, self._current, self._drive)
+        drive = self._charging.drive(needed)
         middle = (times[1:] + times[:-1]) / 2
         best, least = np.array([c.V_GS, 0.1, math.log(c.tau)]), math.inf
         for tau in c.tau * np.geomspace(0.05, 20, 40):
@@ -252,7 +226,7 @@ class _Charging:
         self, theta: FloatArray, last: float, length: float
     ) -> float | None:
         """The law's last spike, s, going on from a measured one; None: it fires on."""
-        if self.rate(theta, np.array(length)) > 0:
+        if self._charging.rate(_drive(theta)(np.array(length))) > 0:
             return None
         spike = last
         while True:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
-_Z95 = 1.959963984540054
+Z95 = 1.959963984540054
+"""Two-sided 95 % quantile of a normal distribution."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Estimate:
         more = sum(half**2 for half in halves)
         return Estimate(
             self.value,
-            math.sqrt(self.error**2 + more / _Z95**2),
+            math.sqrt(self.error**2 + more / Z95**2),
             self.value - math.sqrt((self.value - self.low) ** 2 + more),
             self.value + math.sqrt((self.high - self.value) ** 2 + more),
         )

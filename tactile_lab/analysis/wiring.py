@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Z95, Estimate
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import show
@@ -19,6 +19,8 @@ NODES = ("V_C1", "V_C2", "V_K")
 TOLERANCE = 0.15
 """A voltage may differ from the model by this part of itself, and by 0.25 V."""
 SLACK = 0.25
+CLEARLY = 1.2
+"""An offset or gain beyond so many of its own uncertainty is corrected."""
 FACTORS = (10.0, 0.1, 100.0, 0.01)
 DEAD = 0.02
 """A channel whose voltage is below this part of what it should be is not connected."""
@@ -58,20 +60,49 @@ class ChannelCalibration:
     Attributes:
         offset: shown at 0 V, V.
         gain: volts shown per volt.
-        error: standard uncertainty of a corrected voltage, V.
+        known: half of the 95 % band of one mean, V: what the converter's steps leave.
+        supply: at which the gain was taken, V.
     """
 
     offset: float
     gain: float
-    error: float
+    known: float
+    supply: float
+
+    @property
+    def gain_known(self) -> float:
+        """How far the gain may be off: both its ends at the end of their bands."""
+        return 2 * self.known / self.supply
+
+    @property
+    def corrects(self) -> bool:
+        """Whether offset or gain is beyond what their own uncertainty could make."""
+        offset, gain = abs(self.offset), abs(self.gain - 1)
+        return offset > CLEARLY * self.known or gain > CLEARLY * self.gain_known
 
     def corrected(self, shown: float) -> float:
         """The voltage where the channel shows `shown` V."""
-        return (shown - self.offset) / self.gain
+        return (shown - self.offset) / self.gain if self.corrects else shown
+
+    @property
+    def error(self) -> float:
+        """Standard uncertainty of a voltage so corrected, V."""
+        return math.hypot(self.known, self.known) / Z95
+
+    @property
+    def text(self) -> str:
+        """For a person: offset and gain with their uncertainty, and what is done."""
+        said = (
+            f"offset {show(self.offset, 'V', 2)} ± {show(self.known, 'V', 2)}, gain "
+            f"{self.gain:.3f} ± {self.gain_known:.2g} by 0 V and V_S (95 %)"
+        )
+        if self.corrects:
+            return f"{said}, corrected"
+        return f"{said}: within their own uncertainty, nothing is corrected"
 
 
 def calibrate_channel(
-    at_ground: float, at_supply: float, supply: float, code: float
+    at_ground: float, at_supply: float, supply: float, known: float
 ) -> ChannelCalibration:
     """Offset and gain of a channel.
 
@@ -79,7 +110,7 @@ def calibrate_channel(
         at_ground: mean shown with the probe on 0 V, V.
         at_supply: mean shown with the probe on the supply, V.
         supply: the supply, V.
-        code: one code of the converter, V: a mean is known to that over root 12.
+        known: half of the 95 % band of a mean, V.
 
     Raises:
         NotIdentifiableError: offset or gain is absurd; the text says what it may be.
@@ -103,8 +134,7 @@ def calibrate_channel(
         raise NotIdentifiableError(
             f"{shows}: an offset of {show(at_ground, 'V', 3)}; check the probe's ground"
         )
-    one = code / math.sqrt(12)
-    return ChannelCalibration(at_ground, gain, math.hypot(one, one))
+    return ChannelCalibration(at_ground, gain, known, supply)
 
 
 def judge(

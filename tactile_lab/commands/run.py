@@ -346,7 +346,7 @@ def _print(done: Executed, report: Report | None, took: float) -> None:
         if text := report.findings.conclusion.text:
             say(f"{text}\n")
         say(
-            f"{done.duration:.1f} s of experiment in {took:.1f} s "
+            f"{run.duration:.1f} s of experiment in {took:.1f} s "
             f"({done.took:.1f} s of it running)."
         )
         beside = report.findings.beside

@@ -28,7 +28,6 @@ from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
-from tactile_lab.store.stored_run import Records
 from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
@@ -101,20 +100,29 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
     applied = run.applied
     if not len(applied.steps):
         return None
-    clock = applied.uncertainty
-    if clock is None:
-        known = run.records("segments")["uncertainty"]
-        clock = float(np.nanmax(known, initial=0.0))
-        if scene.bench.coil is not None:  # it acted within one update before it told
-            clock = math.hypot(clock, coil_capability(scene.bench.coil).update_interval)
+    clock = _clock(run, scene)
     return Belief(
         circuit=scene.circuit,
         magnet=scene.bench.magnet,
         setpoint=Waveform.stairs(applied.steps, run.duration),
         followers=scene.bench.followers,
         temperature=scene.sensor.temperature_uncertainty,
-        clock=clock,
+        clock=clock or 0.0,
     )
+
+
+def _clock(run: Run, scene: Scene) -> float | None:
+    """How far measured times may lie from the current's, s; None: never told."""
+    told = run.applied.uncertainty
+    if told is not None:
+        return told
+    known = run.records("segments")["uncertainty"]
+    if not np.isfinite(known).any():
+        return None
+    clock = float(np.nanmax(known))
+    if scene.bench.coil is not None:  # it acted within one update before it told
+        clock = math.hypot(clock, coil_capability(scene.bench.coil).update_interval)
+    return clock
 
 
 def _bias_uncertainty(scene: Scene) -> float:
@@ -159,9 +167,9 @@ def stimulus_onset(scene: Scene) -> float:
 
 def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
     """The trials, and what came after the last in a run that ended before its time."""
-    spikes, segments = run.spikes["time"], run.records("segments")
+    spikes, clock = run.spikes["time"], _clock(run, run.scene)
     trials = [
-        _trial(row, complete, spikes, onset, segments)
+        _trial(row, complete, spikes, onset, run.force, clock)
         for row, complete in zip(run.trials, run.completed.tolist(), strict=True)
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
@@ -175,7 +183,7 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
                 duration=run.duration - end,
                 spike_times=late,
                 complete=False,
-                clock_uncertainty=_clock_uncertainty(segments, end),
+                clock_uncertainty=clock,
             )
         )
     return tuple(trials)
@@ -186,7 +194,8 @@ def _trial(
     complete: bool,
     spikes: NDArray[np.float64],
     onset: float,
-    segments: Records,
+    force: Waveform,
+    clock: float | None,
 ) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
@@ -196,13 +205,14 @@ def _trial(
         start=start,
         duration=end - start,
         spike_times=spikes[(spikes >= start) & (spikes < end)] - start,
-        onset=onset,
+        # a coil that is set over a serial line begins late
+        onset=max(onset, force.departure(start + onset, end) - start),
         hold=None if np.isnan(held[0]) else held,
         pause=bool(row["pause"]),
         complete=complete,
         rest=_number(row, "rest_V_C1"),
         drift=_number(row, "drift_V_C1"),
-        clock_uncertainty=_clock_uncertainty(segments, start),
+        clock_uncertainty=clock,
     )
 
 
@@ -211,14 +221,6 @@ def _number(row: Any, name: str) -> float | None:
     if name not in (row.dtype.names or ()) or np.isnan(row[name]):
         return None
     return float(row[name])
-
-
-def _clock_uncertainty(segments: Records, time: float) -> float | None:
-    """That of the segment that streams at `time` s; None where it never was told."""
-    number = int(np.searchsorted(segments["time"], time, side="right")) - 1
-    if number < 0 or not np.isfinite(segments["uncertainty"][number]):
-        return None
-    return float(segments["uncertainty"][number])
 
 
 def _traces(run: Run, progress: Progress) -> tuple[RecordedSignal, ...]:

@@ -11,7 +11,12 @@ NONE = "–"
 
 
 def trials_table(run: Measurement) -> Table:
-    """One row per trial: name unless that is the force, force, spikes, rates, decay."""
+    """One row per trial: force, spikes, latency, rates, fall, time constant.
+
+    Where only the field is looked at: current and field.
+    """
+    if not run.searched and run.trace("V_C1") is None and run.field is not None:
+        return _field_table(run)
     if not run.searched:
         return Table(
             headings=("Trial", "Start", "Length", "V_C1 before"),
@@ -43,6 +48,28 @@ def trials_table(run: Measurement) -> Table:
     )
     rows = tuple((*(_name(trial),) * named, *_row(run, trial)) for trial in run.results)
     return Table(headings=headings, rows=rows, note=note)
+
+
+def _field_table(run: Measurement) -> Table:
+    """Current and field of each trial, at the end of its hold."""
+    rows = []
+    for trial in run.results:
+        start, end = trial.held or (trial.start, trial.start + trial.duration)
+        current, field = run.current_at(end), run.field_between(start, end)
+        shown = NONE
+        if field.size > 1:
+            error = 2 * float(field.std(ddof=1)) / field.size**0.5
+            shown = _with(float(field.mean()), error, "T", 4)
+        elif field.size:
+            shown = show(float(field[0]), "T", 4)
+        at, read = show(trial.start, "s"), str(field.size)
+        rows.append((_name(trial), at, _shown(current, "A", 4), shown, read))
+    return Table(
+        headings=("Trial", "Start", "Current", "Field", "Readings"),
+        rows=tuple(rows),
+        note="Current at the end of the hold as read back; field: mean of the readings "
+        "in it, ± their scatter (95 %).",
+    )
 
 
 def fits_table(run: Measurement) -> Table:

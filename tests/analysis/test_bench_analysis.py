@@ -9,7 +9,13 @@ from tactile_lab.analysis.field_calibration import (
     calibration_text,
     fit_field,
 )
-from tactile_lab.analysis.wiring import SignalLevels, explaining_V_GS, hum, judge
+from tactile_lab.analysis.wiring import (
+    SignalLevels,
+    calibrate_channel,
+    explaining_V_GS,
+    hum,
+    judge,
+)
 from tactile_lab.calibration import read_calibration
 from tactile_lab.errors import LimitError, NotIdentifiableError, SceneError
 from tactile_lab.model.circuit import Circuit
@@ -196,3 +202,15 @@ def test_the_rest_voltage_gives_v_gs_back(V_GS):
 def test_an_impossible_rest_voltage_is_refused():
     with pytest.raises(NotIdentifiableError, match="no V_GS explains"):
         explaining_V_GS(Circuit(), 4.9, 16e-3)
+
+
+def test_no_channel_is_corrected_by_less_than_its_own_uncertainty():
+    within = calibrate_channel(-0.0197, 5.0197, 5.0, known=0.0197)
+    assert not within.corrects
+    assert within.corrected(4.3) == 4.3
+    assert "nothing is corrected" in within.text
+    beyond = calibrate_channel(-0.06, 4.94, 5.0, known=0.0197)
+    assert beyond.corrects
+    assert beyond.corrected(4.24) == pytest.approx(4.3)
+    fine = calibrate_channel(-0.0197, 5.0197, 5.0, known=0.002)
+    assert fine.corrected(-0.0197) == pytest.approx(0.0)

@@ -11,6 +11,7 @@ from protocols.calibrate_field import CalibrateField
 from protocols.force_check import ForceCheck
 from protocols.hold import Hold
 from tactile_lab.analysis.belief import Belief
+from tactile_lab.analysis.rate_force import eq15_rate
 from tactile_lab.calibration import read_calibration
 from tactile_lab.magnetics import ForceUncertainty, Magnet
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
@@ -353,12 +354,22 @@ def test_the_force_s_uncertainty_reaches_the_critical_force(rate_force):
     expected = np.sqrt(0.0125**2 + 5e-3**2 + (0.04 * 0.0975) ** 2)
     assert known.values["critical_force_uncertainty_N_95"] == pytest.approx(expected)
     assert "states no uncertainty" in " ".join(sure.sentences)
-    wide, narrow = known.values["slope_Hz_per_N"], sure.values["slope_Hz_per_N"]
-    rates = [t.response.peak_rate for t in find(rate_force).run.results[1:]]
-    line = np.polyfit([0.11, 0.15, 0.2], rates, 1)
-    assert wide.value == narrow.value == pytest.approx(line[0])
-    assert wide.high > narrow.high
-    assert wide.low < narrow.low
+    for wide, narrow in zip(known.values["slopes"], sure.values["slopes"], strict=True):
+        assert wide["slope_Hz_per_N"].value == narrow["slope_Hz_per_N"].value
+        assert wide["slope_Hz_per_N"].half > 1.2 * narrow["slope_Hz_per_N"].half
+
+
+def test_slopes_are_local_and_hold_eq_15_s(rate_force):
+    """A straight line through a curve has an interval of nothing but its bend."""
+    circuit = Circuit()
+    steep = []
+    for one in find(rate_force).conclusion.values["slopes"]:
+        force, slope = one["force_N"], one["slope_Hz_per_N"]
+        ends = [eq15_rate(circuit, force + step, 0.25) for step in (-1e-4, 1e-4)]
+        steep.append((ends[1] - ends[0]) / 2e-4)
+        assert slope.value == pytest.approx(steep[-1], rel=0.01)
+        assert slope.half < 0.02 * slope.value
+    assert abs(steep[1] / steep[0] - 1) > 0.2, "one number could not be both"
 
 
 def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
