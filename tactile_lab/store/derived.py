@@ -27,7 +27,7 @@ def derivable(run: StoredRun) -> tuple[str, ...]:
     able = {
         "force": known and run.table("current").size > 0,
         "rate": run.detection is not None,
-        "I_DS": known and "V_C1" in run.signals and run.samples > 3,
+        "I_DS": known and "V_C1" in run.signals and _long_enough(run),
     }
     return tuple(name for name in DERIVED if able[name] and name not in run.signals)
 
@@ -49,6 +49,18 @@ def derivation(run: StoredRun, name: str) -> Callable[[FloatArray], FloatArray]:
     return _held(middles, found.current)
 
 
+def _window(run: StoredRun) -> int:
+    """Samples of V_C1 that are averaged into one."""
+    interval = run.signal("V_C1").interval
+    return max(1, round(max(STEP, interval) / interval))
+
+
+def _long_enough(run: StoredRun) -> bool:
+    """Whether V_C1 has a slope: three averages without a gap, somewhere."""
+    longest = max((b - a for a, b in run.axis.stretches(0, run.samples)), default=0)
+    return longest >= 3 * _window(run)
+
+
 def _held(change: FloatArray, value: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Value 0 until the first change, s, and one more after each."""
     return lambda time: value[np.searchsorted(change, time, side="right")]
@@ -64,7 +76,7 @@ def drain_current_of(run: StoredRun) -> DrainCurrent:
     signal = run.signal("V_C1")
     step = max(STEP, signal.interval)
     spans = run.axis.stretches(0, run.samples)
-    pieces = list(averages([signal], spans, max(1, round(step / signal.interval))))
+    pieces = list(averages([signal], spans, _window(run)))
     time = np.concatenate([times for times, _ in pieces] or [np.empty(0)])
     V_C1 = np.concatenate([means[0] for _, means in pieces] or [np.empty(0)])
     circuit = run.scene.circuit
