@@ -125,7 +125,8 @@ class Ring(Journal):
             oldest = self._time(block.first + block.samples) - self.length
             while self._time(self._blocks[0].first + self._blocks[0].samples) <= oldest:
                 self._blocks.popleft()
-            while self._spikes and self._spikes[0][0][-1] < oldest:
+            first = self._time(self._blocks[0].first)  # of samples that stay
+            while self._spikes and self._spikes[0][0][-1] < first:
                 self._spikes.popleft()
             while self._field and self._field[0][0] < oldest:
                 self._field.popleft()

@@ -61,7 +61,7 @@ class Kept:
             else:
                 # the study's author wrote it, as they write protocols in Python
                 code = _compiled(self.name, self.expression)
-                value = eval(code, {"__builtins__": _BUILTINS, **names})
+                value = eval(code, dict(names))
             array = np.asarray(value, dtype=np.float64)
         except Exception as error:  # whatever a user's expression raises
             where = self.expression.rpartition(":")[0] if self.source else ""
@@ -89,14 +89,6 @@ def _function(kept: Kept) -> Callable[[Any], Any]:
         raise SceneError(f"{path} has no function {name}.")
     called: Callable[[Any], Any] = found
     return called
-
-
-_BUILTINS = {
-    name: value
-    for name, value in vars(__import__("builtins")).items()
-    if name in ("abs", "bool", "float", "int", "len", "max", "min", "range", "round",
-                "sorted", "sum", "zip", "any", "all")
-}  # fmt: skip
 
 
 def kept(asked: tuple[str, ...] | Mapping[str, str], folder: Path) -> tuple[Kept, ...]:

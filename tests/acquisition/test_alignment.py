@@ -119,7 +119,8 @@ def played_list(frequency, stretch=1.0):
     points = CurrentList(current, np.full(time.size, 1e-3))
     axis = np.arange(0, 4.0, 1e-3)  # two seconds of rest follow
     rng = np.random.default_rng(1)
-    seen = points.at((axis - 1.014) / stretch) + rng.normal(0, 0.01, axis.size)
+    # in the middle of each dwell: at its edge, rounding would choose between two
+    seen = points.at((axis - 1.0135) / stretch) + rng.normal(0, 0.01, axis.size)
     codes = np.round(seen / 16e-3) * 16e-3
     bins = Trace.bins(axis, codes, codes, codes, 1e-3)
     return PlayedList(points, 101.0, 101.03), bins

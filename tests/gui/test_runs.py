@@ -96,7 +96,7 @@ def test_a_run_whose_program_died_is_listed_as_cut_short(
     view = RunsView(Theme("light"))
     view.show_entries(found)
     view.filter.group.button(3).click()
-    assert "cut short" in texts(view) and len(view.cards) == 1, "among the faults"
+    assert "Cut short" in texts(view) and len(view.cards) == 1, "among the faults"
 
 
 def listed(view: RunsView) -> list[str]:

@@ -34,7 +34,8 @@ def test_form_is_read_from_its_head_to_its_buttons(lab) -> None:
     read = names(setup)
     at = read.index("Protocol")
     assert read[at + 1 : at + 1 + len(titles)] == titles
-    assert read[at + 1 + len(titles) :] == ["Run", "Queue"]
+    assert read[at + 1 + len(titles)] == "Record"  # the scene's other tables
+    assert read[-2:] == ["Run", "Queue"]
     setup.form.set_texts(lab.texts)
 
 
