@@ -19,8 +19,12 @@ from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.guard_log import default_log
 from tactile_lab.instruments.serial_dialect import CoilDialect, SerialSettings
 
-SILENCE = 0.5
-"""Time without heartbeat after which an armed guard acts, s."""
+SILENCE = 1.0
+"""Time without heartbeat after which an armed guard acts, s.
+
+A program that hangs keeps the current it had, within the coil's limits: half a second
+more of it costs nothing, where a busy computer that stood still for 0.5 s cost the run.
+"""
 
 READY = 10.0
 """Longest wait for the guard process to be ready, s."""
