@@ -28,7 +28,7 @@ VERBS = {
     "show": "What one run holds, in numbers, and where its figures are.",
     "verify": "Check every sample and spike of a run; exit code 1 if damaged.",
     "recover": "Make a run whole that was cut short by a crash.",
-    "export": "A run as CSV, MATLAB or NWB.",
+    "export": "A run as CSV, MATLAB, netCDF, Parquet, NWB or RO-Crate.",
     "report": "Figure, page and numbers of a run, again from its data.",
     "identify": "Fit parameters of the sensor to a run, with intervals.",
     "transfer": "I_S, m and swing from a measured transfer curve.",
