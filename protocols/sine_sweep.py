@@ -17,11 +17,11 @@ from tactile_lab.measurement import FloatArray, MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed
 from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
 from tactile_lab.stimulus.recovery import TABLE_1_TAU
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
 
-Frequency = Annotated[float, Unit("Hz", above=0.0)]
 PushForce = Annotated[float, Unit("N", above=0.0)]
 
 POINTS = 24
@@ -62,16 +62,12 @@ class SineSweep(ForceProtocol):
 
     @model_validator(mode="after")
     def _rising(self) -> SineSweep:
-        if self.highest < self.lowest:
-            raise ValueError(
-                f"highest {self.highest:g} Hz must not be below lowest "
-                f"{self.lowest:g} Hz"
-            )
+        check_rising(self.lowest, self.highest)
         return self
 
     def frequencies(self) -> list[float]:
         """The frequencies, evenly spaced on a logarithmic scale, Hz."""
-        return [float(f) for f in np.geomspace(self.lowest, self.highest, self.count)]
+        return spaced(self.lowest, self.highest, self.count)
 
     def on_sensor(self, tau: float, volts_per_newton: float) -> Self:
         """With what the scene does not say taken from the sensor."""

@@ -22,11 +22,11 @@ from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed
 from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
 from tactile_lab.stimulus.indentation import on_indentation
 from tactile_lab.trial import Trial, Trials
 
 FloatArray = NDArray[np.float64]
-Frequency = Annotated[float, Unit("Hz", above=0.0)]
 PushForce = Annotated[float, Unit("N", above=0.0)]
 
 
@@ -54,11 +54,7 @@ class Vibration(ForceProtocol):
 
     @model_validator(mode="after")
     def _rising(self) -> Vibration:
-        if self.highest < self.lowest:
-            raise ValueError(
-                f"highest {self.highest:g} Hz must not be below lowest "
-                f"{self.lowest:g} Hz"
-            )
+        check_rising(self.lowest, self.highest)
         if self.lasts * self.lowest < 2.5:
             raise ValueError(
                 f"lasts = {self.lasts:g} s holds fewer than 2.5 cycles of "
@@ -68,7 +64,7 @@ class Vibration(ForceProtocol):
 
     def frequencies(self) -> list[float]:
         """The frequencies, evenly spaced on a logarithmic scale, Hz."""
-        return [float(f) for f in np.geomspace(self.lowest, self.highest, self.count)]
+        return spaced(self.lowest, self.highest, self.count)
 
     def presentations(self) -> Trials:
         """All presentations of one frequency, then those of the next."""
