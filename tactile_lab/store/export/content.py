@@ -129,6 +129,14 @@ def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
     return told
 
 
+def compressed_size(run: Run, selection: Selection) -> int:
+    """Bytes that a file of single-precision columns takes, at most.
+
+    About four a row and column, time counted twice; compression makes less of most.
+    """
+    return selection.rows(run) * 4 * (2 + len(selection.names(run)))
+
+
 def unit(name: str) -> str:
     """SI unit of a signal; V where it is none this program knows."""
     return SIGNALS[name].unit if name in SIGNALS else "V"

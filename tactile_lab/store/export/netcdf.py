@@ -12,6 +12,7 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.export.content import (
     about,
+    compressed_size,
     replacing,
     tables,
     unit,
@@ -20,15 +21,13 @@ from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
-ROW = 4
-"""Bytes a row takes per column, about; compression makes less of most."""
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 18
 
 
 def size(run: Run, selection: Selection) -> int:
     """Bytes the file will take, at most."""
-    return selection.rows(run) * ROW * (2 + len(selection.names(run)))
+    return compressed_size(run, selection)
 
 
 def export(

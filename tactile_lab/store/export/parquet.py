@@ -11,6 +11,7 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export.content import (
     UNITS,
     about,
+    compressed_size,
     replacing,
     tables,
     unit,
@@ -19,13 +20,10 @@ from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
-ROW = 4
-"""Bytes a row takes per column, about; compression makes less of most."""
-
 
 def size(run: Run, selection: Selection) -> int:
     """Bytes the files will take, at most."""
-    return selection.rows(run) * ROW * (2 + len(selection.names(run)))
+    return compressed_size(run, selection)
 
 
 def export(
