@@ -148,7 +148,7 @@ def sine_sweep(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Tol
     from tactile_lab.analysis.response import gain
 
     scale = force_scale(run, true)
-    amplitude = run.protocol.amplitude * scale  # type: ignore[attr-defined]
+    amplitude = run.protocol.amplitude * scale
     for found in values.get("V_C1_over_force", ()):
         f = found["frequency_Hz"]
         cycles = max(4, int(60 * f) + 1)
