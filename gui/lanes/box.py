@@ -20,7 +20,7 @@ from gui.lanes.source import Source
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
 from gui.plots.axis import guarded
-from gui.plots.numbers import nice_range, number, numbers
+from gui.plots.numbers import decimals, nice_range, number, value_ticks
 from tactile_lab.trace import Trace
 
 DOTS = 160
@@ -63,9 +63,8 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
         width, height = box.width(), box.height()
         low, high = box.shown
         frame = Frame(AXIS, AXIS + width, 0.0, height, 0.0, 1.0, low, high)
-        found = numbers(low, high, max(2, int(height / 21)))
-        if len(found) < 2:  # one number alone says nothing of the scale
-            found = numbers(low, high, 5)
+        step, values = value_ticks(low, high, max(2, int(height / 21)))
+        found = [(value, number(value, decimals(step))) for value in values]
         heights = [round(frame.y1(value)) + 0.5 for value, _ in found]
         if len(found) > 2 and heights[0] - heights[1] < LINE:
             # told beside each other, they would overlap: both ends

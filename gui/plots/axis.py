@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor, QPen
 
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
-from gui.plots.numbers import decimals, number, step_of, ticks
+from gui.plots.numbers import decimals, number, value_ticks
 
 # at exit it would look through every object there is; the window closes its own
 pg.setConfigOption("exitCleanup", False)
@@ -85,11 +85,7 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
             return [
                 (1.0, list(range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)))
             ]
-        at_most = max(2, int(size / self._apart))
-        found = ticks(low, high, at_most)
-        if len(found) < 2:  # one number alone says nothing of the scale
-            found = ticks(low, high, at_most := 5)
-        step = step_of(high - low, at_most)
+        step, found = value_ticks(low, high, max(2, int(size / self._apart)))
         if step < self._least:
             step, found = 1.0, [*range(math.ceil(low), math.floor(high) + 1)]
         # one at the very end would be left out for an error of rounding

@@ -27,6 +27,17 @@ def ticks(low: float, high: float, at_most: int) -> list[float]:
     return [number * step for number in range(first, last + 1)]
 
 
+def value_ticks(low: float, high: float, at_most: int) -> tuple[float, list[float]]:
+    """The step, and round values in [low, high], ascending.
+
+    More than `at_most` where else one would stand alone: it says nothing of the scale.
+    """
+    found = ticks(low, high, at_most)
+    if len(found) < 2:
+        found = ticks(low, high, at_most := 5)
+    return step_of(high - low, at_most), found
+
+
 def decimals(step: float) -> int:
     """Decimals that tell neighbouring ticks apart."""
     if step <= 0:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.analysis.estimate import Estimate, student_95
+from tactile_lab.analysis.estimate import Z95, Estimate, student_95
 from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import count, printed, show
@@ -23,8 +23,6 @@ CURVES = 8
 """Most curves in one panel."""
 RESAMPLES = 200
 """Of the bootstrap behind the intervals of Sobol indices."""
-Z = 1.959963984540054
-"""Half-width of a 95 % interval in standard deviations of a normal distribution."""
 
 
 def conclude(found: Gathered) -> Conclusion:
@@ -180,10 +178,10 @@ def _yield(found: Gathered) -> tuple[int, Estimate]:
     number = int(good.sum())
     share = number / size
     error = math.sqrt(share * (1 - share) / size)
-    centre = (share + Z * Z / (2 * size)) / (1 + Z * Z / size)
+    centre = (share + Z95 * Z95 / (2 * size)) / (1 + Z95 * Z95 / size)
     half = (
-        Z / (1 + Z * Z / size)
-        * math.hypot(error, Z / (2 * size))
+        Z95 / (1 + Z95 * Z95 / size)
+        * math.hypot(error, Z95 / (2 * size))
     )  # fmt: skip
     low, high = max(centre - half, 0.0), min(centre + half, 1.0)
     return number, Estimate(share, error, low, high)
