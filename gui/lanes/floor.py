@@ -74,17 +74,29 @@ class Stage:
         return self.frame(min(tops), max(bottoms) - TIME_AXIS - 2)
 
 
-class Floor(pg.GraphicsObject):  # type: ignore[misc]
-    """Painted once for all lanes."""
+class Layer(pg.GraphicsObject):  # type: ignore[misc] # pyqtgraph has no types
+    """Something painted once over all lanes.
 
-    def __init__(self, stage: Stage) -> None:
+    Args:
+        stage: what the lanes show, and how large they are.
+        height: above or below the lanes' own items, as Qt's z.
+    """
+
+    def __init__(self, stage: Stage, height: int) -> None:
         super().__init__()
         self._stage = stage
-        self.setZValue(-300)
+        self.setZValue(height)
 
     def boundingRect(self) -> QRectF:
         """All lanes."""
         return QRectF(0, 0, self._stage.width, self._stage.height)
+
+
+class Floor(Layer):
+    """What lies below all lanes."""
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage, -300)
 
     @guarded
     def paint(self, painter: QPainter, *__: Any) -> None:

@@ -20,7 +20,7 @@ from PySide6.QtGui import (
 
 from gui.lanes import paint
 from gui.lanes.box import LaneBox
-from gui.lanes.floor import AXIS, TIME_AXIS, Floor, Stage, hold_names
+from gui.lanes.floor import AXIS, TIME_AXIS, Floor, Layer, Stage, hold_names
 from gui.lanes.paint import Frame
 from gui.lanes.readings import values_at
 from gui.look.fonts import sized
@@ -42,7 +42,7 @@ Places = list[tuple[LaneBox, float, float]]
 """Visible lanes with top and bottom, px."""
 
 
-class Marks(pg.GraphicsObject):  # type: ignore[misc]
+class Marks(Layer):
     """What goes across all lanes: names of holds, now, cursors, crosshair, zoom box.
 
     Attributes:
@@ -52,16 +52,10 @@ class Marks(pg.GraphicsObject):  # type: ignore[misc]
     """
 
     def __init__(self, stage: Stage) -> None:
-        super().__init__()
-        self._stage = stage
+        super().__init__(stage, 100)
         self.boxes: list[LaneBox] = []
         self.pointer: QPointF | None = None
         self.box: QRectF | None = None
-        self.setZValue(100)
-
-    def boundingRect(self) -> QRectF:
-        """All lanes."""
-        return QRectF(0, 0, self._stage.width, self._stage.height)
 
     @guarded
     def paint(self, painter: QPainter, *__: Any) -> None:
