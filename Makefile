@@ -9,13 +9,14 @@ SYSTEM_STAMP := $(VENV)/.installed-system
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_ROOT_USER_ACTION := ignore
 
-.PHONY: demo gui test check fast reports screenshots clean help
+.PHONY: demo gui test check fast search reports screenshots clean help
 
 help:
 	@echo "make demo         install, run the paper's experiment on the simulated bench"
 	@echo "make gui          install, open the bench window"
 	@echo "make test         install what tests need, run every check and test"
 	@echo "make fast         the unit tests alone"
+	@echo "make search       the property tests on new examples, a thousand each"
 	@echo "make reports      the long campaigns; rewrites the tables in docs/"
 	@echo "make screenshots  pictures of the window and of the demo's figure for docs/"
 	@echo "make clean        remove the environment and caches; runs/ is kept"
@@ -40,6 +41,10 @@ check: $(DEV_STAMP)
 
 fast: $(DEV_STAMP)
 	$(BIN)/python -m pytest -x -q -m "not campaign" --ignore tests/gui
+
+# what the settled examples of `make test` do not try; a find becomes an @example
+search: $(DEV_STAMP)
+	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=search -n auto
 
 # hours on two cores, alone on the machine; every table states commit and date
 reports: $(DEV_STAMP)

@@ -5,8 +5,19 @@
 import pydantic.fields  # noqa: F401
 from hypothesis import HealthCheck, settings
 
-# a busy machine is no failure
+# A busy machine is no failure, and one commit gives one verdict: examples are drawn
+# from each test's own seed. `make search` draws new ones, and many more.
 settings.register_profile(
-    "unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "settled",
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
 )
-settings.load_profile("unhurried")
+settings.register_profile(
+    "search",
+    deadline=None,
+    max_examples=1000,
+    print_blob=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("settled")
