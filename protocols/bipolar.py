@@ -42,7 +42,7 @@ class Bipolar(Levels):
     signals: ClassVar[tuple[str, ...]] = ("force", "coil_current", "V_C1", "I_DS")
 
     levels: tuple[Force, ...] = Field(
-        default=(0.05, -0.05, 0.1, -0.1), min_length=1, description="Force held"
+        default=(-0.05, 0.05, -0.08, 0.1), min_length=1, description="Force held"
     )
     ramp: Pause = Field(default=0.25, description="Ramp up and ramp down, each")
     hold: Duration = Field(default=5.0, description="Time at each level")

@@ -45,6 +45,8 @@ OWN = {"input_bias": "follower"}
 """Name of the cause of uncertainty where it is not the suspect's own."""
 SYSTEMATIC = 0.03
 """Of one code: what the mean of dithered codes is off by, alike at each level."""
+DITHERED = 0.25
+"""Of one code: noise smooths a converter's steps where they leave less than this."""
 LEAST = 0.15e-3
 """What V_C2 at firing is known to at best, V."""
 FEWEST = 3
@@ -161,7 +163,7 @@ def explain(
         return None
     plain = problem.under(belief.driven)
     code = 0.0 if V_C1 is None else V_C1.resolution
-    noise = _noise(plain, problem.bins, code)
+    noise = _noise(plain, problem.bins, 0.0 if V_C1 is None else _steps(V_C1))
     weight = np.ones(problem.size)
     if V_C1 is not None and code > 0:
         weight[: problem.bins] = math.sqrt(_levels(V_C1) / problem.bins)
@@ -180,11 +182,21 @@ def explain(
     return Explanation(misfit, tuple(found))
 
 
-def _noise(plain: FloatArray, bins: int, code: float) -> FloatArray:
+def _steps(V_C1: Measured) -> float:
+    """What the converter's steps put the mean of a bin off by, V, root mean square.
+
+    Steps that no noise smooths are off by anything up to `V_C1.steps`, evenly.
+    """
+    if V_C1.steps <= DITHERED * V_C1.resolution:
+        return SYSTEMATIC * V_C1.resolution
+    return V_C1.steps / math.sqrt(3)
+
+
+def _noise(plain: FloatArray, bins: int, steps: float) -> FloatArray:
     """Scatter of V_C1 and of V_C2 at firing about any smooth course, V."""
     noise = np.empty(plain.size)
     for part, least in (
-        (slice(0, bins), max(SYSTEMATIC * code, 1e-5)),
+        (slice(0, bins), max(steps, 1e-5)),
         (slice(bins, plain.size), LEAST),
     ):
         found = irregularity(plain[part]) / 1.96

@@ -30,6 +30,7 @@ class Measured:
         value: shape (n,), mean of each bin, V.
         resolution: one code of the channel, V; what its mean may be off by.
         offset: half of the 95 % band of its follower's offset, V.
+        steps: how far the mean of a bin may be off by the converter's steps, V.
     """
 
     signal: str
@@ -37,6 +38,7 @@ class Measured:
     value: FloatArray
     resolution: float = 0.0
     offset: float = 0.0
+    steps: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

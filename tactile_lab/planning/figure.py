@@ -12,6 +12,7 @@ from tactile_lab.planning.plan import Plan
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.signals import SIGNALS
+from tactile_lab.spikes.rate import rates_between
 
 POINTS = 4000
 LANES = ("V_P", "V_C1", "I_DS", "I_C", "V_C2")
@@ -30,7 +31,7 @@ def preview_plot(plan: Plan) -> Plot:
             shown.append("rate")
         panels += [_lane(plan.preview, name, times) for name in shown]
         if spikes is not None:
-            panels.append(_spikes(spikes))
+            panels.append(_spikes(spikes, plan.timeline))
     return Plot(
         name="preview",
         caption="The planned force and the model under it. Grey bands: recoveries.",
@@ -85,15 +86,15 @@ def _lane(result: Result, name: str, times: NDArray[np.float64]) -> Panel:
     )
 
 
-def _spikes(spikes: NDArray[np.float64]) -> Panel:
-    rates = 1 / np.diff(spikes)
+def _spikes(spikes: NDArray[np.float64], drive: Timeline) -> Panel:
+    middles, rates = rates_between(spikes, np.array([s.start for s in drive.steps]))
     return Panel(
         label="Rate",
         unit="Hz",
         prefix="",
         series=(
             Series(x=spikes, mark="ticks", colour="V_K"),
-            Series(x=(spikes[1:] + spikes[:-1]) / 2, y=rates, mark="dots"),
+            Series(x=middles, y=rates, mark="dots"),
         ),
         limits=(0.0, float(rates.max(initial=0.0)) / 0.78 or 1.0),
         note=f"{spikes.size} spikes (ticks), instantaneous rate 1/ISI (dots)",

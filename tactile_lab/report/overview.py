@@ -17,7 +17,7 @@ from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import count, show
 from tactile_lab.report.splice import ClosedTime
-from tactile_lab.spikes.rate import begins
+from tactile_lab.spikes.rate import rates_between
 
 FloatArray = NDArray[np.float64]
 
@@ -265,12 +265,9 @@ def _train(spikes: FloatArray, axis: ClosedTime) -> Told:
 
 
 def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Middles of the intervals of each train and their rates; none across a silence."""
-    at, rates = [np.empty(0)], [np.empty(0)]
-    for times in spikes:
-        inside = ~begins(times)[1:]
-        at.append(((times[1:] + times[:-1]) / 2)[inside])
-        rates.append(1 / np.diff(times)[inside])
+    """Middles of all trains' intervals and their rates, one train after another."""
+    found = [rates_between(times) for times in (*spikes, np.empty(0))]
+    at, rates = zip(*found, strict=True)
     return np.concatenate(at), np.concatenate(rates)
 
 

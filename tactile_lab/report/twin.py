@@ -104,7 +104,14 @@ def measured(run: RunData, believed: Belief, trace: RecordedSignal) -> Measured:
     """A recorded voltage as compared: within the run, and within its input's range."""
     inside = (trace.time >= 0) & (trace.time <= run.duration) & trace.within_range
     time, mean = trace.time[inside], trace.mean[inside]
-    return Measured(trace.signal, time, mean, trace.code or 0.0, believed.offset)
+    return Measured(
+        trace.signal,
+        time,
+        mean,
+        resolution=trace.code or 0.0,
+        offset=believed.offset,
+        steps=run.step_bias(trace.signal),
+    )
 
 
 def to_dict(beside: BesideModel) -> dict[str, Any]:

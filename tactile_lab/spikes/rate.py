@@ -46,6 +46,23 @@ def begins(spikes: FloatArray, steps: FloatArray = NEVER) -> NDArray[np.bool_]:
     return first
 
 
+def rates_between(
+    spikes: FloatArray, steps: FloatArray = NEVER
+) -> tuple[FloatArray, FloatArray]:
+    """1/ISI of each interval of a train, in its middle; none across a silence.
+
+    Args:
+        spikes: times, ascending, s.
+        steps: when the steps of the run begin, ascending, s.
+
+    Returns:
+        Times, s, and rates, Hz, of shape (n,).
+    """
+    inside = ~begins(spikes, steps)[1:]
+    middles = (spikes[1:] + spikes[:-1]) / 2
+    return middles[inside], 1.0 / np.diff(spikes)[inside]
+
+
 def rate_changes(
     spikes: FloatArray, steps: FloatArray = NEVER
 ) -> tuple[FloatArray, FloatArray]:

@@ -80,6 +80,14 @@ def test_what_the_bench_s_bands_allow_needs_no_explanation(within):
     assert explained(Deviation(**within)) is None
 
 
+def test_steps_of_a_converter_that_no_noise_smooths_are_no_misfit():
+    code, true = 10 / 254, simulate(*BELIEF.driven, keep=("V_C1", "spikes"))
+    time = (np.arange(1000) + 0.5) * true.duration / 1000
+    volts = code * np.rint(true.sample("V_C1", time) / code)
+    seen = Measured("V_C1", time, volts, resolution=code, offset=3e-3, steps=code / 2)
+    assert explain(BELIEF, true.duration, V_C1=seen) is None
+
+
 def test_a_cause_is_named_though_the_follower_is_not_quite_as_stated():
     found = explained(Deviation(V_GS=4e-3, input_bias=15e-12))
     assert found.cause.name == "V_GS"

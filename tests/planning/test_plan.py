@@ -124,20 +124,22 @@ def fixed_ranges(tmp_path):
 
 @pytest.mark.parametrize("preview", [True, False], ids=["plan", "run"])
 def test_a_signal_that_will_leave_its_range_is_warned_of(fixed_ranges, preview):
-    told = " ".join(plan(load("bipolar", bench=fixed_ranges), preview=preview).warnings)
+    pull = ['protocol.levels=["100 mN","-100 mN"]']
+    scene = load("bipolar", pull, bench=fixed_ranges)
+    told = " ".join(plan(scene, preview=preview).warnings)
     assert "V_C1 will leave its channel's range, 500 mV to 4.5 V" in told
 
 
 def test_a_range_is_widened_where_the_model_expects_more(fixed_ranges):
-    """Such as by a pull, or after a long push; the demo keeps the finer one."""
+    """Such as after a long push; demo and `bipolar` keep the finer one."""
 
     def ranges(name):
         made = plan(load(name), preview=False)
         assert "leave" not in " ".join(made.warnings)
         return {c.signal: c.range for c in made.needs.channels}
 
-    assert ranges("demo")["V_C1"] == 2.0
-    assert ranges("bipolar")["V_C1"] == ranges("hold_10s")["V_C1"] == 5.0
+    assert ranges("demo")["V_C1"] == ranges("bipolar")["V_C1"] == 2.0
+    assert ranges("hold_10s")["V_C1"] == 5.0
     assert ranges("hold_10s")["V_C2"] == 2.0
     # without a force nothing is expected beyond
     assert ranges("monitor")["V_C1"] == 2.0

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
-from tactile_lab.spikes.rate import begins, rate, rate_changes
+from tactile_lab.spikes.rate import begins, rate, rate_changes, rates_between
 from tactile_lab.waveform import Waveform
 
 TRAIN = np.array([1.0, 1.1, 1.3, 1.7])
@@ -24,6 +24,17 @@ def test_rate_is_right_continuous_and_zero_before_the_second_spike():
 def test_rate_just_after_each_spike_is_one_over_the_last_interval(steps):
     times = np.cumsum(steps) * 1e-3
     assert rate(times, times)[1:] == pytest.approx(1 / np.diff(times))
+
+
+def test_no_interval_spans_a_silence_or_the_wait_between_two_steps():
+    spikes = np.array([1.0, 1.1, 1.3, 4.0, 4.2])
+    middles, rates = rates_between(spikes)
+    assert middles == pytest.approx([1.05, 1.2, 4.1])
+    assert rates == pytest.approx([10.0, 5.0, 5.0])
+    slow = np.array([1.0, 2.0, 3.0])
+    assert rates_between(slow)[1] == pytest.approx([1.0, 1.0])
+    assert rates_between(slow, np.array([2.5]))[1] == pytest.approx([1.0])
+    assert rates_between(np.empty(0))[0].size == 0
 
 
 def test_no_rate_is_told_through_a_silence():
