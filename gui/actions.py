@@ -81,7 +81,9 @@ class Actions(QObject):
         ):
             button.clicked.connect(lambda _=False, topic=topic: self.show_help(topic))
         panels.review.help.clicked.connect(
-            lambda: self.show_help(("Results", "Runs", "Manual")[panels.review.tab])
+            lambda: self.show_help(
+                ("Results", "Runs", "Manual", "Spikes")[panels.review.tab]
+            )
         )
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
@@ -109,7 +111,7 @@ class Actions(QObject):
         panels = self.panels
         tools, view = panels.centre.tools, panels.centre.view
         cross = panels.centre.stack.scene.toggle_crosshair
-        form = panels.setup.form
+        form, stepped = panels.setup.form, panels.review.spikes.stepped.emit
         return [
             Shortcut(("Ctrl+R",), "Run", panels.setup.start),
             Shortcut(
@@ -136,6 +138,8 @@ class Actions(QObject):
             Shortcut(("X",), "Crosshair", cross, single=True),
             Shortcut(("Left",), "Earlier", lambda: self._nudge(-1), single=True),
             Shortcut(("Right",), "Later", lambda: self._nudge(1), single=True),
+            Shortcut((".",), "Next spike", lambda: stepped(1), single=True),
+            Shortcut((",",), "The spike before", lambda: stepped(-1), single=True),
             Shortcut(("Home",), "Start of the run", self._home, single=True),
             Shortcut(
                 ("End",), "End of the run", lambda: view.set_follow(True), single=True
@@ -154,6 +158,7 @@ class Actions(QObject):
             Shortcut(("Ctrl+1",), "Results", lambda: self._tab(0)),
             Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
             Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),
+            Shortcut(("Ctrl+4",), "Spikes", lambda: self._tab(3)),
             Shortcut(("Ctrl+Z",), "Undo in the form", form.undo_edit),
             Shortcut(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.redo_edit),
             Shortcut(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),

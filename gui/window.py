@@ -25,6 +25,7 @@ from gui.look.theme import Theme
 from gui.parts import column
 from gui.preferences import Preferences
 from gui.review.panel import ReviewPanel
+from gui.review.spike_tools import SpikeTools
 from gui.run_actions import RunActions
 from gui.screen.centre import Centre
 from gui.screen.frames import Frames
@@ -80,6 +81,7 @@ class Window(QMainWindow):
             self, self.panels, self.screen_, self.runs, self.closing, self.preferences
         )
         self._habits = Habits(session, self.preferences, self.screen_)
+        self.spikes = SpikeTools(self.review.spikes, self.centre.stack, session)
         self._leaving = False
         self._connect()
         self.render_state()

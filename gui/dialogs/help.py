@@ -86,6 +86,14 @@ PANELS = (
         "hangs for 2 s, the coil is switched off.",
     ),
     (
+        "Spikes",
+        "Next and Previous go from spike to spike, in the lanes too. The first plot "
+        "lays the stored samples of up to 100 spikes over each other where they cross "
+        "the threshold; below it is how often each interval comes, and how intervals "
+        "follow each other. Silences are no intervals. Choose whether all spikes "
+        "count, those in view, or those between the cursors.",
+    ),
+    (
         "Connect instruments",
         "Asks ports and devices for their names, suggests driver and row, tests, and "
         "saves a bench file. Its other pages run the wiring check and the field "

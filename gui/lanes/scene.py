@@ -43,7 +43,7 @@ Places = list[tuple[LaneBox, float, float]]
 
 
 class Marks(Layer):
-    """What goes across all lanes: names of holds, now, cursors, crosshair, zoom box.
+    """What goes across all lanes: now, cursors, the chosen spike, ...
 
     Attributes:
         boxes: of the visible lanes, from the top.
@@ -67,6 +67,10 @@ class Marks(Layer):
         if source.running and frame.start <= source.reach <= frame.end:
             pen = paint.pen(tokens.border_strong)
             self._upright(painter, frame.x1(source.reach), pen)
+        chosen = stage.view.spike
+        if chosen is not None and frame.start <= chosen <= frame.end:
+            pen = paint.pen(tokens.V_K, Qt.PenStyle.DotLine)
+            self._upright(painter, frame.x1(chosen), pen)
         self._cursors(painter, frame)
         if self.pointer is not None and frame.left <= self.pointer.x() <= frame.right:
             self._cross(painter, self.pointer)

@@ -68,6 +68,7 @@ class LaneStack(QFrame):
 
     def show_source(self, source: Source) -> None:
         """Show another source in the same lanes."""
+        self.view.spike = None
         for one in self.rows:
             one.box.forget()
         self.exchange_source(source)

@@ -18,7 +18,7 @@ SHORTEST = 1e-5
 
 
 class TimeView(QObject):
-    """The window of time on screen, the head of the data and the cursors A and B."""
+    """The window of time on screen, the head of the data, cursors, the chosen spike."""
 
     changed = Signal()
     cursors_changed = Signal()
@@ -32,6 +32,7 @@ class TimeView(QObject):
         self.length = 5.0
         self.follow = True
         self.cursors: tuple[float, float] | None = None
+        self.spike: float | None = None
         self._before: list[tuple[float, float]] = []
         self._after: list[tuple[float, float]] = []
         self._noted = -PAUSE
@@ -131,6 +132,14 @@ class TimeView(QObject):
             far = self.start + (0.9 if which == 0 else 0.1) * self.width
             self.cursors = (at, far) if which == 0 else (far, at)
         self.move_cursor(which, at)
+
+    def show_spike(self, at: float) -> None:
+        """Choose the spike at a time, s, and have it in view."""
+        self.spike = at
+        if self.start + 0.05 * self.width <= at <= self.end - 0.05 * self.width:
+            self.changed.emit()
+        else:
+            self.show_span(at - self.width / 2, self.width)
 
     def clear_cursors(self) -> None:
         """Take the cursors away."""

@@ -1,4 +1,4 @@
-"""The right panel: Results, Runs, Manual."""
+"""The right panel: Results, Runs, Manual, Spikes."""
 
 from __future__ import annotations
 
@@ -23,26 +23,33 @@ from gui.parts import (
 from gui.review.manual import ManualView
 from gui.review.results import ResultsView
 from gui.review.runs import RunsView
+from gui.review.spikes import SpikesView
 
 
 class ReviewPanel(QFrame):
-    """Three tabs."""
+    """Four tabs."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.setProperty("role", "panel")
-        self.setAccessibleName("Results, runs and manual control")
+        self.setAccessibleName("Results, runs, manual control and spikes")
         self.setMinimumWidth(336)
         self.results = ResultsView(theme)
         self.runs = RunsView(theme)
         self.manual = ManualView(theme)
+        self.spikes = SpikesView(theme)
         self.export = IconButton(theme, "folder", "Open the run's folder")
         self.help = IconButton(theme, "help", "Help on this panel")
         manual = with_gutter(scrolling(self.manual), self.manual.rows)
         self._pages = QStackedWidget()
         self._tabs = QButtonGroup(self)
         head = row(spacing=2)
-        pages = {"Results": self.results, "Runs": self.runs, "Manual": manual}
+        pages = {
+            "Results": self.results,
+            "Runs": self.runs,
+            "Manual": manual,
+            "Spikes": self.spikes,
+        }
         for number, (name, page) in enumerate(pages.items()):
             tab = QToolButton()
             tab.setText(name)
@@ -65,6 +72,6 @@ class ReviewPanel(QFrame):
         return self._pages.currentIndex()
 
     def show_tab(self, number: int) -> None:
-        """0 Results, 1 Runs, 2 Manual."""
+        """0 Results, 1 Runs, 2 Manual, 3 Spikes."""
         self._tabs.button(number).setChecked(True)
         self._pages.setCurrentIndex(number)

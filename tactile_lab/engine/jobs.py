@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from tactile_lab.engine.manual import FieldReading
     from tactile_lab.engine.model_parts import StoredParts
     from tactile_lab.scene.scene import Scene
+    from tactile_lab.store.spike_shapes import SpikeShapes
+    from tactile_lab.trace import FloatArray
 
 LONGEST = 300.0
 """Seconds a report may take."""
@@ -183,6 +185,15 @@ def model_of_run(
     with _SOLVING:
         stored = _stored(folder)
     return stored.part(start, end, count)
+
+
+def shapes_of_run(engine: Engine, folder: Path, times: FloatArray) -> SpikeShapes:
+    """The stored samples around the spikes of a run that are nearest to `times`, s."""
+    from tactile_lab.store.run import Run
+    from tactile_lab.store.spike_shapes import spike_shapes
+
+    with Run.load(folder) as run:
+        return spike_shapes(run, times)
 
 
 _SOLVING = threading.Lock()
