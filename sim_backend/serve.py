@@ -89,7 +89,7 @@ class ServedBench:
                 row = coil_dialect(coil_row)
                 source, wire = coil_far_end(plant, row, clock), row.serial
                 if log is not None:
-                    self._log = log.open("a", encoding="utf-8")
+                    self._log = _appended(log)
                     source.on_change = _writer(self._log)
                 wire = wire.model_copy(update={"baud": baud or wire.baud})
                 self._add("coil", coil, source, wire, clock, paced)
@@ -148,6 +148,16 @@ def _server(where: str, far_end: FarEnd, paced: bool) -> SerialServer:
     except OSError as reason:
         raise InstrumentError(
             f"TCP port {port} cannot be served ({reason}); choose another, or 0."
+        ) from reason
+
+
+def _appended(log: Path) -> TextIO:
+    try:
+        return log.open("a", encoding="utf-8")
+    except OSError as reason:
+        raise SceneError(
+            f"--log {log} cannot be written: {reason.strerror}; give a file in a "
+            "folder that is there."
         ) from reason
 
 

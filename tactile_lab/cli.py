@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import importlib.util
 import io
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 import click
 
@@ -120,5 +122,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = INTERRUPTED
     except BrokenPipeError:
         code = 1  # nobody reads on: no message, no traceback
+    except OSError as refused:
+        if refused.errno not in (errno.ENOSPC, errno.EIO):
+            raise
+        code = 1  # what stdout goes to takes no more
+        with suppress(OSError):
+            terminal.say(f"tactile-lab: cannot be printed: {refused}", sys.stderr)
     terminal.let_go()
     sys.exit(code if isinstance(code, int) else 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -24,6 +25,8 @@ def read_text(path: Path, what: str = "File") -> str:
         SceneError: missing, a folder, not readable, too large, or not text.
     """
     try:
+        if stat.S_ISFIFO(path.stat().st_mode):
+            raise SceneError(f"{what} {path} is a pipe; a file is needed.")
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
     except FileNotFoundError as reason:

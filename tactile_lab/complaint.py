@@ -132,6 +132,8 @@ def _line(error: Any, kind: Any, at: tuple[str, ...], blame: Blame) -> str:
     shown = "" if value in told or isinstance(error["input"], dict) else f" = {value}"
     if isinstance(error["input"], str) and value not in told:
         told = told.replace(error["input"], value.strip('"'))
+    if origin.startswith(f"{'.'.join(map(str, full))} = "):  # says key and value itself
+        return f"{origin}: {_sentence(told)}"
     return f"{origin}: {place(full)}{shown}: {_sentence(told)}"
 
 

@@ -74,7 +74,7 @@ def module_from_file(path: Path, what: str) -> ModuleType:
     sys.modules[spec.name] = module  # annotations of the class are resolved there
     try:
         spec.loader.exec_module(module)
-    except Exception as reason:
+    except (Exception, SystemExit) as reason:
         del sys.modules[spec.name]
         frames = traceback.extract_tb(reason.__traceback__)
         lines = [f.lineno for f in frames if f.filename == str(path)]

@@ -55,6 +55,10 @@ def parse(text: str, unit: str) -> float:
     value = _scaled(digits, factor)
     if not math.isfinite(value):
         raise QuantityError(f'"{text}" is not finite; give a finite number in {unit}.')
+    if value == 0 and any(one in "123456789" for one in digits.lower().split("e")[0]):
+        raise QuantityError(
+            f'"{text}" is less than any number here can be; write 0 {unit}, or more.'
+        )
     return value
 
 

@@ -149,5 +149,5 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     if summary["loss"]:
         yield "", summary["loss"]["text"]
     for name, digest in summary["inputs"].items():
-        yield "kept", f"{name}  sha256 {digest[:16]}"
+        yield "kept", f"{name}  sha256 {str(digest)[:16]}"
     yield from (("figure", figure) for figure in summary["figures"])

@@ -295,10 +295,22 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
             raise complaint(
                 ("bench", "simulated"), f"{file} is a simulated bench.", blame
             )
-    merged = _merged(_lists_to_tuples(under), _placed(inline, folder))
+    merged = _merged(_of_the_same_rows(under, inline), _placed(inline, folder))
     if path is not None:
         folder, merged["file"] = path.parent, str(path)
     return validated(BenchSpec, merged, ("bench",), blame, folder)
+
+
+def _of_the_same_rows(under: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """A bench's tables without the baud rate of a row that another one replaces."""
+    kept = dict(_lists_to_tuples(under))
+    for name, table in over.items():
+        below = kept.get(name)
+        if not (isinstance(table, dict) and isinstance(below, dict)):
+            continue
+        if table.get("dialect", below.get("dialect")) != below.get("dialect"):
+            kept[name] = {key: v for key, v in below.items() if key != "baud"}
+    return kept
 
 
 def _moved(data: dict[str, Any]) -> dict[str, Any]:

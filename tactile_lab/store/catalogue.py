@@ -22,6 +22,15 @@ INDEX = ".index.json"
 VERSION = 3
 """Of the index; another one is thrown away and rebuilt."""
 
+KINDS: Mapping[str, type | tuple[type, ...]] = {
+    "status": str,
+    **dict.fromkeys(("started", "title", "protocol", "scene", "bench"), str),
+    **dict.fromkeys(("notes", "parameters", "loss"), dict),
+    **dict.fromkeys(("duration_s", "spikes_online"), (int, float)),
+    "simulated": bool,
+}
+"""What entries of `run.json` are, where they are there."""
+
 SENSOR_KEYS = ("sensor", "sample")
 """Notes that name the sensor measured on."""
 
@@ -195,6 +204,7 @@ def _read_index(root: Path) -> dict[str, Any]:
 def _entry(path: Path) -> RunSummary:
     try:
         info, remarks = read_info(path), read_remarks(path)
+        _check(path, info)
     except RunFolderError as error:
         return RunSummary(folder=path, name=path.name, trouble=str(error))
     notes = info.get("notes") or {}
@@ -219,6 +229,26 @@ def _entry(path: Path) -> RunSummary:
         spikes=info.get("spikes_online"),
         loss=str((info.get("loss") or {}).get("text") or ""),
     )
+
+
+def _check(path: Path, info: Mapping[str, Any]) -> None:
+    """Refuse what no run says of itself, lest one such file stops a list of all.
+
+    Raises:
+        RunFolderError: an entry is of another kind.
+    """
+    for name, kinds in KINDS.items():
+        if (found := info.get(name)) is not None and not isinstance(found, kinds):
+            raise RunFolderError(
+                f"{path / INFO} says {name} = {json.dumps(found)[:40]}, which no run "
+                "has: it is damaged. `tactile-lab verify` lists what else is."
+            )
+    try:
+        datetime.fromisoformat(info.get("started") or "2000-01-01")
+    except ValueError as error:
+        raise RunFolderError(f"{path / INFO} is damaged: {error}.") from error
+    if not info.get("status"):
+        raise RunFolderError(f"{path / INFO} is damaged: it does not say the status.")
 
 
 def _free(notes: Mapping[str, Any]) -> list[str]:

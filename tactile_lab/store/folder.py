@@ -167,9 +167,10 @@ def read_info(path: Path) -> dict[str, Any]:
     file = path / INFO
     try:
         info = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
+        what = f"it has no {INFO}" if path.is_dir() else "it is no folder"
         raise RunFolderError(
-            f"{path} is no run folder: it has no {INFO}. Give the folder of one run; "
+            f"{path} is no run folder: {what}. Give the folder of one run; "
             "`tactile-lab runs` lists them."
         ) from error
     except (OSError, ValueError) as error:
@@ -199,13 +200,10 @@ def check_space(path: Path, needed: int) -> None:
 def is_live(path: Path) -> bool:
     """Whether a process still writes the run in folder `path`."""
     try:
-        with (path / LOG).open("r+", encoding="utf-8") as log:
-            return not _lock(log)
-    except FileNotFoundError:
-        return False
-    except PermissionError:
-        # another user's run, or a read-only archive: nobody here can be its writer
-        return False
+        with (path / LOG).open(encoding="utf-8") as log:
+            return not _lock(log, shared=True)
+    except OSError:
+        return False  # no log, or none that may be read: nobody here can be its writer
 
 
 @contextmanager
@@ -242,8 +240,14 @@ def _plain(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9-]+", "-", name).strip("-")[:60] or "run"
 
 
-def _lock(file: IO[str]) -> bool:
-    """Lock the open log until it is closed or its process dies; False if taken."""
+def _lock(file: IO[str], *, shared: bool = False) -> bool:
+    """Lock the open log until it is closed or its process dies; False if taken.
+
+    Args:
+        file: the log.
+        shared: as a reader does who looks whether a writer has it; a writer waits for
+            such a look to end.
+    """
     if sys.platform == "win32":
         import msvcrt
 
@@ -256,7 +260,7 @@ def _lock(file: IO[str]) -> bool:
     import fcntl
 
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB if shared else fcntl.LOCK_EX)
     except OSError:
         return False
     return True

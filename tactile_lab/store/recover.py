@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import zlib
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.certificate import redetect, write_certificate
 from tactile_lab.store.columns import Column, SampleColumn
+from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import (
     DATA,
     RESERVE,
@@ -24,7 +26,7 @@ from tactile_lab.store.folder import (
     read_info,
     write_info,
 )
-from tactile_lab.store.layout import RECORDS, create_channel
+from tactile_lab.store.layout import RECORDS
 from tactile_lab.store.ledger import LEDGER, Written, goes_on, read_ledger
 from tactile_lab.store.progress import Progress, nothing, share
 from tactile_lab.store.run import Run
@@ -37,6 +39,10 @@ FILLING = 0.6
 
 EMPTY = 1 << 18
 """Bytes that no data file has before its first sample."""
+
+BITSHUFFLE, OF_ITS_OWN = 32008, 3
+"""A filter's number in HDF5, and how many values it puts before those it is given
+whenever a dataset is made with it."""
 
 OF_SAMPLES = {"segments": "first", "gaps": "sample", "overrange": "sample"}
 """Tables about samples, and the column that tells which; lost ones are dropped."""
@@ -75,14 +81,11 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
             f"{path} was not cut short (status {info['status']}); nothing to recover. "
             "`tactile-lab verify` checks it."
         )
-    if not (path / LEDGER).exists() and _can_be_opened(path):
-        raise RunFolderError(
-            f"{path} has no {LEDGER} that tells what was written. Put it back; after a "
-            f"run of an older version, read what {DATA} holds."
-        )
     # a recovery that was cut short itself has put it there already
     killed = path / KEPT if (path / KEPT).exists() else path / DATA
-    written = read_ledger(path / LEDGER)
+    listed = written = read_ledger(path / LEDGER)
+    if not written.declared and killed.exists():
+        written = _told_by(killed)
     if not written.declared or not killed.exists():
         _refuse_if_there_may_be_samples(path, killed)
         return _without_samples(path, info)
@@ -100,8 +103,72 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
     new.replace(path / DATA)
     recovery = _derive(path, samples, dropped)
     progress(1.0)
-    (path / LEDGER).unlink()
+    if listed.declared:  # else somebody may have a better copy of it
+        (path / LEDGER).unlink()
     return recovery
+
+
+def _told_by(killed: Path) -> Written:
+    """What a data file itself tells was written: older versions kept no ledger.
+
+    Nothing where it cannot be opened; tables and chunks as far as they can be read.
+    """
+    image = io.BytesIO()
+    rows: dict[str, list[Any]] = {name: [] for name in RECORDS}
+    chunks: dict[str, Any] = {}
+    try:
+        with (
+            open_data(killed, live=False) as file,
+            h5py.File(image, "w", libver="latest") as declared,
+        ):
+            declared.attrs.update(file.attrs)
+            file.visititems(lambda name, item: _declare_again(declared, name, item))
+            for name in (name for name in RECORDS if name in file):
+                rows[name] = _readable_rows(file[name])
+            for name in file.get("samples", ()):
+                chunks[f"samples/{name}"] = _listed(file, name)
+    except (OSError, KeyError, RuntimeError, ValueError):
+        return Written(b"", {}, {})
+    return Written(image.getvalue(), rows, chunks)
+
+
+def _declare_again(file: h5py.File, name: str, item: h5py.Dataset | h5py.Group) -> None:
+    """Declare a dataset as it is, but empty."""
+    if isinstance(item, h5py.Dataset):
+        folder, _, own = name.rpartition("/")
+        group = file.require_group(folder or "/")
+        empty = h5py.h5s.create_simple((0,), (h5py.h5s.UNLIMITED,))
+        like = item.id.get_create_plist()
+        filters = [like.get_filter(number) for number in range(like.get_nfilters())]
+        like.remove_filter(h5py.h5z.FILTER_ALL)
+        for code, flags, values, _ in filters:
+            own_values = values[OF_ITS_OWN:] if code == BITSHUFFLE else values
+            like.set_filter(code, flags, own_values)
+        h5py.h5d.create(group.id, own.encode(), item.id.get_type(), empty, dcpl=like)
+        file[name].attrs.update(item.attrs)
+
+
+def _readable_rows(table: h5py.Dataset) -> list[Any]:
+    """Rows of a table up to the first that cannot be read."""
+    rows: list[Any] = []
+    with suppress(OSError):
+        for first in range(0, table.shape[0], table.chunks[0]):
+            rows += table[first : first + table.chunks[0]].tolist()
+    return rows
+
+
+def _listed(file: h5py.File, name: str) -> dict[int, list[tuple[int, int, int, int]]]:
+    """Chunks of a channel as `Written` has them; the newest may lack its checksum."""
+    samples, found = file[f"samples/{name}"], {}
+    checks = _readable_rows(file[f"checks/{name}"])
+
+    def note(chunk: Any) -> None:
+        number = chunk.chunk_offset[0] // samples.chunks[0]
+        if number < len(checks):
+            found[number] = [(chunk.byte_offset, chunk.size, *checks[number])]
+
+    samples.id.chunk_iter(note)
+    return found
 
 
 def _refuse_if_there_may_be_samples(path: Path, killed: Path) -> None:
@@ -128,14 +195,6 @@ def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:
     (path / LEDGER).unlink(missing_ok=True)
     write_info(path, {**info, "status": "recovered", "samples": {}})
     return Recovered(0, 0, 0, kept)
-
-
-def _can_be_opened(path: Path) -> bool:
-    try:
-        Run.load(path).close()
-    except RunFolderError:
-        return False
-    return True
 
 
 def _fill(
@@ -198,7 +257,8 @@ class _Chunks:
         self._scale = int(like.attrs["code_scale"])
         # HDF5 decompresses what it finds in a dataset of its own
         memory = h5py.File(name, "w", driver="core", backing_store=False)
-        self._one = create_channel(memory, "one", like.dtype, self.size)
+        _declare_again(memory, "one", like)
+        self._one = memory["one"]
         self._one.resize((self.size,))
 
     def read(self, number: int) -> NDArray[np.int16]:

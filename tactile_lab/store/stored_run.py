@@ -60,7 +60,8 @@ class StoredRun:
         if not file.exists():
             raise RunFolderError(
                 f"{path} has no {DATA}: the run ended ({info['status']}) before the "
-                "first sample was stored."
+                "first sample was stored. `tactile-lab show` says why; "
+                f"`tactile-lab run --again {path}` repeats it."
             )
         try:
             live = info["status"] == "running" and is_live(path)

@@ -286,3 +286,19 @@ def test_a_key_that_former_versions_wrote_into_every_run_is_passed_over(tmp_path
     assert text.count(table) == 1
     kept.write_text(text.replace(table, f'{table}interval = "0.2 s"\n'))
     assert load(str(kept)).bench.field_meter == load("demo").bench.field_meter
+
+
+def test_a_refusal_in_python_says_key_and_value_once():
+    with pytest.raises(SceneError) as refused:
+        load("demo", {"protocol.levels": None})
+    assert str(refused.value) == "protocol.levels = None: a list [...] is needed."
+
+
+def test_another_row_brings_its_own_baud_rate():
+    """The built-in bench's 19200 baud are the Kepco's, not any other source's."""
+    kept = load("demo", {"bench.coil.dialect": "kepco-bop"})
+    assert kept.bench.coil.baud == 19200
+    other = load("demo", {"bench.coil.dialect": "keithley-2400"})
+    assert other.bench.coil.baud is None
+    told = load("demo", {"bench.coil.dialect": "keithley-2400", "bench.coil.baud": 300})
+    assert told.bench.coil.baud == 300

@@ -293,18 +293,46 @@ def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, tmp_path, after):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 @pytest.mark.parametrize("byte", [3, 25, 33, 37, 200])
-def test_a_run_is_not_called_empty_because_its_ledger_is_damaged(tmp_path, byte):
-    path, _ = killed(tmp_path, after=150 * 1024)
+def test_a_run_whose_ledger_is_damaged_is_recovered_from_its_file(tmp_path, byte):
+    path, acknowledged = killed(tmp_path, after=150 * 1024)
     ledger = bytearray((path / "ledger.bin").read_bytes())
     ledger[byte] ^= 0x10
     (path / "ledger.bin").write_bytes(ledger)
+    assert recover(path).samples >= acknowledged - 1024
+    assert (path / "ledger.bin").read_bytes() == ledger
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+@pytest.mark.parametrize("after", [1024, 9 * 1024])
+def test_a_killed_run_without_a_ledger_is_recovered_from_its_file(
+    bench, tmp_path, after
+):
+    """As versions before the ledger left it; a short one was called empty and sound."""
+    path, acknowledged = killed(tmp_path, after=after)
+    (path / "ledger.bin").unlink()
+    done = recover(path)
+    assert done.samples >= acknowledged - 1024
+    verdict = verify(path)
+    assert verdict.sound, verdict.findings
+    made = bench.codes(200_000)
+    with Run.load(path) as run:
+        stored = run.signal("V_K").scope_codes(0, run.samples)
+        np.testing.assert_array_equal(stored, made[1, : run.samples])
+        assert after == 1024 or run.table("current").shape[0] > 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(tmp_path):
+    path, _ = killed(tmp_path, after=150 * 1024)
+    (path / "ledger.bin").unlink()
+    data = bytearray((path / "data.h5").read_bytes())
+    data[:64] = bytes(64)
+    data += bytes(1 << 18)  # as long as a file with samples
+    (path / "data.h5").write_bytes(data)
     before = {file.name: file.read_bytes() for file in path.iterdir() if file.is_file()}
     with pytest.raises(RunFolderError, match=r"may hold samples\. Nothing was changed"):
         recover(path)
     assert before == {f.name: f.read_bytes() for f in path.iterdir() if f.is_file()}
-    ledger[byte] ^= 0x10  # the copy that somebody had
-    (path / "ledger.bin").write_bytes(ledger)
-    assert recover(path).samples >= 149 * 1024
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")

@@ -1,0 +1,112 @@
+"""Damaged, odd and foreign input to the verbs: one message, its code, no traceback."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tactile_lab.store.folder import INFO, RunFolder, is_live
+
+
+@pytest.fixture
+def empty_run(tmp_path):
+    folder = RunFolder.create(tmp_path / "runs", "empty", {"protocol": "pulses"})
+    folder.finish("faulted", reason="the scope did not answer")
+    return folder.path
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {"status": 5},
+        {"status": None},
+        {"started": "yesterday"},
+        {"notes": ["Ada"]},
+        {"duration_s": "long"},
+        {"parameters": 3},
+        {"simulated": "x"},
+    ],
+)
+def test_one_odd_run_does_not_hide_the_others(tactile_lab, empty_run, odd):
+    folder = RunFolder.create(empty_run.parent, "odd", {})
+    folder.finish("complete")
+    info = json.loads((folder.path / INFO).read_text())
+    (folder.path / INFO).write_text(json.dumps({**info, **odd}))
+    listed = tactile_lab("runs", empty_run.parent)
+    assert listed.code == 0
+    assert empty_run.name in listed.out
+    (line,) = (line for line in listed.out.splitlines() if folder.path.name in line)
+    assert "unreadable" in line
+    assert "damaged" in line
+
+
+@pytest.mark.parametrize("verb", [("identify", "V_GS"), ("report",), ("export",)])
+def test_a_run_without_samples_says_what_to_do(tactile_lab, empty_run, verb):
+    name, *rest = verb
+    extra = ("--to", "csv") if name == "export" else ()
+    answer = tactile_lab(name, empty_run, *rest, *extra)
+    assert answer.code == 2
+    assert "before the first sample" in answer.err
+    assert "run --again" in answer.err
+
+
+@pytest.mark.parametrize("verb", ["show", "recover", "report"])
+def test_a_file_in_place_of_a_run_is_no_damage(tactile_lab, empty_run, verb):
+    answer = tactile_lab(verb, empty_run / INFO)
+    assert answer.code == 2
+    assert "is no run folder: it is no folder" in answer.err
+    assert "damaged" not in answer.err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pipes with names")
+def test_a_pipe_is_no_scene(tactile_lab, tmp_path):
+    os.mkfifo(tmp_path / "scene.toml")
+    answer = tactile_lab("plan", tmp_path / "scene.toml")
+    assert answer.code == 2
+    assert "is a pipe" in answer.err
+
+
+def test_a_force_too_small_for_a_number_is_not_zero(tactile_lab):
+    answer = tactile_lab("plan", "demo", "--set", 'protocol.levels=["1e-400 N"]')
+    assert answer.code == 2
+    assert "1e-400 N" in answer.err
+
+
+def test_a_log_of_the_served_bench_that_cannot_be_written(tactile_lab, tmp_path):
+    answer = tactile_lab("serve-bench", "--log", tmp_path / "none" / "log")
+    assert answer.code == 2
+    assert "--log" in answer.err
+
+
+def test_a_protocol_that_leaves_the_program_is_refused(tactile_lab, tmp_path):
+    (tmp_path / "leaves.py").write_text("import sys\nsys.exit(7)\n")
+    answer = tactile_lab("plan", tmp_path / "leaves.py")
+    assert answer.code == 2
+    assert "SystemExit: 7 (line 2)" in answer.err
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device of Linux")
+def test_a_full_disk_under_stdout_is_told():
+    with open("/dev/full", "w") as full:
+        verb = [sys.executable, "-m", "tactile_lab", "runs", "--json", "."]
+        done = subprocess.run(
+            verb, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "No space left" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
+def test_who_asks_whether_a_run_is_live_never_stops_its_writer(tmp_path):
+    """A reader took the writer's own lock: a second reader, or the writer, lost it."""
+    import fcntl
+
+    folder = RunFolder.create(tmp_path, "live", {})
+    assert is_live(folder.path)
+    folder.finish("complete")
+    with (folder.path / "log.jsonl").open() as other:
+        fcntl.flock(other, fcntl.LOCK_SH)
+        assert not is_live(folder.path)
