@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.rate_force import eq15_rate
 from tactile_lab.analysis.transfer import Transfer
 from tactile_lab.magnetics import Magnet
@@ -75,7 +76,7 @@ def page(
             "Fig. 2c", "no numbers; tau 8.69 s in Table 1",
             f"tau {interval(bipolar['tau_s'], 's')}",
             percent(bipolar["tau_s"]["value"], table_1.tau),
-            "one code of V_C1 is 39 mV there",
+            "±50, −80 and 100 mN on the simulated bench",
         ),
         (
             "Fig. 4a-c, 5a", "no magnitudes; silent, then firing, faster with force",
@@ -183,9 +184,7 @@ paper prints.
 {picture("bipolar-summary", "Drain current and Eq. (8)")}
 
 {currents(found["bipolar"])} The decays give tau = {interval(bipolar["tau_s"], "s")};
-Table 1, which the simulated bench is made of, says 8.69 s. V_C1 rises beyond the 4.5 V
-that the 2 V range sees, so that the run takes the 5 V range: one code is 39 mV, which
-makes the steps in I_DS.
+Table 1, which the simulated bench is made of, says 8.69 s.
 
 ## Fig. 4a-c and 5a: four magnitudes
 
@@ -249,7 +248,7 @@ fitted to the spikes and the silence, gives tau =
 
 With Table 1 as printed, 50 mN stays below threshold: no spike at all (the critical
 force is {critical:.0f} mN). The bench must have sat within about 1 mV of it. With V_GS
-= 1.54141 V (preset `fig5b`, the follower's bias switched off, because it alone would
+= 1.54141 V (preset `fig5b`, the follower's bias compensated, because it alone would
 fire the circuit) there are {long["spikes"]} spikes, the last
 {long["silent_from_s"]:.1f} s after the trial's start; the paper says "approximately
 50 s". How sharp that is, in the model alone:
@@ -288,10 +287,8 @@ def percent(value: float, other: float) -> str:
 
 def interval(number: dict[str, float], unit: str) -> str:
     """A fitted number with its 95 % interval."""
-    return (
-        f"{number['value']:.3g} {unit} ({number['low_95']:.3g} to "
-        f"{number['high_95']:.3g} {unit})"
-    )
+    keys = ("value", "error", "low_95", "high_95")
+    return Estimate(*(number[key] for key in keys)).text(unit)
 
 
 def peak(results: dict[str, Any]) -> float:
@@ -347,11 +344,7 @@ def constant(fit: dict[str, Any] | None) -> str:
     """The time constant with its interval."""
     if fit is None:
         return "no time constant"
-    tau = fit["time_constant_s"]
-    return (
-        f"a time constant of {tau['value']:.3g} s ({tau['low_95']:.3g} to "
-        f"{tau['high_95']:.3g} s)"
-    )
+    return f"a time constant of {interval(fit['time_constant_s'], 's')}"
 
 
 def currents(results: dict[str, Any]) -> str:

@@ -107,11 +107,10 @@ def periodic() -> Plot:
         name="periodic",
         caption=f"(a) I_DS under {STIMULI} stimuli of {LEVEL * 1e3:g} mN, mean of "
         f"three specimens and, shaded, its standard error ({TOLERANCES}); bands: "
-        "holds. (b) "
-        "The same aligned on each stimulus: first, second and last, and the mean of "
-        "all. What V_P loses during a stimulus it lacks in the next. The paper's "
-        "stimuli are not given.",
-        x_label="Time, in b from each stimulus",
+        "holds. (b) The same, its time from the beginning of each stimulus: first, "
+        "second and last, and the mean of all. What V_P loses during a stimulus it "
+        "lacks in the next. The paper's stimuli are not given.",
+        x_label="Time",
         x_unit="s",
         beside=True,
         letters=True,

@@ -166,8 +166,8 @@ def _by_circuit(run: Measurement, trial: MeasuredTrial) -> Conclusion:
         return Conclusion((), {"tau_s": None}, (f"No tau of the film: {why}.",))
     said = (
         f"By the circuit's own law, Eq. (15) with V_P(t), the film leaks with tau = "
-        f"{law.tau.text('s')} and {_gate(law)}; the rates lie within "
-        f"{show(law.rms, 'Hz', 2)} of it (rms)."
+        f"{law.tau.text('s')} and {_gate(law)} (95 %, the circuit's other parameters "
+        f"as believed); the rates lie within {show(law.rms, 'Hz', 2)} of it (rms)."
     )
     measured = trial.response.silent
     if law.silent_from is not None and measured is not None:

@@ -39,11 +39,20 @@ class Estimate:
         return (self.high - self.low) / 2
 
     def text(self, unit: str, factor: float = 1.0) -> str:
-        """For a person: "3.1 s (2.9 to 3.3 s, 95 %)"; `factor`: from SI to `unit`."""
-        low, high = _plain(self.low * factor), _plain(self.high * factor)
+        """For a person: "3.1 s (2.9 to 3.3 s, 95 %)"; `factor`: from SI to `unit`.
+
+        Three digits, or as many more as tell the interval's ends apart.
+        """
+        digits = 3
+        if self.half > 0 and self.value:
+            digits = max(3, math.floor(math.log10(abs(self.value) / self.half)) + 1)
+        value, low, high = (
+            printed(f"{number * factor:.{digits}g}")
+            for number in (self.value, self.low, self.high)
+        )
         if self.value == self.low < self.high:
             return f"{low} {unit} (at its bound; below {high} {unit}, 95 %)"
-        return f"{_plain(self.value * factor)} {unit} ({low} to {high} {unit}, 95 %)"
+        return f"{value} {unit} ({low} to {high} {unit}, 95 %)"
 
     def widened(self, *halves: float) -> Estimate:
         """With further independent causes of error, half-widths of their 95 % bands."""
@@ -102,10 +111,6 @@ class Line:
             scatter,
             spread,
         )
-
-
-def _plain(value: float) -> str:
-    return printed(f"{value:.3g}")
 
 
 def correlated(residual: FloatArray, group: FloatArray | None = None) -> float:

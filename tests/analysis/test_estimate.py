@@ -1,0 +1,19 @@
+"""A number with its interval, as it is printed."""
+
+import pytest
+
+from tactile_lab.analysis.estimate import Estimate
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [
+        (3.1, 0.2, "3.1 s (2.9 to 3.3 s, 95 %)"),
+        (8.6923, 0.03, "8.69 s (8.66 to 8.72 s, 95 %)"),
+        (8.69, 0.001, "8.69 s (8.689 to 8.691 s, 95 %)"),
+        (-2e-3, 1e-3, "−0.002 s (−0.003 to −0.001 s, 95 %)"),
+        (0.0, 0.5, "0 s (−0.5 to 0.5 s, 95 %)"),
+    ],
+)
+def test_the_ends_of_an_interval_are_told_apart(value, half, text):
+    assert Estimate(value, half / 2, value - half, value + half).text("s") == text
