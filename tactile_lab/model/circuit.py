@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError
+from tactile_lab.model import derived
 from tactile_lab.quantity import Unit
 from tactile_lab.table import INTERNAL, SceneTable
 
@@ -121,7 +122,7 @@ class Circuit(SceneTable):
     )
 
     def __post_init__(self) -> None:
-        for name, unit in _units().items():
+        for name, unit in units().items():
             value = getattr(self, name)
             if value is None and name in _PUT:
                 continue
@@ -175,9 +176,7 @@ class Circuit(SceneTable):
     @property
     def k_F(self) -> float:
         """Piezoelectric voltage per force, Eqs. (3)-(6), V/N."""
-        return float(
-            6 * self.g31 * self.h * (self.L - self.d) / (self.a * self.b * self.b)
-        )
+        return derived.k_F(self)
 
     @property
     def tau_L(self) -> float:
@@ -187,7 +186,7 @@ class Circuit(SceneTable):
     @property
     def tau_A(self) -> float:
         """Time constant of node A without the PiezoFET, Eq. (16), s."""
-        return self.C1 / (1 / self.R1 + 1 / self.R2)
+        return derived.tau_A(self)
 
     @property
     def tau_K(self) -> float:
@@ -221,22 +220,11 @@ class Circuit(SceneTable):
 
         Infinite where I_bias alone reaches it.
         """
-        current = self.threshold_current
-        if current <= -self.I_T1s:
-            return math.inf
-        U = self.V_T * math.log1p(current / self.I_T1s)
-        if self.t1 == "emitter_resistor":
-            U += self.R3 * current
-        return self.V_S - U
-
-    @property
-    def threshold_current(self) -> float:
-        """Collector current that just keeps V_C2 at V_fire, A."""
-        return self.fire_voltage / self.R_L - self.I_bias
+        return derived.critical_V_C1(self, self.t1 == "direct")
 
 
 @cache
-def _units() -> dict[str, Unit]:
+def units() -> dict[str, Unit]:
     """Unit and limits of every parameter that is a number."""
     return {
         name: unit

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tactile_lab.model import derived
 from tactile_lab.model.circuit import Circuit, FloatArray
 
 
@@ -41,15 +42,9 @@ def V_C1_slope(circuit: Circuit, V_P: ArrayLike, V_C1: ArrayLike) -> FloatArray:
 def critical_force(circuit: Circuit) -> float:
     """The least force at which a film that does not leak would keep it firing, N.
 
-    Held from rest, it moves node A to where T1's current just keeps V_C2 at V_fire:
-    there I_DS, Eq. (8), draws what R1 and R2 give, Eq. (16). NaN where no force does.
+    NaN where no force does; see `derived.critical_force`.
     """
-    c, V = circuit, circuit.critical_V_C1
-    drawn = (c.V_S - V) / c.R1 - V / c.R2
-    if not (math.isfinite(V) and V > 0 and drawn > 0 and c.k_F):
-        return math.nan
-    gate = c.m * c.V_T * math.log(drawn / (c.I_S * -math.expm1(-V / c.V_T)))
-    return (gate - c.V_GS) / c.k_F
+    return derived.critical_force(circuit, circuit.critical_V_C1, circuit.k_F)
 
 
 def I_C(circuit: Circuit, V_C1: ArrayLike) -> FloatArray:
@@ -130,15 +125,11 @@ def rest_V_C1(circuit: Circuit, V_P: float = 0.0) -> float:
 @lru_cache(maxsize=256)
 def rest_point(circuit: Circuit) -> tuple[float, float]:
     """V_C1 and V_C2 at equilibrium, V; V_C2 as if it did not fire."""
-    if circuit.saturation:
-        # compiled: a thousand evaluations
-        from tactile_lab.model.packed import parameters
-        from tactile_lab.model.rest_pair import rest_of_both
+    from tactile_lab.model.packed import parameters
+    from tactile_lab.model.rest_pair import rest_of_both
 
-        V_C1, V_C2 = rest_of_both(parameters(circuit))
-        return float(V_C1), float(V_C2)
-    V_C1 = rest_V_C1(circuit)
-    return V_C1, rest_V_C2(circuit, V_C1)
+    V_C1, V_C2 = rest_of_both(parameters(circuit))
+    return float(V_C1), float(V_C2)
 
 
 def fires_at_rest(circuit: Circuit) -> bool:

@@ -1,4 +1,4 @@
-"""The equilibrium of V_C1 and V_C2 where T1 saturates."""
+"""The equilibrium of V_C1 and V_C2, as if it did not fire."""
 
 from __future__ import annotations
 
@@ -9,10 +9,18 @@ import numpy as np
 
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
-from tactile_lab.model.integrator import TAU_L, V_S
-from tactile_lab.model.node_a import LAMBDA, V_T, B_at
+from tactile_lab.model.integrator import TAU_L, V_S, Q_at
+from tactile_lab.model.node_a import LAMBDA, V_T, B_at, equilibrium
 from tactile_lab.model.pair import flow
-from tactile_lab.model.transistor import I_S1, T1_BIAS, T1_C1, T1_C2, TO_A, TO_C2
+from tactile_lab.model.transistor import (
+    I_S1,
+    SATURATES,
+    T1_BIAS,
+    T1_C1,
+    T1_C2,
+    TO_A,
+    TO_C2,
+)
 
 
 @inner
@@ -32,14 +40,24 @@ def rest_V_C2_at(B: float, y: float, par: FloatArray, f: FloatArray) -> float:
             high = v
 
 
+@inner
+def rest_of_cascade(par: FloatArray) -> tuple[float, float]:
+    """Root of Eq. (16), then of Eq. (18), V: V_C2 does not act back."""
+    y = equilibrium(B_at(0.0, par), par)
+    return y, Q_at(y, par)
+
+
 def _build(stamp: int) -> Callable[..., Any]:
     @entry
     def rest_of_both(par: FloatArray) -> tuple[float, float]:
-        """Root of Eqs. (16) and (18) together, V: one halving inside another.
+        """Root of Eqs. (16) and (18), V.
 
-        V_C1's slope, with V_C2 at rest for each V_C1, falls strictly too.
+        Where T1 saturates, of both together: one halving inside another, for V_C1's
+        slope, with V_C2 at rest for each V_C1, falls strictly too.
         """
         _ = stamp
+        if par[SATURATES] == 0.0:
+            return rest_of_cascade(par)
         f = np.empty(6)
         B = B_at(0.0, par)
         highest = par[V_S] + par[T1_BIAS] / (par[LAMBDA] * par[T1_C1])

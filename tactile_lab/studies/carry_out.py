@@ -5,26 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.planning.plan import plan
+from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, write
-from tactile_lab.studies.points import Points
-from tactile_lab.studies.shelf import NAME, Shelf
+from tactile_lab.studies.points import Points, Task
+from tactile_lab.studies.shelf import Batch, Shelf
 from tactile_lab.studies.study import Study
-from tactile_lab.studies.workers import Task, batch_of, workers
+from tactile_lab.studies.workers import Alone, Workers, workers
 
 LONG = 1.0
 """Seconds a batch should take: little to lose, enough to be worth sending."""
-MOST = 20_000
+MOST = 100_000
 """Points of one batch."""
 FIRST = 3
 """Points whose time tells what the others will take."""
-AT_ONCE = 50_000
-"""Points whose addresses are made at a time."""
 SHELF = "points"
 """Folder of finished points, shared by all studies beside it."""
 
@@ -75,8 +75,8 @@ def forecast(study: Study, out: Path) -> Forecast:
 
     On real instruments nothing is tried: the plan of a run tells its time.
     """
-    points = study_points(study, out)
-    missing = _missing(study, addresses(study, points), Shelf(out / SHELF))
+    points, named = study_points(study, out), addresses(study)
+    missing = _missing(study, named, Shelf(out / SHELF))
     size = study.design.size
     seconds, reason = None, ""
     if missing.size and study.on == "bench":
@@ -85,9 +85,9 @@ def forecast(study: Study, out: Path) -> Forecast:
         tried = []
         for number in missing[:FIRST]:
             began = time.perf_counter()
-            batch = batch_of(points, _task(study, np.array([number]), [b""]))
+            batch = points.batch(_task(study, named, np.array([number])))
             tried.append(time.perf_counter() - began)
-            reason = reason or batch.reasons[0]
+            reason = reason or batch.reasons.get(0, "")
         seconds = min(tried)  # the first one compiles
     return Forecast(size, size - missing.size, seconds, reason)
 
@@ -118,36 +118,45 @@ def carry_out(
         NotFoundError, SceneError: the scheduler cannot be used.
     """
     points, shelf = study_points(study, out), Shelf(out / SHELF)
-    named = addresses(study, points)
+    named = addresses(study)
     missing = _missing(study, named, shelf)
+    done, failed = study.design.size - missing.size, 0
+    there = done
     if missing.size:
         with workers(study, points, count, scheduler) as crew:
-            done, failed = study.design.size - missing.size, 0
-            there, pace = done, _Pace(crew.count)
+            pace = _Pace(crew.count)
             tell(Progress(done, study.design.size, there, failed, crew.count))
-            for batch in crew.batches(_tasks(study, missing, named, pace)):
+            for batch in _batches(study, missing, named, points, crew, pace):
                 shelf.put(batch)
-                pace.tell(len(batch.addresses))
-                done += len(batch.addresses)
-                failed += sum(map(bool, batch.reasons))
+                size = batch.addresses.size
+                pace.tell(size)
+                done, failed = done + size, failed + len(batch.reasons)
                 tell(Progress(done, study.design.size, there, failed, crew.count))
     found = gathered(study, shelf, shelf.find(named))
     write(found, out / study.name)
     return found
 
 
-def addresses(study: Study, points: Points) -> NDArray[np.bytes_]:
-    """The address of each point, in the order of their numbers."""
-    design = study.design
-    found = np.empty(design.size, dtype=NAME)
-    for first in range(0, design.size, AT_ONCE):
-        numbers = np.arange(first, min(first + AT_ONCE, design.size))
-        at = zip(design.values(numbers), design.repeats(numbers), strict=True)
-        found[numbers] = [points.address(values, repeat) for values, repeat in at]
-    return found
+def _batches(
+    study: Study,
+    missing: NDArray[np.intp],
+    named: NDArray[np.void],
+    points: Points,
+    crew: Workers,
+    pace: _Pace,
+) -> Iterator[Batch]:
+    """All that is missing, as it is finished.
+
+    The first point of a model is computed here, so that code is compiled once and
+    processes that fork have it.
+    """
+    tasks = _tasks(study, missing, named, pace)
+    if study.on == "model":
+        yield from Alone(points).batches(islice(tasks, 1))
+    yield from crew.batches(tasks)
 
 
-def _missing(study: Study, named: NDArray[np.bytes_], shelf: Shelf) -> NDArray[np.intp]:
+def _missing(study: Study, named: NDArray[np.void], shelf: Shelf) -> NDArray[np.intp]:
     """Numbers of the points to compute, in the order in which they are."""
     _, first = np.unique(named, return_index=True)  # two points may be one
     first = np.sort(first)
@@ -160,19 +169,19 @@ def _missing(study: Study, named: NDArray[np.bytes_], shelf: Shelf) -> NDArray[n
 def _tasks(
     study: Study,
     missing: NDArray[np.intp],
-    named: NDArray[np.bytes_],
+    named: NDArray[np.void],
     pace: _Pace,
 ) -> Iterator[Task]:
     at = 0
     while at < missing.size:
         numbers = missing[at : at + (1 if study.on == "bench" else pace.points())]
         at += numbers.size
-        yield _task(study, numbers, named[numbers].tolist())
+        yield _task(study, named, numbers)
 
 
-def _task(study: Study, numbers: NDArray[np.intp], named: list[bytes]) -> Task:
+def _task(study: Study, named: NDArray[np.void], numbers: NDArray[np.intp]) -> Task:
     design = study.design
-    return named, design.values(numbers), design.repeats(numbers)
+    return Task(named[numbers], design.columns(numbers), design.repeats(numbers))
 
 
 class _Pace:

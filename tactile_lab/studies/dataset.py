@@ -12,7 +12,8 @@ import tomli_w
 from numpy.typing import NDArray
 
 from tactile_lab.studies.axes import Axis
-from tactile_lab.studies.shelf import Column, Places, Shelf
+from tactile_lab.studies.column import Column, Rows
+from tactile_lab.studies.shelf import Places, Shelf
 from tactile_lab.studies.study import Study
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Gathered:
 
     study: Study
     columns: dict[str, Column]
-    reasons: NDArray[np.str_]
+    reasons: NDArray[np.object_]
 
     @property
     def failed(self) -> int:
@@ -47,7 +48,7 @@ class Gathered:
         return {
             name: column.reshape(shape)
             for name, column in self.columns.items()
-            if not isinstance(column, list)
+            if not isinstance(column, Rows)
         }
 
     def unit(self, name: str) -> str:
@@ -67,15 +68,18 @@ class Gathered:
         shape, dimensions = design.shape, design.dimensions
         variables: dict[str, Any] = {}
         for name, column in self.columns.items():
-            if not isinstance(column, list):
+            if not isinstance(column, Rows):
                 unit = {"units": self.unit(name)}
                 variables[name] = (dimensions, column.reshape(shape), unit)
                 continue
-            sizes = np.array([row.size for row in column]).reshape(shape)
             unit = {"units": self.unit(name)}
-            variables[name] = (f"{name}_sample", np.concatenate(column), unit)
+            variables[name] = (f"{name}_sample", column.values, unit)
             about = {"sample_dimension": f"{name}_sample"}
-            variables[f"{name}_size"] = (dimensions, sizes, about)
+            variables[f"{name}_size"] = (
+                dimensions,
+                column.sizes.reshape(shape),
+                about,
+            )
         variables["reason"] = (dimensions, self.reasons.reshape(shape))
         coordinates = {
             name: (dimension, _labels(axis, values), {"units": axis.unit})
@@ -91,12 +95,7 @@ class Gathered:
 
 def gathered(study: Study, shelf: Shelf, places: Places) -> Gathered:
     """All points of a study that has been computed."""
-    names = [one.name for one in study.kept]
-    columns, reasons = shelf.gather(places, names)
-    missing = np.full(study.design.size, np.nan)
-    return Gathered(
-        study, {name: columns.get(name, missing) for name in names}, reasons
-    )
+    return Gathered(study, *shelf.gather(places, [one.name for one in study.kept]))
 
 
 def write(found: Gathered, folder: Path) -> None:

@@ -92,23 +92,46 @@ class Design:
         """Number of points, repeats counted."""
         return math.prod(self.shape)
 
-    def values(self, points: Numbers) -> list[tuple[Any, ...]]:
-        """The value of each axis at each of the points, axes in their order."""
+    def columns(self, points: Numbers) -> list[Sequence[Any] | FloatArray]:
+        """Of each axis, in their order, its values at these points.
+
+        An array where they are floating-point numbers, else a list.
+        """
         at = np.unravel_index(np.asarray(points), self.shape) if self.shape else ()
-        columns: dict[str, list[Any]] = {}
+        found: dict[str, Sequence[Any] | FloatArray] = {}
         for group, place in zip(self.groups, at, strict=False):
             for axis in group:
-                columns[axis.key] = [axis.values[i] for i in place]
+                table = self._tables[axis.key]
+                found[axis.key] = (
+                    table[place]
+                    if isinstance(table, np.ndarray)
+                    else [table[i] for i in place]
+                )
         if self.drawn:
             rows = self._draws[at[len(self.groups)]]
             for axis, column in zip(self.drawn, rows.T, strict=True):
-                columns[axis.key] = column.tolist()
-        chosen = [columns[axis.key] for axis in self.axes]
-        return list(zip(*chosen, strict=True)) if chosen else [()] * len(points)
+                found[axis.key] = column
+        return [found[axis.key] for axis in self.axes]
 
-    def repeats(self, points: Numbers) -> list[int]:
+    def values(self, points: Numbers) -> list[tuple[Any, ...]]:
+        """The value of each axis at each of the points, axes in their order."""
+        columns = self.columns(points)
+        return by_point(columns) if columns else [()] * len(points)
+
+    @cached_property
+    def _tables(self) -> dict[str, Sequence[Any] | FloatArray]:
+        """Values of the axes that have them, as an array where all are floats."""
+        return {
+            axis.key: np.array(axis.values)
+            if all(isinstance(value, float) for value in axis.values)
+            else axis.values
+            for axis in self.axes
+            if axis.spread is None
+        }
+
+    def repeats(self, points: Numbers) -> NDArray[np.intp]:
         """Which repeat, from 0, each of the points is."""
-        return [int(point) % self.repeat for point in points]
+        return np.asarray(points) % self.repeat
 
     def coordinates(self) -> Iterator[tuple[str, str, Axis, list[Any]]]:
         """(name, its dimension, axis, values along it) for each axis."""
@@ -164,6 +187,12 @@ class Design:
             one[:, i] = second[:, i]
             mixed.append(one)
         return np.concatenate([first, second, *mixed])
+
+
+def by_point(columns: Sequence[Sequence[Any] | FloatArray]) -> list[tuple[Any, ...]]:
+    """Columns turned: a tuple for each point, numbers as Python's own."""
+    plain = [c.tolist() if isinstance(c, np.ndarray) else c for c in columns]
+    return list(zip(*plain, strict=True))
 
 
 def checked(design: Design) -> Design:

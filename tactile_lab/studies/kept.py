@@ -11,25 +11,32 @@ from types import CodeType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError, SceneError, choices, fault_in
+from tactile_lab.spikes.trains import Trains
+from tactile_lab.studies.column import Column, Rows, Value
 
-NAMED = {
-    "spike_count": ("len(spikes)", ""),
-    "spike_times": ("spikes", "s"),
-    "first_spike": ("spikes[0] if len(spikes) else nan", "s"),
-    "last_spike": ("spikes[-1] if len(spikes) else nan", "s"),
-    "mean_rate": (
-        "(len(spikes) - 1) / (spikes[-1] - spikes[0]) if len(spikes) > 1 else nan",
-        "Hz",
-    ),
-    "critical_force": ("critical_force(circuit)", "N"),
+OF_TRAINS: Mapping[str, Callable[[Trains], Column]] = {
+    "spike_count": lambda trains: trains.count.astype(np.float64),
+    "spike_times": lambda trains: Rows(trains.times, trains.count),
+    "first_spike": lambda trains: trains.first,
+    "last_spike": lambda trains: trains.last,
+    "mean_rate": lambda trains: trains.mean_rate,
 }
-"""Names that stand for an expression, and its unit."""
+"""Names that stand for something of the spikes, computed for many points at once."""
+CRITICAL_FORCE = "critical_force(circuit)"
+NAMED = {
+    "spike_count": ("spike_count", ""),
+    "spike_times": ("spike_times", "s"),
+    "first_spike": ("first_spike", "s"),
+    "last_spike": ("last_spike", "s"),
+    "mean_rate": ("mean_rate", "Hz"),
+    "critical_force": (CRITICAL_FORCE, "N"),
+}
+"""Names that stand for one of these or an expression, and its unit."""
+OF_A_POINT = frozenset({"result", "run", "answer", "circuit", "scene"})
+"""What an expression may use of a point beside its spikes and the force."""
 _FUNCTION = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]*)")
-
-Value = float | NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -38,8 +45,8 @@ class Kept:
 
     Attributes:
         name: of its column.
-        expression: Python, with the names that `seen` gives a point; or
-            ``file.py:function``, called with the point's run (or the model's result).
+        expression: one of `OF_TRAINS`; or Python, with the names that a point gives;
+            or ``file.py:function``, called with the point's run (or model's result).
         source: the text of the function's file; "" for an expression.
         unit: SI; "" where it has none, or only its author knows it.
     """
@@ -49,6 +56,21 @@ class Kept:
     source: str = ""
     unit: str = ""
 
+    @property
+    def of_spikes(self) -> bool:
+        """Whether a point's spikes and force are all it needs."""
+        if self.source:
+            return False
+        if self.expression in OF_TRAINS:
+            return True
+        return not OF_A_POINT & _names(_compiled(self.name, self.expression))
+
+    @property
+    def needs_times(self) -> bool:
+        """Whether number, first and last of the spikes are not enough."""
+        short = {*OF_TRAINS, CRITICAL_FORCE} - {"spike_times"}
+        return self.expression not in short
+
     def of(self, names: Mapping[str, Any]) -> Value:
         """The value at a point: a number, or a row of numbers (shape (n,)).
 
@@ -56,7 +78,10 @@ class Kept:
             ParameterError: the expression or function fails, or gives something else.
         """
         try:
-            if self.source:
+            if self.expression in OF_TRAINS:
+                column = OF_TRAINS[self.expression](Trains.of_one(names["spikes"]))
+                value = column.values if isinstance(column, Rows) else column[0]
+            elif self.source:
                 value = _function(self)(names.get("run", names.get("result")))
             else:
                 # the study's author wrote it, as they write protocols in Python
@@ -77,6 +102,12 @@ class Kept:
 @cache
 def _compiled(name: str, expression: str) -> CodeType:
     return compile(expression, f"keep.{name}", "eval")
+
+
+def _names(code: CodeType) -> set[str]:
+    """All names that a piece of Python looks up, in its lambdas, too."""
+    inner = (one for one in code.co_consts if isinstance(one, CodeType))
+    return set(code.co_names).union(*map(_names, inner))
 
 
 @cache
@@ -123,6 +154,8 @@ def _kept(name: str, text: str, folder: Path) -> Kept:
     if text.isidentifier() and text not in NAMED:
         raise SceneError(f'keep has no "{text}"; {choices(text, NAMED)}')
     expression, unit = NAMED.get(text, (text, ""))
+    if expression in OF_TRAINS:
+        return Kept(name, expression, unit=unit)
     try:
         _compiled(name, expression)
     except (SyntaxError, ValueError) as reason:

@@ -1,41 +1,51 @@
-"""One point of a study: its address, and what is kept of it."""
+"""Points of a study: one after another, or many circuits at once."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import fields, replace
-from functools import cache, cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.errors import TactileLabError, UnsafeError
-from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import critical_force
 from tactile_lab.planning.preview import DEFAULT_TOLERANCE, model
 from tactile_lab.planning.timeline import Timeline, timeline
-from tactile_lab.plugins import registered
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
-from tactile_lab.studies.axes import Axis, changed
-from tactile_lab.studies.kept import Value
+from tactile_lab.spikes.trains import Trains
+from tactile_lab.studies.addresses import Axes, Columns, Group, seeds_of
+from tactile_lab.studies.axes import changed
+from tactile_lab.studies.column import Column, Rows, Value, packed, placed
+from tactile_lab.studies.design import by_point
+from tactile_lab.studies.kept import CRITICAL_FORCE, OF_TRAINS, Kept
+from tactile_lab.studies.shelf import Batch
 from tactile_lab.studies.study import Study
 from tactile_lab.trial import Protocol
 
-ADDRESS = 16
-"""Bytes of an address."""
-REGISTERED = (
-    "tactile_lab.drivers",
-    "tactile_lab.far_ends",
-    "tactile_lab.benches",
-    "tactile_lab.protocols",
-)
-"""Groups of entry points whose packages a point may depend on."""
+SCENES = 64
+"""Scenes that differ in more than numbers of the sensor, kept with their force."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Some points to compute.
+
+    Attributes:
+        addresses: of each, of dtype `NAME`.
+        columns: of each axis the values, see `Design.columns`.
+        repeats: which repeat each is, from 0.
+    """
+
+    addresses: NDArray[np.void]
+    columns: Columns
+    repeats: NDArray[np.intp]
 
 
 class Points:
@@ -49,38 +59,45 @@ class Points:
     def __init__(self, study: Study, runs: Path | None = None) -> None:
         self._study = study
         self._runs = runs
-        self._axes = study.design.axes
-        sensor = study.scene.sensor
-        self._sensor = {
-            f.name: value
-            for f in fields(Circuit)
-            if isinstance(value := getattr(sensor, f.name), float)
-        }
-        self._numbers = np.array(list(self._sensor.values()))
-        self._columns = {name: i for i, name in enumerate(self._sensor)}
-        self._others = tuple(one for one in self._axes if not self._of_sensor(one))
-        self._last: tuple[tuple[Any, ...], Scene, Timeline] | None = None
-        self._digests: dict[tuple[Any, ...], bytes] = {}
+        self._axes = Axes(study.design.axes, study.scene)
+        self._with = lru_cache(SCENES)(self._scene_and_force)
 
-    def address(self, values: Sequence[Any], repeat: int) -> bytes:
-        """What tells this point from every other: scene, code, seed, what is kept.
+    def batch(self, task: Task) -> Batch:
+        """What is kept of the points of a task; one that fails keeps its reason.
 
-        Hexadecimal digits. A point that the scene refuses has one, too.
+        Raises:
+            UnsafeError: a coil's state is not known: nothing goes on.
         """
-        sensor, others = self._split(values)
-        digest = self._digests.get(others)
-        if digest is None:
-            digest = self._digests[others] = self._digest(others)
-        numbers = self._numbers.copy()
-        for name, value in sensor.items():
-            numbers[self._columns[name]] = value
-        found = hashlib.blake2b(digest, digest_size=ADDRESS)
-        found.update(numbers.tobytes())
-        found.update(self._seed(repeat).to_bytes(8, "little"))
-        return found.hexdigest().encode()
+        size = task.addresses.size
+        parts: dict[str, list[tuple[NDArray[np.intp], Column]]]
+        parts = {one.name: [] for one in self._study.kept}
+        reasons: dict[int, str] = {}
+        alone = np.ones(size, dtype=bool)
+        for group in self._axes.groups(task.columns, size) if self._together else ():
+            rows, columns = self._solved(group)
+            alone[rows] = False
+            for name, column in columns.items():
+                parts[name].append((rows, column))
+        left = np.flatnonzero(alone)
+        found: list[Mapping[str, Value] | None] = []
+        for row in left.tolist():
+            values = by_point([column[row : row + 1] for column in task.columns])
+            try:
+                one = self.compute(values[0] if values else (), int(task.repeats[row]))
+            except UnsafeError:
+                raise
+            except Exception as error:  # whatever a user's protocol or function raises
+                reasons[row] = _why(error)
+                found.append(None)
+            else:
+                found.append(one)
+        for name, some in parts.items() if left.size else ():
+            some.append((left, packed([None if r is None else r[name] for r in found])))
+        columns = {name: placed(some, size) for name, some in parts.items()}
+        return Batch(task.addresses, columns, reasons)
 
     def compute(self, values: Sequence[Any], repeat: int) -> dict[str, Value]:
-        """What is kept of the point, by name.
+        """What is kept of one point, by name.
 
         Raises:
             TactileLabError: the point is refused or fails.
@@ -91,12 +108,73 @@ class Points:
 
     # --- the model alone
 
+    @cached_property
+    def _together(self) -> bool:
+        """Whether many circuits can be solved at once: what is kept needs no more."""
+        needed = (one for one in self._study.kept if one.expression != CRITICAL_FORCE)
+        return (
+            self._study.on == "model"
+            and all(one.of_spikes for one in needed)
+            and self._alike
+        )
+
+    def _solved(self, group: Group) -> tuple[NDArray[np.intp], dict[str, Column]]:
+        """Those of a group's points that a batch solves, and what is kept of them.
+
+        The others are for `compute`, which says why they are refused.
+        """
+        from tactile_lab.model.batch import certain, critical_forces, records
+
+        none: tuple[NDArray[np.intp], dict[str, Column]] = (np.empty(0, np.intp), {})
+        try:
+            scene, drive = self._with(group.others)
+        except TactileLabError:
+            return none
+        circuit = scene.circuit
+        if circuit.saturation or scene.sensor.temperature is not None:
+            return none  # both voltages together; numbers that follow from others
+        many = records(circuit, group.numbers)
+        good = np.flatnonzero(certain(circuit, many, scene.start))
+        if not good.size:
+            return none
+        columns, kept = {}, self._study.kept
+        trains, solved = self._trains(scene, drive, many[good])
+        for one in kept:
+            if one.expression in OF_TRAINS:
+                columns[one.name] = OF_TRAINS[one.expression](trains)
+            elif one.expression == CRITICAL_FORCE:
+                columns[one.name] = critical_forces(circuit, many[good])
+            else:
+                columns[one.name], right = _each(one, trains, drive)
+                solved &= right
+        rows = np.flatnonzero(solved)
+        return group.rows[good[rows]], {
+            name: column.take(rows) if isinstance(column, Rows) else column[rows]
+            for name, column in columns.items()
+        }
+
+    def _trains(
+        self, scene: Scene, drive: Timeline, many: NDArray[np.void]
+    ) -> tuple[Trains, NDArray[np.bool_]]:
+        """The spikes of many circuits in a scene, and which were solved."""
+        from tactile_lab.model.batch import spike_trains
+
+        return spike_trains(
+            scene.circuit,
+            many,
+            drive.force,
+            until=drive.duration,
+            start=scene.start,
+            tolerance=DEFAULT_TOLERANCE,
+            keep_times=any(one.needs_times for one in self._study.kept),
+        )
+
     def _modelled(self, values: Sequence[Any]) -> dict[str, Value]:
         if self._alike:
-            sensor, others = self._split(values)
-            scene, drive = self._with(others)
-            changes: dict[str, Any] = dict(sensor)  # all of them numbers
-            scene = replace(scene, sensor=replace(scene.sensor, **changes))
+            (group,) = self._axes.groups([[value] for value in values], 1)
+            scene, drive = self._with(group.others)
+            sensor: dict[str, Any] = {n: float(v[0]) for n, v in group.numbers.items()}
+            scene = replace(scene, sensor=replace(scene.sensor, **sensor))
         else:
             scene = self._scene(values)
             drive = timeline(scene, through_coil=False)
@@ -106,8 +184,9 @@ class Points:
         names = {
             "result": result,
             "spikes": result.spike_times,
-            "force": drive.force,
-            **_always(scene),
+            "circuit": scene.circuit,
+            "scene": scene,
+            **_always(drive),
         }
         return {one.name: one.of(names) for one in self._study.kept}
 
@@ -116,12 +195,7 @@ class Points:
         """What the model must keep for the expressions to be evaluated."""
         told = " ".join(one.expression + one.source for one in self._study.kept)
         voltages = (n for n in ("V_P", "V_C1", "V_C2", "I_DS", "I_C") if n in told)
-        looked = (
-            "spikes" in told
-            or "result" in told
-            or any(one.source for one in self._study.kept)
-        )
-        return (*(("spikes",) if looked else ()), *voltages) or ("spikes",)
+        return ("spikes", *voltages)
 
     @cached_property
     def _alike(self) -> bool:
@@ -131,15 +205,10 @@ class Points:
             return False
         return not timeline(self._study.scene, through_coil=False).adaptive
 
-    def _with(self, others: tuple[Any, ...]) -> tuple[Scene, Timeline]:
-        """The scene with the values that are no numbers of the sensor, and its force.
-
-        Points come in order: the last one is mostly the one that is wanted again.
-        """
-        if self._last is None or self._last[0] != others:
-            scene = load(self._study.scene, changed(self._others, others))
-            self._last = (others, scene, timeline(scene, through_coil=False))
-        return self._last[1:]
+    def _scene_and_force(self, others: tuple[Any, ...]) -> tuple[Scene, Timeline]:
+        """The scene with the values of all but the sensor's numbers, and its force."""
+        scene = load(self._study.scene, changed(self._axes.others, others))
+        return scene, timeline(scene, through_coil=False)
 
     # --- the whole bench
 
@@ -149,8 +218,8 @@ class Points:
         from tactile_lab.report.from_run import read
         from tactile_lab.store.run import Run
 
-        simulated = replace(scene.simulated, seed=self._seed(repeat))
-        scene = replace(scene, simulated=simulated)
+        seed = int(seeds_of(self._study, np.array([repeat]))[0])
+        scene = replace(scene, simulated=replace(scene.simulated, seed=seed))
         with ExitStack() as stack:
             folder = self._runs or Path(
                 stack.enter_context(TemporaryDirectory(prefix="tactile-lab-"))
@@ -164,93 +233,39 @@ class Points:
             names = {
                 "run": run,
                 "spikes": np.asarray(run.spikes["time"]),
-                **_always(scene),
+                "circuit": scene.circuit,
+                "scene": scene,
+                **_always(),
             }
             if any("answer" in one.expression for one in self._study.kept):
                 names["answer"] = find(read(done.folder)).conclusion.plain
             return {one.name: one.of(names) for one in self._study.kept}
 
     def _scene(self, values: Sequence[Any]) -> Scene:
-        return load(self._study.scene, changed(self._axes, values))
+        return load(self._study.scene, changed(self._study.design.axes, values))
 
-    # --- addresses
 
-    def _of_sensor(self, axis: Axis) -> bool:
-        """Whether it varies a number of the sensor, so that a point needs no file."""
-        table, _, name = axis.key.partition(".")
-        return axis.numeric and table == "sensor" and name in self._sensor
-
-    def _split(self, values: Sequence[Any]) -> tuple[dict[str, float], tuple[Any, ...]]:
-        """The sensor's numbers by name, and the other values."""
-        sensor, others = {}, []
-        for axis, value in zip(self._axes, values, strict=True):
-            if self._of_sensor(axis):
-                sensor[axis.key.removeprefix("sensor.")] = float(value)
-            else:
-                others.append(value)
-        return sensor, tuple(others)
-
-    def _digest(self, others: tuple[Any, ...]) -> bytes:
-        """Of everything but the sensor's numbers and the seed."""
-        changes = changed(self._others, others)
+def _each(
+    kept: Kept, trains: Trains, drive: Timeline
+) -> tuple[Column, NDArray[np.bool_]]:
+    """An expression of the spikes for each point, and where it does not fail."""
+    found: list[Value | None] = []
+    names = _always(drive)
+    for spikes in trains.rows():
         try:
-            scene = load(self._study.scene, changes)
-        except TactileLabError as reason:
-            return hashlib.blake2b(f"{changes} {reason}".encode()).digest()
-        data = scene.to_dict()
-        del data["conditions"]  # a label: nothing is computed from it
-        data["simulated"].pop("seed", None)
-        for name in self._sensor:
-            data["sensor"].pop(name, None)
-        files = {str(path): path.read_text(encoding="utf-8") for path in scene.files}
-        kept = [(one.name, one.expression, one.source) for one in self._study.kept]
-        whole = json.dumps(
-            [self._study.on, data, files, kept, DEFAULT_TOLERANCE, code_digest()],
-            sort_keys=True,
-        )
-        return hashlib.blake2b(whole.encode(), digest_size=ADDRESS).digest()
-
-    def _seed(self, repeat: int) -> int:
-        """Of the simulated bench's noise; 0 where nothing is random."""
-        if self._study.on == "model":
-            return 0
-        return self._study.design.seed * 1_000_003 + repeat
+            found.append(kept.of({**names, "spikes": spikes}))
+        except TactileLabError:
+            found.append(None)
+    return packed(found), np.array([value is not None for value in found])
 
 
-def _always(scene: Scene) -> Mapping[str, Any]:
-    """Names that every expression may use."""
-    return {
-        "circuit": scene.circuit,
-        "scene": scene,
-        "critical_force": critical_force,
-        "np": np,
-        "nan": np.nan,
-    }
+def _always(drive: Timeline | None = None) -> dict[str, Any]:
+    """Names that every expression may use; the force where one is modelled."""
+    force = {} if drive is None else {"force": drive.force}
+    return {"critical_force": critical_force, "np": np, "nan": np.nan, **force}
 
 
-@cache
-def code_digest() -> str:
-    """Of the program's own source: another program computes every point anew."""
-    from importlib.util import find_spec
-
-    modules = {
-        entry.module for group in REGISTERED for entry in registered(group).values()
-    }
-    found = hashlib.blake2b(digest_size=ADDRESS)
-    for package in sorted({_top(name) for name in (__name__, *modules)}):
-        spec = find_spec(package)
-        for place in (spec.submodule_search_locations or ()) if spec else ():
-            for path in sorted(Path(place).rglob("*.py")):
-                found.update(str(path.relative_to(place)).encode())
-                found.update(path.read_bytes())
-    return found.hexdigest()
-
-
-def _top(module: str) -> str:
-    return module.partition(".")[0]
-
-
-def why(error: BaseException) -> str:
+def _why(error: BaseException) -> str:
     """The reason that a point which failed is kept with."""
     if isinstance(error, TactileLabError):
         return str(error)

@@ -1,7 +1,7 @@
 """Finished points on disk: what is computed once is never computed again.
 
 Each batch is one file, written whole or not at all; a point is found by its address
-(see `Points.address`), whichever study asked for it.
+(see `Addresses`), whichever study asked for it.
 """
 
 from __future__ import annotations
@@ -18,37 +18,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError
-from tactile_lab.studies.kept import Value
-from tactile_lab.studies.points import ADDRESS
+from tactile_lab.studies.addresses import ADDRESS, NAME
+from tactile_lab.studies.column import Column, Rows, placed
 
-NAME = f"S{2 * ADDRESS}"
-"""Addresses as numpy holds them: text, for bytes that end in 0 would be cut."""
-
-
-Column = NDArray[np.float64] | list[NDArray[np.float64]]
-"""Of each point a number, NaN where it failed; or a row of numbers."""
+DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+"""What reading a file raises that is not whole."""
 
 
 class Places(NamedTuple):
     """Where points are kept: number of the file, -1 for none, and row in it."""
 
-    file: NDArray[np.intp]
-    row: NDArray[np.intp]
+    file: NDArray[np.int32]
+    row: NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Batch:
     """What is kept of some points.
 
     Attributes:
-        addresses: of each.
-        found: by name, for each point that was computed; None for one that failed.
-        reasons: why, for each that failed; "" for the others.
+        addresses: of each, of dtype `NAME`.
+        columns: by name, a value for each point.
+        reasons: why, for each that failed, by its place among the points.
     """
 
-    addresses: Sequence[bytes]
-    found: Sequence[Mapping[str, Value] | None]
-    reasons: Sequence[str]
+    addresses: NDArray[np.void]
+    columns: Mapping[str, Column]
+    reasons: Mapping[int, str]
 
 
 class Shelf:
@@ -61,26 +57,34 @@ class Shelf:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._files: list[Path] = []
-        self._addresses: list[NDArray[np.bytes_]] = []
+        self._addresses: list[NDArray[np.void]] = []
         for path in sorted(folder.glob("*.npz")):
             self._take(path)
 
-    def find(self, addresses: NDArray[np.bytes_]) -> Places:
+    def find(self, addresses: NDArray[np.void]) -> Places:
         """Where each of these points is kept.
 
         Args:
             addresses: shape (n,), of dtype `NAME`.
         """
-        sizes = [part.size for part in self._addresses]
-        whole = np.concatenate([np.empty(0, NAME), *self._addresses])
+        places = Places(
+            np.full(addresses.size, -1, np.int32), np.zeros(addresses.size, np.int32)
+        )
+        if not self._addresses:
+            return places
+        whole = np.concatenate(self._addresses)
         order = np.argsort(whole, kind="stable")
-        at = np.searchsorted(whole, addresses, sorter=order)
-        known = at < whole.size
-        place = order[np.where(known, at, 0)] if whole.size else np.zeros_like(at)
-        known &= whole[place] == addresses if whole.size else False
-        begins = np.cumsum([0, *sizes])
+        whole = whole[order]
+        asked = np.argsort(addresses, kind="stable")  # in order, they are found fast
+        sought = addresses[asked]
+        at = np.minimum(np.searchsorted(whole, sought), whole.size - 1)
+        there = whole[at] == sought
+        begins = np.cumsum([0, *(part.size for part in self._addresses)])
+        place = order[at[there]]
         number = np.searchsorted(begins, place, side="right") - 1
-        return Places(np.where(known, number, -1), place - begins[number])
+        places.file[asked[there]] = number
+        places.row[asked[there]] = place - begins[number]
+        return places
 
     def put(self, batch: Batch) -> None:
         """Keep a batch; it is on disk when this returns.
@@ -88,14 +92,13 @@ class Shelf:
         Raises:
             RecordingError: the folder cannot be written.
         """
-        arrays = _packed(batch)
-        name = hashlib.blake2b(arrays["address"].tobytes(), digest_size=ADDRESS)
+        name = hashlib.blake2b(batch.addresses.tobytes(), digest_size=ADDRESS)
         path = self._folder / f"{name.hexdigest()}.npz"
         part = path.with_suffix(f".{os.getpid()}.part")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             with part.open("wb") as file:
-                np.savez(file, **arrays)  # type: ignore[arg-type] # names are ours
+                np.savez(file, **_arrays(batch))  # type: ignore[arg-type] # names ours
                 file.flush()
                 os.fsync(file.fileno())
             part.replace(path)
@@ -109,79 +112,66 @@ class Shelf:
                 f"{path} cannot be written: {reason.strerror or reason}. What was "
                 "finished before is kept; make room and start the study again."
             ) from reason
-        self._take(path)
+        self._files.append(path)
+        self._addresses.append(batch.addresses)
 
     def gather(
         self, places: Places, names: Sequence[str]
-    ) -> tuple[dict[str, Column], NDArray[np.str_]]:
+    ) -> tuple[dict[str, Column], NDArray[np.object_]]:
         """What is kept by name, and why for each point that failed ("" for others).
 
         Args:
             places: as `find` gave them, all known.
             names: what is wanted.
         """
-        columns: dict[str, Column] = {}
-        reasons = np.zeros(places.file.size, dtype=object)
-        for number in np.unique(places.file):
-            mine = np.flatnonzero(places.file == number)
-            rows = places.row[mine]
+        size = places.file.size
+        reasons = np.full(size, "", dtype=object)
+        parts: dict[str, list[tuple[NDArray[np.intp], Column]]] = {n: [] for n in names}
+        order = np.argsort(places.file, kind="stable")
+        numbers, begins = np.unique(places.file[order], return_index=True)
+        for number, mine in zip(numbers, np.split(order, begins[1:]), strict=True):
+            rows = places.row[mine].astype(np.intp)
             with np.load(self._files[number]) as arrays:
-                reasons[mine] = arrays["reason"][rows]
+                why = dict(
+                    zip(arrays["failed"].tolist(), arrays["reason"], strict=True)
+                )
+                for at in np.flatnonzero(np.isin(rows, arrays["failed"])):
+                    reasons[mine[at]] = str(why[int(rows[at])])
                 for name in names:
-                    _collect(columns, name, mine, rows, arrays, places.file.size)
-        return columns, reasons.astype(np.str_)
+                    parts[name].append((mine, _column(arrays, name, rows)))
+        return {name: placed(found, size) for name, found in parts.items()}, reasons
 
     def _take(self, path: Path) -> None:
         try:
             with path.open("rb") as file, np.load(file) as arrays:
-                self._addresses.append(arrays["address"])
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return  # damaged: its points are computed again, into the same file
-        self._files.append(path)
+                addresses = arrays["address"]
+        except DAMAGED:
+            return  # its points are computed again, into the same file
+        if addresses.dtype == NAME:  # of an earlier version of this program
+            self._addresses.append(addresses)
+            self._files.append(path)
 
 
-def _collect(
-    columns: dict[str, Column],
-    name: str,
-    mine: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    arrays: Any,
-    size: int,
-) -> None:
-    """Put what one file has of `name` where it belongs."""
-    if f"number {name}" in arrays:
-        column = columns.setdefault(name, np.full(size, np.nan))
-        values = arrays[f"number {name}"][rows]
-        if isinstance(column, list):
-            for at, value in zip(mine, values, strict=True):
-                column[at] = np.empty(0) if np.isnan(value) else np.array([value])
-        else:
-            column[mine] = values
-    elif f"rows {name}" in arrays:
-        long = columns.get(name)
-        if not isinstance(long, list):  # a batch before gave one number a point
-            short = np.full(size, np.nan) if long is None else long
-            long = [np.empty(0) if np.isnan(one) else np.array([one]) for one in short]
-            columns[name] = long
-        begin, whole = arrays[f"begin {name}"], arrays[f"rows {name}"]
-        for at, row in zip(mine, rows, strict=True):
-            long[at] = whole[begin[row] : begin[row + 1]]
-
-
-def _packed(batch: Batch) -> dict[str, NDArray[Any]]:
-    """Numbers as a column, rows of numbers joined with where each begins."""
+def _arrays(batch: Batch) -> dict[str, NDArray[Any]]:
+    """A batch as the arrays of its file."""
     whole: dict[str, NDArray[Any]] = {
-        "address": np.array(batch.addresses, dtype=NAME),
-        "reason": np.array(batch.reasons, dtype=np.str_),
+        "address": batch.addresses,
+        "failed": np.array(list(batch.reasons), dtype=np.int64),
+        "reason": np.array(list(batch.reasons.values()), dtype=np.str_),
     }
-    names = next((list(row) for row in batch.found if row is not None), [])
-    for name in names:
-        values = [np.nan if row is None else row[name] for row in batch.found]
-        if all(isinstance(value, float) for value in values):
-            whole[f"number {name}"] = np.array(values)
-            continue
-        rows = [np.empty(0) if row is None else np.atleast_1d(row[name])
-                for row in batch.found]  # fmt: skip
-        whole[f"rows {name}"] = np.concatenate(rows)
-        whole[f"begin {name}"] = np.cumsum([0, *(row.size for row in rows)])
+    for name, column in batch.columns.items():
+        if isinstance(column, Rows):
+            whole[f"rows {name}"], whole[f"sizes {name}"] = column.values, column.sizes
+        else:
+            whole[f"number {name}"] = column
     return whole
+
+
+def _column(arrays: Any, name: str, rows: NDArray[np.intp]) -> Column:
+    """Some rows of what a file has of `name`; NaN where all its points failed."""
+    if f"rows {name}" in arrays:
+        return Rows(arrays[f"rows {name}"], arrays[f"sizes {name}"]).take(rows)
+    if f"number {name}" in arrays:
+        found: Column = arrays[f"number {name}"][rows]
+        return found
+    return np.full(rows.size, np.nan)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Iterable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -15,19 +16,20 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import lru_cache
-from itertools import islice
 from typing import Any, Protocol
 
-from tactile_lab.errors import LinkLostError, NotFoundError, SceneError, UnsafeError
-from tactile_lab.studies.points import Points, code_digest, why
+from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
+from tactile_lab.studies.addresses import code_digests
+from tactile_lab.studies.points import Points, Task
 from tactile_lab.studies.shelf import Batch
 from tactile_lab.studies.study import Study
 
 AHEAD = 2
 """Batches that wait at each worker, so that none stands idle."""
-Task = tuple[list[bytes], list[tuple[Any, ...]], list[int]]
-"""Addresses, values of the axes and repeats of some points."""
+MOST_ENDED = 3
+"""So often in a row workers may be ended from outside before a batch is finished."""
 
 
 class Workers(Protocol):
@@ -37,23 +39,6 @@ class Workers(Protocol):
 
     def batches(self, tasks: Iterable[Task]) -> Iterator[Batch]:
         """Each task's batch, in any order; tasks are taken as they are needed."""
-
-
-def batch_of(points: Points, task: Task) -> Batch:
-    """What is kept of the points of a task; one that fails keeps its reason."""
-    addresses, values, repeats = task
-    found: list[Mapping[str, Any] | None] = []
-    reasons = []
-    for value, repeat in zip(values, repeats, strict=True):
-        try:
-            found.append(points.compute(value, repeat))
-            reasons.append("")
-        except UnsafeError:
-            raise  # the coil's state is not known: nothing goes on
-        except Exception as error:  # whatever a user's protocol or function raises
-            found.append(None)
-            reasons.append(why(error) or type(error).__name__)
-    return Batch(addresses, found, reasons)
 
 
 class Alone:
@@ -70,49 +55,87 @@ class Alone:
 
     def batches(self, tasks: Iterable[Task]) -> Iterator[Batch]:
         """In the order of the tasks."""
-        for task in tasks:
-            yield batch_of(self._points, task)
+        return map(self._points.batch, tasks)
 
 
 class Pool:
     """Processes of this machine, or the workers of a Dask cluster.
 
     Args:
-        executor: sends them work.
+        start: gives an executor that sends them work; called again where all of its
+            workers are gone.
         study: what they compute.
         count: how many they are.
+        lost: what an executor raises where its workers are gone for good.
     """
 
-    def __init__(self, executor: Executor, study: Study, count: int) -> None:
+    def __init__(
+        self,
+        start: Callable[[], Executor],
+        study: Study,
+        count: int,
+        lost: tuple[type[BaseException], ...] = (),
+    ) -> None:
         self.count = count
-        self._executor = executor
-        self._study = pickle.dumps(study)
+        self._start = start
+        self._study = pickle.dumps(_without_points(study))
+        self._lost: tuple[type[BaseException], ...] = (
+            BrokenExecutor,
+            CancelledError,
+            *lost,
+        )
 
     def batches(self, tasks: Iterable[Task]) -> Iterator[Batch]:
-        """As they are finished.
+        """As they are finished; a worker that is ended is replaced.
 
         Raises:
-            LinkLostError: a worker is gone.
+            LinkLostError: workers are gone, or end again and again.
         """
-        coming = iter(tasks)
-        running = {self._send(task) for task in islice(coming, self.count * AHEAD)}
+        coming, waiting = iter(tasks), deque[Task]()
+        running: dict[Future[Batch], Task] = {}
+        executor, ended = self._start(), 0
         try:
-            while running:
-                done, running = wait(running, return_when=FIRST_COMPLETED)
-                for one in done:
-                    yield one.result()
-                    running |= {self._send(task) for task in islice(coming, 1)}
-        except (BrokenExecutor, CancelledError) as reason:
+            while True:
+                try:
+                    while len(running) < self.count * AHEAD:
+                        task = waiting.popleft() if waiting else next(coming, None)
+                        if task is None:
+                            break
+                        waiting.appendleft(task)  # until it is sent
+                        running[executor.submit(_on_worker, self._study, task)] = task
+                        waiting.popleft()
+                    if not running:
+                        return
+                    done, _ = wait(running, return_when=FIRST_COMPLETED)
+                    for one in done:
+                        batch = one.result()
+                        del running[one]
+                        ended = 0
+                        yield batch
+                except BrokenExecutor:
+                    ended += 1
+                    if ended > MOST_ENDED:
+                        raise
+                    executor.shutdown()
+                    waiting.extend(running.values())
+                    running.clear()
+                    executor = self._start()
+        except self._lost as reason:
             raise LinkLostError(
-                "A worker was ended from outside (too little memory?). What was "
-                "finished is kept; start the study again and it goes on."
+                "Workers were ended from outside (too little memory?), or their "
+                "scheduler was. What was finished is kept; start the study again and "
+                "it goes on."
             ) from reason
         finally:
             for one in running:
                 one.cancel()
+            executor.shutdown(wait=False)
 
-    def _send(self, task: Task) -> Future[Batch]:
-        return self._executor.submit(_on_worker, self._study, task)
+
+def _without_points(study: Study) -> Study:
+    """The study as a worker needs it: the values of its points come with each task."""
+    axes = tuple(replace(axis, values=axis.values[:1]) for axis in study.design.axes)
+    return replace(study, design=replace(study.design, axes=axes), source={})
 
 
 @contextmanager
@@ -140,14 +163,15 @@ def workers(
         yield Alone(points)
     elif scheduler is not None:
         with _client(scheduler) as client:
+            from distributed.scheduler import KilledWorker
+
             threads = sum(client.nthreads().values())
-            yield Pool(client.get_executor(), study, threads)
+            yield Pool(client.get_executor, study, threads, (KilledWorker, OSError))
     elif count == 1:
         yield Alone(points)
     else:
         count = count or os.cpu_count() or 1
-        with ProcessPoolExecutor(count) as executor:
-            yield Pool(executor, study, count)
+        yield Pool(lambda: ProcessPoolExecutor(count), study, count)
 
 
 @contextmanager
@@ -174,15 +198,30 @@ def _client(address: str) -> Iterator[Any]:
 
 
 def _check_versions(client: Any, address: str) -> None:
-    theirs = client.run(code_digest)
-    if not theirs:
+    """Refuse workers that would compute something else."""
+    if not client.nthreads():
         raise NotFoundError(f"The scheduler {address} has no workers; start some.")
-    other = [where for where, digest in theirs.items() if digest != code_digest()]
-    if other:
+    try:
+        theirs = client.run(code_digests)
+    except ImportError as reason:
         raise SceneError(
-            f"{len(other)} of {len(theirs)} workers of {address} run another version "
-            f"of this program (the first is {other[0]}); install the same on each."
-        )
+            f"Workers of {address} lack this program ({reason}); install the same "
+            "version on each."
+        ) from reason
+    ours = code_digests()
+    for where, found in theirs.items():
+        missing = [package for package in ours if package not in found]
+        other = [p for p, digest in found.items() if ours.get(p, digest) != digest]
+        if missing or other:
+            what = (
+                f"lacks {', '.join(missing)}"
+                if missing
+                else f"has another version of {', '.join(other)}"
+            )
+            raise SceneError(
+                f"The worker {where} of {address} {what}; install the same version of "
+                "this program on each."
+            )
 
 
 @lru_cache(maxsize=2)
@@ -191,4 +230,4 @@ def _points(study: bytes) -> Points:
 
 
 def _on_worker(study: bytes, task: Task) -> Batch:
-    return batch_of(_points(study), task)
+    return _points(study).batch(task)

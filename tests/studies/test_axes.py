@@ -57,7 +57,7 @@ def test_every_combination_stands_once_for_each_repeat(
 ) -> None:
     design = Design(axes=grid(**dict(zip("abc", sizes, strict=False))), repeat=repeat)
     every = range(design.size)
-    seen = list(zip(design.values(every), design.repeats(every), strict=True))
+    seen = list(zip(design.values(every), design.repeats(every).tolist(), strict=True))
     assert len(set(seen)) == design.size == np.prod(sizes) * repeat
 
 
