@@ -156,7 +156,7 @@ class LaneStack(QFrame):
         steps = menu.addMenu("Jump to step")
         for hold in [one for one in self.source.holds if not one.pause][:STEPS]:
             span = hold.start, hold.end - hold.start
-            steps.addAction(hold.label, partial(view.show_span, *span))
+            steps.addAction(hold.label, partial(view.show_step, *span))
         steps.setEnabled(not steps.isEmpty())
         menu.addSeparator()
         for which, name in enumerate("AB"):

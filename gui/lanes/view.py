@@ -77,6 +77,10 @@ class TimeView(QObject):
             self._after = []
         self._noted = now
 
+    def show_step(self, start: float, length: float) -> None:
+        """Show a stretch with a little of what is on either side."""
+        self.show_span(start - 0.05 * length, 1.1 * length)
+
     def back(self) -> None:
         """Show what was seen before the last change."""
         self._return(self._before, self._after)

@@ -110,6 +110,8 @@ class LogView(QWidget):
     """The log with its filters and the field for notes."""
 
     noted = Signal(str)
+    step_chosen = Signal(float)
+    """A line that tells of a time of the run was double clicked; that time, s."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -129,6 +131,7 @@ class LogView(QWidget):
         column(self, row(*top, spacing=10), (self.table, 1))
         self.choices.group.idClicked.connect(self._chosen)
         self.note.returnPressed.connect(self._noted)
+        self.table.activated.connect(self._activated)
         theme.changed.connect(self.table.viewport().update)
 
     def add(self, line: LogLine) -> None:
@@ -143,6 +146,11 @@ class LogView(QWidget):
     def _chosen(self, number: int) -> None:
         self.filter.choose(number)
         self.table.scrollToBottom()
+
+    def _activated(self, index: Index) -> None:
+        time = self.model.lines[self.filter.mapToSource(index).row()].time
+        if time is not None:
+            self.step_chosen.emit(time)
 
     def _noted(self) -> None:
         text = self.note.text().strip()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QHelpEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QToolTip, QWidget
 
 from gui.lanes.expected import Stretch
 from gui.look.theme import Theme
@@ -15,7 +15,10 @@ from gui.state import Snapshot, WindowState, minutes
 
 
 class Blocks(QWidget):
-    """One block per step; done ones are filled."""
+    """One block per step; done ones are filled. A click shows one in the lanes."""
+
+    chosen = Signal(float, float)
+    """Start and length of the step that was clicked, s."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -25,6 +28,7 @@ class Blocks(QWidget):
         self._at = 0.0
         self._colour = "accent"
         self.setFixedHeight(12)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
         theme.changed.connect(self.update)
 
     def show_steps(
@@ -35,6 +39,26 @@ class Blocks(QWidget):
         if shown != (self._holds, self._length, self._at, self._colour):
             self._holds, self._length, self._at, self._colour = shown
             self.update()
+
+    def step_at(self, x: float) -> Stretch | None:
+        """The step under a pixel."""
+        time = x / max(self.width(), 1) * self._length
+        return next((one for one in self._holds if one.start <= time < one.end), None)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Show the step in the lanes."""
+        step = self.step_at(event.position().x())
+        if step is not None:
+            self.chosen.emit(step.start, step.end - step.start)
+
+    def event(self, event: QEvent) -> bool:
+        """Name the step under the pointer."""
+        if isinstance(event, QHelpEvent):
+            step = self.step_at(event.pos().x())
+            words = step and f"{step.label}, {step.start:.1f} to {step.end:.1f} s"
+            QToolTip.showText(event.globalPos(), words or "", self)
+            return True
+        return super().event(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the blocks and the head."""

@@ -7,6 +7,7 @@ from html import escape
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -57,6 +58,8 @@ class ResultsView(QWidget):
     """Rates against force, a table of steps, and what the report adds."""
 
     report_asked = Signal()
+    step_chosen = Signal(float, float)
+    """A step of the table was chosen: its start and its length, s."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -200,6 +203,16 @@ class ResultsView(QWidget):
                 table.setItem(at, where, item)
         table.setFixedHeight(HEAD + ROW * max(len(steps), 4))  # the page scrolls
 
+    def _choose(self, row: int) -> None:
+        step = self._steps[row]
+        self.step_chosen.emit(step.start, step.duration)
+
+    def copy_table(self) -> None:
+        """Put the table of steps on the clipboard, as a spreadsheet takes it."""
+        rows = [tuple(heading.replace("\n", " / ") for heading in HEADINGS)]
+        rows += [cells(step) for step in self._steps]
+        QGuiApplication.clipboard().setText("\n".join("\t".join(row) for row in rows))
+
     def _set_up_table(self) -> None:
         table = self.table
         table.setAccessibleName("Results of each step")
@@ -214,7 +227,17 @@ class ResultsView(QWidget):
         table.setAlternatingRowColors(True)
         table.setTabKeyNavigation(False)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setToolTip("A click, or Enter, shows the step in the lanes")
+        table.cellClicked.connect(self._choose)
+        table.cellActivated.connect(self._choose)
+        copy = QAction("Copy table", table)
+        copy.setShortcut(QKeySequence.StandardKey.Copy)
+        copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        copy.triggered.connect(self.copy_table)
+        table.addAction(copy)
+        table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)

@@ -48,9 +48,8 @@ class SpikesView(QWidget):
         self.succession = SmallPlot(theme, "No two spikes in a row.")
         inner = QWidget()
         go = row(self.before, self.after, self.closely, STRETCH)
-        plots = ((one, 1) for one in (self.shape, self.intervals, self.succession))
-        shape, *intervals = plots
-        parts = (go, self.facts, shape, self.said, *intervals)
+        intervals = (self.said, (self.intervals, 1), (self.succession, 1))
+        parts = (go, self.facts, (self.shape, 1), *intervals)
         page = with_gutter(scrolling(inner), column(inner, *parts, spacing=9))
         head = row(label("Spikes", "title"), STRETCH, self.scopes)
         stack(self, (head, page), page, spacing=9)

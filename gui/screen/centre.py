@@ -22,6 +22,9 @@ from gui.record.monitor_bar import MonitorBar
 from gui.record.progress import ProgressStrip
 from gui.screen.compare_bar import CompareBar
 
+LATER = 0.05
+"""By how much the record may have a step begin later than was told live, s."""
+
 FOLLOWED = 5.0
 """Visible time of a run that begins, s."""
 
@@ -114,6 +117,8 @@ class Centre(QWidget):
         lower.setMinimumHeight(151)
         column(self).addWidget(self.splitter)
         self.empty = EmptyCard(self.stack, theme)
+        self.progress.blocks.chosen.connect(self.view.show_step)
+        self.log.step_chosen.connect(self._show_step)
 
     def show_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
         """Show another source, whole; `lanes`: None keeps those shown."""
@@ -145,6 +150,14 @@ class Centre(QWidget):
         self._show_lanes(lanes)
         self.stack.refresh()
         self.stack.show_values()
+
+    def _show_step(self, time: float) -> None:
+        """Show the step that a time of the run is in, or that time itself."""
+        for one in reversed(self.stack.source.holds):
+            if one.start - LATER <= time < one.end:
+                self.view.show_step(one.start, one.end - one.start)
+                return
+        self.view.show_span(time - self.view.width / 2, self.view.width)
 
     def say(self, problem: str) -> None:
         """Say something above the lanes; "" takes it away."""

@@ -65,6 +65,7 @@ class Screen(QObject):
         records.compared.connect(self._show_comparison)
         records.failed.connect(self.say)
         self.listed.connect(self._list)
+        panels.review.results.step_chosen.connect(panels.centre.view.show_step)
         runs = panels.review.runs
         runs.opened.connect(lambda entry: self.open_run(entry.folder))
         runs.again.connect(self._again)

@@ -32,6 +32,7 @@ class LogLine:
         source: who says so: runner, coil, scope, plan, store, note, ...
         text: for a person.
         safety: whether it is about the coil's safe state.
+        time: of the run it tells of, s; None where it tells of none.
     """
 
     at: datetime
@@ -39,6 +40,7 @@ class LogLine:
     source: str
     text: str
     safety: bool = False
+    time: float | None = None
 
 
 class Log(QObject):
@@ -51,10 +53,16 @@ class Log(QObject):
         self.lines: list[LogLine] = []
 
     def add(
-        self, level: Severity, source: str, text: str, *, safety: bool = False
+        self,
+        level: Severity,
+        source: str,
+        text: str,
+        *,
+        safety: bool = False,
+        time: float | None = None,
     ) -> None:
-        """Put a line into the log."""
-        line = LogLine(datetime.now(), level, source, text, safety)
+        """Put a line into the log; `time`: of the run, s, where it has one."""
+        line = LogLine(datetime.now(), level, source, text, safety, time)
         self.lines.append(line)
         del self.lines[:-KEPT]
         self.added.emit(line)

@@ -179,6 +179,7 @@ class Session(QObject):
             Severity.NOTE,
             "note",
             text + (at if self.run.alive else " (kept for the next run)"),
+            time=self.run.elapsed if self.run.alive else None,
         )
         self.run.note(text)
 

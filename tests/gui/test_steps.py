@@ -1,0 +1,64 @@
+"""A click on a step goes there: in the bar, in the table, in the log."""
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def opened(lab):
+    (folder,) = lab.runs(1)
+    window = lab.window
+    window.screen_.open_run(folder)
+    lab.until(lambda: window.screen_.run is not None)
+    window.centre.view.show_all()
+    return window, [one for one in window.screen_.run.holds if not one.pause]
+
+
+def shows(view, step) -> bool:
+    length = step.end - step.start
+    inside = view.start <= step.start and step.end <= view.end
+    return inside and view.width < 1.2 * length
+
+
+def test_a_click_in_the_bar_shows_that_step(lab) -> None:
+    window, steps = opened(lab)
+    blocks, view = window.centre.progress.blocks, window.centre.view
+    middle = (steps[1].start + steps[1].end) / 2
+    at = QPoint(round(middle / window.screen_.run.length * blocks.width()), 6)
+    QTest.mouseClick(blocks, LEFT, Qt.KeyboardModifier.NoModifier, at)
+    assert shows(view, steps[1])
+
+
+def test_a_row_of_the_table_shows_that_step_by_mouse_and_by_key(lab) -> None:
+    window, steps = opened(lab)
+    window.actions_._tab(0)
+    results, view = window.review.results, window.centre.view
+    lab.until(lambda: results.table.rowCount() == len(steps))
+    at = results.table.visualItemRect(results.table.item(1, 0)).center()
+    QTest.mouseClick(results.table.viewport(), LEFT, Qt.KeyboardModifier.NoModifier, at)
+    assert shows(view, steps[1])
+    results.table.setCurrentCell(0, 0)
+    QTest.keyClick(results.table, Qt.Key.Key_Return)
+    assert shows(view, steps[0])
+    results.copy_table()
+    copied = QGuiApplication.clipboard().text().split("\n")
+    assert len(copied) == 1 + len(steps)
+    assert copied[1].split("\t")[0] == "80 mN"
+
+
+def test_a_line_of_the_log_on_a_step_shows_it(lab) -> None:
+    lab.complete_run()
+    window, log = lab.window, lab.window.centre.log
+    lab.until(lambda: window.screen_.run is not None)
+    steps = [one for one in window.screen_.run.holds if not one.pause]
+    view = window.centre.view
+    view.show_all()
+    rows = [
+        row
+        for row, line in enumerate(log.model.lines)
+        if line.source == "runner" and "120 mN started" in line.text
+    ]
+    log.table.activated.emit(log.filter.mapFromSource(log.model.index(rows[-1], 3)))
+    assert shows(view, steps[1])
