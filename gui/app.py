@@ -46,7 +46,7 @@ def main(
     """Open the window and stay until it is closed.
 
     Args:
-        target: scene, protocol file or run folder to open; None for the demo.
+        target: scene, protocol file or run folder to open; None for the last scene.
         out: folder for run folders; None for that of the preferences.
         bench: "sim", a bench file, "none"; None for that of the preferences.
         theme: "system", "light" or "dark".
@@ -69,7 +69,7 @@ def main(
     _close_on_signals(window)
     wanted = bench or wishes.bench
     wanted_bench = None if wanted == "none" else wanted
-    QTimer.singleShot(0, lambda: begin(window, target, wanted_bench))
+    QTimer.singleShot(0, lambda: begin(window, target or wishes.scene, wanted_bench))
     app.exec()
     session.close()
     left = session.coil_view()
@@ -80,7 +80,8 @@ def begin(window: Window, target: str | None, bench: str | None) -> None:
     """What happens right after the window has appeared."""
     path = None if target is None else Path(target)
     is_run = path is not None and path.is_dir()
-    window.screen_.open_scene(None if is_run else target)
+    if not window.screen_.open_scene(None if is_run else target):
+        window.screen_.open_scene(None)  # which ships, so that there is a form
     if is_run and path is not None:
         window.screen_.open_run(path)
     window.screen_.list_runs()

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
+from gui.lanes.stack import LaneStack
 from gui.preferences import Preferences
 from gui.screen.screen import Screen
 from gui.session.session import Session
@@ -16,16 +17,21 @@ APART = 400
 
 
 class Habits(QObject):
-    """Sounds, watching the sensor, recent scenes, where runs are kept.
+    """Sounds, watching the sensor, recent scenes, where runs are kept, the lanes.
 
     Args:
         session: what happens.
         preferences: what is to follow.
         screen: opens scenes, lists runs.
+        lanes: are found again as they were left.
     """
 
     def __init__(
-        self, session: Session, preferences: Preferences, screen: Screen
+        self,
+        session: Session,
+        preferences: Preferences,
+        screen: Screen,
+        lanes: LaneStack,
     ) -> None:
         super().__init__(screen)
         self._session, self._wishes, self._screen = session, preferences, screen
@@ -34,6 +40,8 @@ class Habits(QObject):
         session.bench.ready.connect(self._watch)
         screen.scene_opened.connect(self._remember)
         preferences.changed.connect(self.follow)
+        lanes.arrangement.restore(preferences.lanes)
+        lanes.arranged.connect(lambda: preferences.keep(lanes=lanes.arrangement.text))
 
     def follow(self) -> None:
         """The preferences have changed."""
@@ -47,6 +55,7 @@ class Habits(QObject):
                 QTimer.singleShot(number * APART, QApplication.beep)
 
     def _watch(self) -> None:
+        self._wishes.keep(last_bench=self._session.bench.choice or "")
         if self._wishes.monitor and not self._session.queue.going:
             self._session.show_monitor(True)
 

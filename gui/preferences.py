@@ -16,6 +16,8 @@ DEFAULTS: dict[str, Any] = {
     "sound": False,
     "monitor": False,
     "reports": True,
+    "last_bench": "",
+    "lanes": "",
 }
 
 
@@ -50,8 +52,22 @@ class Preferences(QObject):
 
     @property
     def bench(self) -> str:
-        """Bench file that is connected at the start, "sim", or "none"."""
-        return str(self._values["bench"] or "sim")
+        """Bench file that is connected at the start, "sim", or "none".
+
+        Where none was chosen it is the one that answered last, if it is still there.
+        """
+        last = str(self._values["last_bench"])
+        return self.chosen_bench or (last if Path(last).is_file() else "sim")
+
+    @property
+    def chosen_bench(self) -> str:
+        """Bench to be connected at the start, as it was chosen; "" for the last."""
+        return str(self._values["bench"])
+
+    @property
+    def scene(self) -> str | None:
+        """Scene to begin with: the one that was opened last; None for the demo."""
+        return next((str(path) for path in self.recent), None)
 
     @property
     def sound(self) -> bool:
@@ -75,11 +91,20 @@ class Preferences(QObject):
 
     def set(self, **values: str | bool) -> None:
         """Change some; all are kept."""
+        self.keep(**values)
+        self.changed.emit()
+
+    def keep(self, **values: str | bool) -> None:
+        """Keep what was seen of the user; nothing follows from it now."""
         self._values |= values
         if self._settings is not None:
             for key, value in values.items():
                 self._settings.setValue(f"preferences/{key}", value)
-        self.changed.emit()
+
+    @property
+    def lanes(self) -> str:
+        """How the lanes were left: the text of an `Arrangement`; "" at first."""
+        return str(self._values["lanes"])
 
     def remember(self, scene: str) -> None:
         """A scene file was opened."""

@@ -80,7 +80,9 @@ class Window(QMainWindow):
         self.actions_ = Actions(
             self, self.panels, self.screen_, self.runs, self.closing, self.preferences
         )
-        self._habits = Habits(session, self.preferences, self.screen_)
+        self._habits = Habits(
+            session, self.preferences, self.screen_, self.centre.stack
+        )
         self.spikes = SpikeTools(self.review.spikes, self.centre.stack, session)
         self._leaving = False
         self._connect()

@@ -26,7 +26,7 @@ class PreferencesCard(Overlay):
         super().__init__(window, 560)
         self._preferences = preferences
         self.folder = line_edit("Folder for runs", "runs")
-        self.bench = line_edit("Bench at the start", "sim, none, or a bench file")
+        self.bench = line_edit("Bench at the start", "the last; sim, none, or a file")
         self.switches = {key: QCheckBox(words) for key, words in SWITCHES.items()}
         self.save = push("Save", "primary")
         self.close_button = push("Close")
@@ -50,7 +50,7 @@ class PreferencesCard(Overlay):
     def show_preferences(self) -> None:
         """Open the card."""
         self.folder.setText(str(self._preferences.folder))
-        self.bench.setText(self._preferences.bench)
+        self.bench.setText(self._preferences.chosen_bench)
         for key, switch in self.switches.items():
             switch.setChecked(getattr(self._preferences, key))
         self.open()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSize
-from PySide6.QtGui import QPixmap, QResizeEvent
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel
 
 from gui.lanes.compare import MARKS
@@ -21,6 +21,9 @@ MARGIN, RIGHT = 12, 6
 TITLE = 26
 """Height of the title with the margin above it, px."""
 
+EDGE = 6
+"""Height of its lower edge, which can be dragged, px."""
+
 LINE = 15
 """Height of a line of small text, px."""
 
@@ -28,7 +31,16 @@ Values = Sequence[float | None]
 
 
 class LaneCard(QFrame):
-    """Swatch, title, value with unit, and a line of small text."""
+    """Swatch, title, value with unit, and a line of small text.
+
+    A drag of its lower edge makes the lane higher, one of the rest moves it.
+    """
+
+    resized = Signal(float)
+    """Its lower edge was dragged down by so many px."""
+    moved = Signal(int)
+    """It was dragged up (-1) or down (1) by most of its height."""
+    dropped = Signal()
 
     def __init__(self, lane: Lane, theme: Theme) -> None:
         super().__init__()
@@ -37,6 +49,8 @@ class LaneCard(QFrame):
         self.setFixedWidth(CARD)
         self._swatch = QLabel()
         self._swatch.setFixedSize(QSize(10, 10))
+        self.setMouseTracking(True)
+        self._held: tuple[bool, float] | None = None
         self._flat = not lane.valued
         self._value = label("—", "flatvalue" if self._flat else "value")
         self._unit = label(lane.unit, "muted")
@@ -110,6 +124,37 @@ class LaneCard(QFrame):
         """Say as much as there is room for."""
         super().resizeEvent(event)
         self._lay_out_runs()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take hold of the lower edge, or of the lane."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._held = self._at_edge(event), event.globalPosition().y()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag what is held; show what could be."""
+        if self._held is None:
+            edge = self._at_edge(event)
+            way = Qt.CursorShape.SplitVCursor if edge else Qt.CursorShape.OpenHandCursor
+            self.setCursor(way)
+            return
+        edge, since = self._held
+        now = event.globalPosition().y()
+        if edge:
+            self._held = edge, now
+            self.resized.emit(now - since)
+        elif abs(now - since) > max(0.75 * self.height(), EDGE):
+            self._held = edge, now
+            self.setCursor(Qt.CursorShape.ClosedHandCursor)
+            self.moved.emit(1 if now > since else -1)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go."""
+        if self._held is not None:
+            self._held = None
+            self.dropped.emit()
+
+    def _at_edge(self, event: QMouseEvent) -> bool:
+        return event.position().y() > self.height() - EDGE
 
     def tint(self, *, grey: bool) -> None:
         """Colour the swatch; `grey` where colour means something else."""

@@ -8,9 +8,10 @@ from functools import partial
 from PySide6.QtCore import QPoint, Signal
 from PySide6.QtWidgets import QFrame, QMenu
 
+from gui.lanes.arrangement import Arrangement
 from gui.lanes.box import LaneBox
 from gui.lanes.floor import Stage
-from gui.lanes.lane import Lane
+from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.navigator import Navigator
 from gui.lanes.readings import Painted
 from gui.lanes.row import LaneRow
@@ -28,6 +29,8 @@ class LaneStack(QFrame):
     """The lanes of one source: cards, and beside them their plots in one scene."""
 
     export_asked = Signal()
+    arranged = Signal()
+    """Lanes were moved, resized or hidden by hand."""
 
     def __init__(self, view: TimeView, theme: Theme) -> None:
         super().__init__()
@@ -37,12 +40,12 @@ class LaneStack(QFrame):
         self.rows: list[LaneRow] = []
         self.navigator = Navigator(view, theme)
         self.show_residual = True
-        self._hidden: set[str] = {"coil_current"}  # the force lane says the same
+        self.arrangement = Arrangement()
         self._theme = theme
         self._cards = lines(spacing=0)
         lanes = row(self._cards, spacing=0)
         lanes.addWidget(self.scene, 1)
-        column(self, (lanes, 1), self.navigator, spacing=0)
+        self._whole = column(self, (lanes, 1), self.navigator, spacing=0)
         view.changed.connect(self.refresh)
         view.cursors_changed.connect(self.show_values)
         self.scene.drawn.connect(self._follow_picture)
@@ -56,13 +59,17 @@ class LaneStack(QFrame):
 
     def show_lanes(self, lanes: Sequence[Lane]) -> None:
         """Show these lanes."""
-        if [one.lane for one in self.rows] == list(lanes):
+        wanted = self.arrangement.ordered(lanes)
+        if [one.lane for one in self.rows] == wanted:
             return
         empty(self._cards)
-        self.rows = [LaneRow(lane, self.stage, self._theme) for lane in lanes]
+        self.rows = [LaneRow(lane, self.stage, self._theme) for lane in wanted]
         for one in self.rows:
-            self._cards.addWidget(one.card, round(one.lane.weight * 100))
+            self._cards.addWidget(one.card)
             self._cards.addWidget(one.rule)
+            one.card.resized.connect(partial(self._resize, one))
+            one.card.moved.connect(partial(self.move_lane, one))
+            one.card.dropped.connect(self.arranged)
         self.scene.show_boxes([one.box for one in self.rows])
         self.arrange()
 
@@ -84,17 +91,54 @@ class LaneStack(QFrame):
 
     def hide_lane(self, key: str, hidden: bool) -> None:
         """Hide or show one lane."""
-        (self._hidden.add if hidden else self._hidden.discard)(key)
+        shown = self.arrangement.hidden
+        (shown.add if hidden else shown.discard)(key)
+        self.arrange()
+        self.arranged.emit()
+
+    def move_lane(self, which: LaneRow, way: int) -> None:
+        """Let a lane change places with the next above (-1) or below (1) on screen."""
+        shown = self.visible_rows()
+        at = shown.index(which) + way
+        if not 0 <= at < len(shown):
+            return
+        one, other = self.rows.index(which), self.rows.index(shown[at])
+        self.rows[one], self.rows[other] = self.rows[other], self.rows[one]
+        self.arrangement.put([one.lane.key for one in self.rows])
+        for each in self.rows:  # a widget that is added again goes to the end
+            self._cards.addWidget(each.card)
+            self._cards.addWidget(each.rule)
+        self.arrange()
+
+    def _resize(self, which: LaneRow, by: float) -> None:
+        """Make a lane higher by so many px, at the cost of the next below."""
+        shown = self.visible_rows()
+        at = shown.index(which)
+        if at + 1 < len(shown):
+            below = shown[at + 1]
+            heights = which.card.height() + by, below.card.height() - by
+            self.arrangement.resize(which.lane, below.lane, heights)
+            self.arrange()
+            self._whole.activate()  # the next move of the pointer goes on from there
+
+    def forget_arrangement(self) -> None:
+        """Give the lanes the order and the heights of the beginning."""
+        self.arrangement.forget()
+        self.arranged.emit()
+        lanes = lanes_for({row.lane.key for row in self.rows})
+        self.show_lanes([lane for lane in lanes if self.row(lane.key)])
         self.arrange()
 
     def arrange(self) -> None:
         """Show what is wanted; the lowest visible lane carries the time axis."""
         for one in self.rows:
-            wanted = one.lane.key not in self._hidden
+            wanted = not self.is_hidden(one.lane.key)
             if one.lane.key == "residual":
                 wanted = wanted and self.show_residual
             one.card.setVisible(wanted)
             one.rule.setVisible(wanted)
+            share = round(100 * self.arrangement.weight(one.lane))
+            self._cards.setStretchFactor(one.card, share)
         self.refresh()
 
     def _places(self) -> list[tuple[LaneBox, float, float]]:
@@ -122,7 +166,7 @@ class LaneStack(QFrame):
 
     def is_hidden(self, key: str) -> bool:
         """Whether the user folded this lane away."""
-        return key in self._hidden
+        return key in self.arrangement.hidden
 
     def _follow_picture(self) -> None:
         """What is at the right edge has moved with the picture."""
@@ -134,6 +178,10 @@ class LaneStack(QFrame):
         for one in self.rows:
             one.tint()
         self.refresh()
+
+    def _move_once(self, which: LaneRow, way: int) -> None:
+        self.move_lane(which, way)
+        self.arranged.emit()
 
     def _ask(self, box: LaneBox, time: float, at: QPoint) -> None:
         """The menu of a lane, at a time, s."""
@@ -150,6 +198,11 @@ class LaneStack(QFrame):
         automatic = menu.addAction("Automatic range", lambda: lock(False))
         automatic.setEnabled(box.locked)
         menu.addAction(f"Hide {lane.plain}", lambda: self.hide_lane(lane.key, True))
+        place = menu.addMenu("Arrange")
+        own = next(row for row in self.rows if row.lane is lane)
+        for words, way in (("Move up", -1), ("Move down", 1)):
+            place.addAction(words, partial(self._move_once, own, way))
+        place.addAction("All as at first", self.forget_arrangement)
         menu.addSeparator()
         menu.addAction("Back to the view before", view.back)
         menu.addAction("Forward again", view.forward)

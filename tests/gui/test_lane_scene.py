@@ -10,7 +10,9 @@ from PySide6.QtSvg import QSvgGenerator, QSvgRenderer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu
 
+from gui.lanes.arrangement import Arrangement
 from gui.lanes.box import LaneBox
+from gui.lanes.card import LaneCard
 from gui.lanes.expected import Stretch
 from gui.lanes.floor import AXIS
 from gui.lanes.lane import lanes_for
@@ -212,7 +214,7 @@ def test_the_menu_of_a_lane(app, stack):
     assert stack.view.cursors[1] == pytest.approx(under)
     assert stack.view.start < stack.view.cursors[0] < stack.view.end
     choose(app, stack, "V_C1", "80 mN")
-    assert (stack.view.start, stack.view.width) == (10.0, 10.0)
+    assert (stack.view.start, stack.view.width) == pytest.approx((9.5, 11.0))
     asked = []
     stack.export_asked.connect(lambda: asked.append(True))
     choose(app, stack, "V_C1", "Export this view …")
@@ -338,3 +340,57 @@ def test_cursors_move_no_button_and_tell_their_times(app, stack, width):
     tools.close()
     tools.deleteLater()
     settle(app)
+
+
+def drag_card(card: LaneCard, y: float, by: float) -> None:
+    """Drag a lane's card by so many px, in steps as a hand does."""
+    at, button = QPointF(40, y), Qt.MouseButton.LeftButton
+    for kind, moved in (
+        (QEvent.Type.MouseButtonPress, 0.0),
+        *((QEvent.Type.MouseMove, by * part / 8) for part in range(1, 9)),
+        (QEvent.Type.MouseButtonRelease, by),
+    ):
+        there = QPointF(card.mapToGlobal(at.toPoint())) + QPointF(0, moved)
+        QApplication.sendEvent(
+            card,
+            QMouseEvent(
+                kind, at, there, button, button, Qt.KeyboardModifier.NoModifier
+            ),
+        )
+
+
+def shown(stack: LaneStack) -> list[str]:
+    return [one.lane.key for one in stack.visible_rows()]
+
+
+def test_lanes_are_moved_and_resized_by_drag_and_stay_so(app, stack):
+    settle(app)
+    before = box(stack, "V_C1").height()
+    card = stack.row("V_C1").card
+    drag_card(card, card.height() - 2, 30)
+    settle(app)
+    assert box(stack, "V_C1").height() == pytest.approx(before + 30, abs=3)
+    card = stack.row("spikes").card
+    drag_card(card, 10, -1.1 * card.height())
+    settle(app)
+    assert shown(stack) == ["force", "V_C1", "spikes", "V_K", "rate"]
+    tops = [box(stack, key).geometry().top() for key in shown(stack)]
+    assert tops == sorted(tops), "plots are beside their cards"
+    other = LaneStack(TimeView(), Theme("light"))
+    other.arrangement.restore(stack.arrangement.text)
+    other.show_lanes(lanes_for(("force", "V_C1", "V_K", "spikes"), twin=False))
+    kept = [one.lane.key for one in other.rows if not other.is_hidden(one.lane.key)]
+    assert [key for key in kept if key in shown(stack)] == shown(stack)
+    choose(app, stack, "V_C1", "All as at first")
+    assert shown(stack)[:3] == ["force", "V_C1", "V_K"]
+    other.close()
+
+
+@pytest.mark.parametrize("text", ["", "no JSON", "{}", '[[], {"V_K": -1}, []]'])
+def test_an_arrangement_that_cannot_be_read_changes_nothing(text):
+    lanes = lanes_for(("force", "V_C1", "V_K"), twin=False)
+    arrangement = Arrangement()
+    arrangement.put(["V_K"])
+    arrangement.restore(text)
+    assert arrangement.ordered(lanes)[0].key == "V_K"
+    assert arrangement.weight(lanes[0]) == lanes[0].weight
