@@ -32,6 +32,7 @@ VERBS = {
     "recover": "Make a run whole that was cut short by a crash.",
     "export": "A run as CSV, MATLAB, netCDF, Parquet, NWB or RO-Crate.",
     "report": "Figure, page and numbers of a run, again from its data.",
+    "trust": "Let the code that a run from elsewhere holds be executed here.",
     "identify": "Fit parameters of the sensor to a run, with intervals.",
     "transfer": "I_S, m and swing from a measured transfer curve.",
 }

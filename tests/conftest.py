@@ -1,9 +1,16 @@
 """For every test."""
 
+import os
+import tempfile
+
 # PySide6's import hook, which pytest-qt brings, reads the source of modules that are
 # only half imported; pydantic does not stand that unless its fields come first
 import pydantic.fields  # noqa: F401
 from hypothesis import HealthCheck, settings
+
+# what the program keeps for its user, and what its user told it, is no test's
+for _name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+    os.environ[_name] = tempfile.mkdtemp(prefix="tactile-lab-test-")
 
 # A busy machine is no failure, and one commit gives one verdict: examples are drawn
 # from each test's own seed. `make search` draws new ones, and many more.

@@ -2,23 +2,78 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Ending
     from tactile_lab.engine.task import Task
 
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+STARTING = b"stopping before anything is opened; once more ends it at once\n"
 
 E = TypeVar("E", bound="Ending")
 
 
 def _nothing() -> None:
     return
+
+
+class Signals:
+    """Notes the signals that would end the program, from `with` on.
+
+    A KeyboardInterrupt may be raised where it is swallowed, in a callback from C or in
+    a user's file, and then the coil would be switched on all the same. What is noted is
+    looked at between two steps; as one of them may compile for 20 s, a second signal
+    ends the program at once as long as nothing is open.
+
+    Args:
+        acts: what signals of other names do while a task runs.
+
+    Attributes:
+        caught: their numbers, as they came.
+    """
+
+    def __init__(self, acts: Mapping[str, Callable[[], None]] | None = None) -> None:
+        self.caught: list[int] = []
+        self.acts = acts or {}
+        self.opened = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Signals:
+        names = (*ENDING, *self.acts)
+        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        self._before = {n: signal.signal(n, self._note) for n in numbers}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def look(self) -> None:
+        """Leave the program if one came; nothing is open yet.
+
+        Raises:
+            click.exceptions.Exit: with 128 and the signal's number.
+        """
+        if self.caught:
+            raise click.exceptions.Exit(128 + self.caught[0])
+
+    def _note(self, number: int, _: FrameType | None) -> None:
+        self.caught.append(number)
+        if self.opened or signal.Signals(number).name in self.acts:
+            return
+        if len(self.caught) > 1:
+            os._exit(128 + self.caught[0])
+        with suppress(OSError):
+            os.write(2, STARTING)
 
 
 @contextmanager
@@ -34,9 +89,7 @@ def interrupted() -> Iterator[None]:
 
 
 def run_attended(
-    task: Task[E],
-    meanwhile: Callable[[], None] = _nothing,
-    acts: Mapping[str, Callable[[], None]] | None = None,
+    task: Task[E], signals: Signals, meanwhile: Callable[[], None] = _nothing
 ) -> E:
     """Run a task in a thread of its own while this one minds the signals.
 
@@ -46,8 +99,9 @@ def run_attended(
 
     Args:
         task: about to run.
+        signals: noted since before it was made; one that came already ends it before
+            it opens anything.
         meanwhile: called every 50 ms.
-        acts: what signals of other names do.
 
     Raises:
         Exception: whatever the task raised.
@@ -55,36 +109,33 @@ def run_attended(
     ended: list[E] = []
     failed: list[BaseException] = []
 
+    def mind() -> None:
+        while signals.caught:
+            number = signals.caught.pop(0)
+            name = signal.Signals(number).name
+            if name in signals.acts:
+                signals.acts[name]()
+            else:
+                task.stop(f"stopped by {name}", signal=number)
+
     def work() -> None:
         try:
             ended.append(task.run())
         except BaseException as error:
             failed.append(error)
 
+    signals.opened = True
+    mind()
     worker = threading.Thread(target=work, name="runner")
-    caught: list[int] = []
-    acts = acts or {}
-    numbers = [getattr(signal, n) for n in (*ENDING, *acts) if hasattr(signal, n)]
-    before = {n: signal.signal(n, lambda got, _: caught.append(got)) for n in numbers}
-    try:
-        worker.start()
-        while worker.is_alive():
-            worker.join(0.05)
-            while caught:
-                number = caught.pop(0)
-                name = signal.Signals(number).name
-                if name in acts:
-                    acts[name]()
-                else:
-                    task.stop(f"stopped by {name}", signal=number)
-            try:
-                meanwhile()
-            except Exception as failure:
-                task.stop(f"stopped as nobody watches any more: {failure}")
-                meanwhile = _nothing
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    worker.start()
+    while worker.is_alive():
+        worker.join(0.05)
+        mind()
+        try:
+            meanwhile()
+        except Exception as failure:
+            task.stop(f"stopped as nobody watches any more: {failure}")
+            meanwhile = _nothing
     if failed:
         raise failed[0]
     return ended[0]

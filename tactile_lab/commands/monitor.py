@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from tactile_lab.commands.attended import run_attended
+from tactile_lab.commands.attended import Signals, run_attended
 from tactile_lab.commands.options import noted, notes_option, runs_option, scene_options
 from tactile_lab.commands.terminal import StatusLine, fail, refusing, say, warn
 
@@ -51,14 +51,27 @@ def command(
     printed, and watching goes on. Nothing else is stored. The simulated bench keeps
     pace with the clock.
     """
-    with refusing():
-        from tactile_lab.engine.monitor import Monitor
-        from tactile_lab.scene.load import load
+    asked: SimpleQueue[str] = SimpleQueue()
+    with Signals({RECORD: lambda: asked.put(RECORD)}) as signals:
+        with refusing():
+            from tactile_lab.engine.monitor import Monitor
+            from tactile_lab.scene.load import load
 
-        loaded = load(scene or "monitor", (*ENDLESS, *overrides), bench)
-        kept = noted(notes)
-        monitor = Monitor(loaded, realtime=True, keep=keep)
-    asked = _entered(sys.stdin)
+            loaded = load(scene or "monitor", (*ENDLESS, *overrides), bench)
+            kept = noted(notes)
+            monitor = Monitor(loaded, realtime=True, keep=keep)
+            signals.look()
+        _watch(monitor, signals, asked, out, kept)
+
+
+def _watch(
+    monitor: Monitor,
+    signals: Signals,
+    asked: SimpleQueue[str],
+    out: Path,
+    kept: dict[str, str],
+) -> None:
+    _listen(sys.stdin, asked)
     sight = Sight(sys.stderr)
 
     def look() -> None:
@@ -67,7 +80,7 @@ def command(
             sight.wipe()
             _record(monitor, out, kept)
 
-    ending = run_attended(monitor, look, {RECORD: lambda: asked.put(RECORD)})
+    ending = run_attended(monitor, signals, look)
     sight.wipe()
     if ending.exit_code and ending.signal is None:
         fail(ending.told, ending.exit_code)
@@ -112,16 +125,14 @@ class Sight:
             self._line.close()
 
 
-def _entered(stream: TextIO) -> SimpleQueue[str]:
-    """Lines of `stream` as they come."""
-    lines: SimpleQueue[str] = SimpleQueue()
+def _listen(stream: TextIO, lines: SimpleQueue[str]) -> None:
+    """Put the lines of `stream` into `lines` as they come."""
 
     def read() -> None:
         for line in stream:
             lines.put(line)
 
     threading.Thread(target=read, name="keyboard", daemon=True).start()
-    return lines
 
 
 def _any(lines: SimpleQueue[str]) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.attended import interrupted, run_attended
+from tactile_lab.commands.attended import Signals, interrupted, run_attended
 from tactile_lab.commands.options import (
     json_option,
     noted,
@@ -110,66 +110,79 @@ def command(
     interrupted by SIGHUP, SIGINT or SIGTERM with the coil verified off.
     """
     began = time.monotonic()
-    with refusing():
-        from tactile_lab.engine.execution import Execution
+    with Signals() as signals:
+        with refusing():
+            from tactile_lab.engine.execution import Execution
 
-        if temperature is not None:
-            overrides = (*overrides, f"conditions.temperature={temperature}")
-        loaded = _scene(scene, overrides, bench, again)
-        if sweeps or repeat > 1:
-            given = {
-                "--realtime": realtime,
-                "--note": notes,
-                "--transcript": transcripts,
-                "--again": again,
-                "--field": field,
-            }
-            _refuse_with_sweep([name for name, value in given.items() if value])
-            _sweep(loaded, sweeps, repeat, out, as_json=as_json)
-            return
-        narrator, person = Narrator(loaded.name), somebody()
-        execution = Execution(
-            loaded,
-            out,
-            realtime=realtime,
-            emit=narrator,
-            notes=noted(notes),
-            ask=person,
-            asked_field=field_reader(loaded, person, field),
-        )
-        if transcripts is not None:
-            record(execution.bench, transcripts)
-        for text in execution.plan.warnings:
-            warn(text)
-    narrator.expect(execution)
-    with interrupted():
-        try:
-            done = run_attended(execution)
-        except Exception as error:
-            with suppress(OSError):
-                narrator.close()
-            fail(str(error), 3 if execution.coil_left_safe else 4)
-            return
-        try:
-            narrator.close()
-            for text in _overrange(done):
+            if temperature is not None:
+                overrides = (*overrides, f"conditions.temperature={temperature}")
+            loaded = _scene(scene, overrides, bench, again)
+            if sweeps or repeat > 1:
+                given = {
+                    "--realtime": realtime,
+                    "--note": notes,
+                    "--transcript": transcripts,
+                    "--again": again,
+                    "--field": field,
+                }
+                _refuse_with_sweep([name for name, value in given.items() if value])
+                with interrupted():
+                    _sweep(loaded, sweeps, repeat, out, as_json=as_json)
+                return
+            signals.look()
+            narrator, person = Narrator(loaded.name), somebody()
+            execution = Execution(
+                loaded,
+                out,
+                realtime=realtime,
+                emit=narrator,
+                notes=noted(notes),
+                ask=person,
+                asked_field=field_reader(loaded, person, field),
+            )
+            if transcripts is not None:
+                record(execution.bench, transcripts)
+            for text in execution.plan.warnings:
                 warn(text)
-            if done.exit_code:
-                say(f"tactile-lab: {done.told}", sys.stderr)
-            report = None if no_report else _report(done)
-            changed = None if again is None else _differences(again, done)
-            if as_json:
-                print_json(answer(done, report, changed))
-            else:
-                _print(done, report, time.monotonic() - began)
-                if changed is not None:
-                    say(f"against {again}\n{changed}")
-        except (Exception, KeyboardInterrupt) as failure:
-            _unreported(done, failure)
+        narrator.expect(execution)
+        done = finished(execution, signals, narrator)
+        with interrupted():
+            try:
+                for text in _overrange(done):
+                    warn(text)
+                if done.exit_code:
+                    say(f"tactile-lab: {done.told}", sys.stderr)
+                report = None if no_report else _report(done)
+                changed = None if again is None else _differences(again, done)
+                if as_json:
+                    print_json(answer(done, report, changed))
+                else:
+                    _print(done, report, time.monotonic() - began)
+                    if changed is not None:
+                        say(f"against {again}\n{changed}")
+            except (Exception, KeyboardInterrupt) as failure:
+                _unreported(done, failure)
     # how the run ended, whatever became of telling it
     if not done.off.verified:
         fail(done.off.text, done.exit_code)
     raise click.exceptions.Exit(done.exit_code)
+
+
+def finished(execution: Execution, signals: Signals, narrator: Narrator) -> Executed:
+    """How an execution ended, which is carried out here.
+
+    Raises:
+        click.exceptions.Exit: it could not be begun; told.
+    """
+    try:
+        done = run_attended(execution, signals)
+    except Exception as error:
+        with suppress(OSError):
+            narrator.close()
+        fail(str(error), 3 if execution.coil_left_safe else 4)
+    with suppress(OSError):
+        narrator.close()
+    return done
 
 
 def _refuse_with_sweep(options: list[str]) -> None:

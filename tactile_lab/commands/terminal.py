@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import click
 
@@ -67,7 +67,7 @@ def warn(message: str) -> None:
         say(f"warning: {message}", sys.stderr)
 
 
-def fail(message: str, code: int) -> None:
+def fail(message: str, code: int) -> NoReturn:
     """Write `message` to stderr, if anybody is there to read it; exit with `code`."""
     with suppress(OSError):
         say(f"tactile-lab: {message}", sys.stderr)

@@ -6,6 +6,7 @@ import inspect
 import platform
 import subprocess
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.store.folder import INPUTS, SCENE, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.table import dumped
+from tactile_lab.trust import remember
 
 PACKAGES = (
     "tactile-lab", "numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb",
@@ -90,6 +92,8 @@ def keep_scene(folder: RunFolder, scene: Scene) -> None:
                 f"{getattr(error, 'strerror', None) or error}."
             ) from error
         folder.write_text(name, text)
+    with suppress(OSError):  # `tactile-lab trust` says what prevents it
+        remember(copies)
 
 
 def temperature(scene: Scene, read_back: Settings) -> dict[str, object]:

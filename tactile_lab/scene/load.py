@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from tactile_lab import trust
 from tactile_lab.columns import read_text
 from tactile_lab.complaint import Blame, complaint, validated, written
 from tactile_lab.errors import SceneError, choices, nearest
@@ -83,7 +84,8 @@ def load(
         if file.suffix == ".py":
             data = {"protocol": {"name": name, "source": file.name}}
         else:
-            data = _read(file, "Scene")
+            data = read_toml(file, "Scene")
+            trust.check(data, file.parent)
     origins = {}
     if bench is not None:
         data["bench"] = (
@@ -181,7 +183,12 @@ def _find(path: str | Path | None) -> Path:
     return file
 
 
-def _read(path: Path, what: str) -> dict[str, Any]:
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """What a TOML file holds.
+
+    Raises:
+        SceneError: it cannot be read, or is no TOML.
+    """
     try:
         return tomllib.loads(read_text(path, what))
     except RecursionError as reason:
@@ -285,7 +292,7 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
                 ("bench", "file"), f"{written(file)}: a text is needed.", blame
             )
         path = (folder / file).resolve()
-        under = _read(path, "Bench file")
+        under = read_toml(path, "Bench file")
         if "file" in under:
             raise SceneError(f'{path}: a bench file has no key "file".')
         _refuse_impossible(under, _blame(str(path), {}))

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_lab.errors import RecordingError, RunFolderError
-from tactile_lab.store.folder import INFO, is_live, read_info, write_json
+from tactile_lab.store.folder import is_live, read_info, write_json
 from tactile_lab.store.remarks import REMARKS, read_remarks
+from tactile_lab.trust import INFO
 
 if TYPE_CHECKING:
     from tactile_lab.store.run import Run

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.trust import INFO
 
 Status = Literal["running", "complete", "aborted", "faulted", "recovered"]
 
@@ -24,7 +25,7 @@ SCHEMA = 1
 SEAL = "sha256"
 """Key of `run.json` with the hash of all the others; runs of older versions lack it."""
 
-INFO, DATA, LOG, SCENE = "run.json", "data.h5", "log.jsonl", "scene.toml"
+DATA, LOG, SCENE = "data.h5", "log.jsonl", "scene.toml"
 
 INPUTS = "inputs"
 """Folder within a run for copies of what it was made from."""

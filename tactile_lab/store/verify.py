@@ -24,7 +24,6 @@ from tactile_lab.store.certificate import (
 from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.folder import (
     DATA,
-    INFO,
     SEAL,
     digest,
     is_live,
@@ -34,6 +33,7 @@ from tactile_lab.store.folder import (
 from tactile_lab.store.layout import BIN, RECORDS
 from tactile_lab.store.progress import Progress, counted, each, nothing
 from tactile_lab.store.run import Run
+from tactile_lab.trust import INFO
 
 UNREADABLE = (OSError, KeyError, RuntimeError)
 """What h5py raises for damaged bytes."""

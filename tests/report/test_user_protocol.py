@@ -16,6 +16,7 @@ from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
+from tactile_lab.trust import remember
 
 OWN = """
 from typing import ClassVar
@@ -71,6 +72,7 @@ def kept(made, folder, old="", new=""):
     text = file.read_text().replace(old, new)
     file.unlink()
     file.write_text(text)
+    remember([file])
     return folder / "run"
 
 

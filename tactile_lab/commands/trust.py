@@ -1,0 +1,44 @@
+"""``tactile-lab trust``: let the code that a run from elsewhere holds be executed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.options import run_argument
+from tactile_lab.commands.terminal import refusing, say
+
+
+@click.command()
+@run_argument
+def command(run: Path) -> None:
+    """Let the code that RUN was made from be executed here, and say what it is.
+
+    To report, identify, plan or repeat a run executes its protocol and its drivers
+    where they are somebody's own. Those of runs recorded here are known; read those of
+    a run you were sent before you trust them.
+    """
+    with refusing():
+        from tactile_lab.errors import SceneError
+        from tactile_lab.scene.load import read_toml
+        from tactile_lab.store.folder import SCENE, digest, read_info
+        from tactile_lab.trust import code_named, known_file, remember
+
+        recorded = read_info(run).get("files") or {}
+        code = code_named(read_toml(run / SCENE, "Scene"), run)
+        for path in code:
+            name = "/".join(path.parts[-2:])
+            found = digest(path.read_bytes())
+            state = "as it was recorded"
+            if recorded.get(name) != found:
+                state = "NOT AS IT WAS RECORDED"
+            say(f"{path}  sha256 {found[:16]}, {state}")
+        try:
+            remember(code)
+        except OSError as reason:
+            raise SceneError(
+                f"{known_file()} cannot be written: {reason.strerror}. Another folder "
+                "is used where the environment variable XDG_DATA_HOME names one."
+            ) from reason
+    say("trusted from now on" if code else f"{run} holds no code of anybody's own")
