@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tactile_lab.bench import CoilCapability, ScopeCapability
+from tactile_lab.errors import SceneError
+from tactile_lab.generator import AnalogueInput
 from tactile_lab.instruments.dialects import coil_dialect, meter_dialect, scope_dialect
 from tactile_lab.instruments.registry import CoilDriver, FieldMeterDriver, ScopeDriver
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from drivers.usbtmc.scope import UsbtmcScope
     from tactile_lab.clock import Clock
     from tactile_lab.instruments.scope_dialect import ScopeDialect
+    from tactile_lab.instruments.serial_dialect import CoilDialect
     from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
 
 DEFAULT_SCOPE = "rigol-ds1000z"
@@ -29,7 +32,14 @@ def _source(table: CoilSpec, clock: Clock) -> CoilSource:
     from drivers.coil.source import CoilSource
 
     row = coil_dialect(table.dialect)
-    return CoilSource(row, table.port, table.limits, clock, baud=table.baud)
+    return CoilSource(
+        row,
+        table.port,
+        table.limits,
+        clock,
+        baud=table.baud,
+        analogue=table.generator is not None,
+    )
 
 
 def _source_capability(table: CoilSpec) -> CoilCapability:
@@ -40,6 +50,25 @@ def _source_capability(table: CoilSpec) -> CoilCapability:
         bipolar=row.polarity == "both",
         update_interval=row.promised_interval(table.baud),
         lists=row.lists(table.baud),
+        analogue=_analogue_input(table, row),
+    )
+
+
+def _analogue_input(table: CoilSpec, row: CoilDialect) -> AnalogueInput | None:
+    """The source's analogue input as it is wired; None where it is not."""
+    wiring, mode = table.generator, row.analogue
+    if wiring is None:
+        return None
+    if mode is None:
+        raise SceneError(
+            f"[coil.generator] wires the scope's generator to {row.title}, whose row "
+            f'"{row.id}" has no [analogue] input. Leave [coil.generator] out, or see '
+            "docs/how-to/add-a-dialect.md."
+        )
+    return AnalogueInput(
+        gain=wiring.gain or mode.gain,
+        range=mode.range,
+        bandwidth=wiring.bandwidth or mode.bandwidth,
     )
 
 
@@ -56,6 +85,7 @@ def _picoscope(table: ScopeSpec, clock: Clock) -> PicoScope:
 
 
 def _picoscope_capability(table: ScopeSpec) -> ScopeCapability:
+    from drivers.picoscope.generator import CAPABILITY
     from drivers.picoscope.scope import GUARANTEED
     from drivers.picoscope.sdk import INPUTS, RANGES
 
@@ -65,6 +95,7 @@ def _picoscope_capability(table: ScopeSpec) -> ScopeCapability:
         ranges=tuple(RANGES),
         bits=8,
         fastest=GUARANTEED,
+        generator=CAPABILITY,
     )
 
 

@@ -39,11 +39,20 @@ def serial_source(table: CoilSpec, world: World) -> CoilSource:
     if (when := world.simulated.coil_unplugged) is not None:
         faults.append(SerialFault(kind="unplug", after=when, times=None))
     source = coil_far_end(world.plant, row, world.clock)
+    if table.generator is not None:
+        source.wire_analogue_input()
     for one in given:
         if isinstance(one, ListFault):
             source.list.fault = one
     far_end = plug_in(source, wire, world.clock, "coil", faults)
-    return CoilSource(row, far_end.url, table.limits, world.clock, baud=table.baud)
+    return CoilSource(
+        row,
+        far_end.url,
+        table.limits,
+        world.clock,
+        baud=table.baud,
+        analogue=table.generator is not None,
+    )
 
 
 def ps3000a(table: ScopeSpec, world: World) -> PicoScope:
@@ -58,6 +67,7 @@ def ps3000a(table: ScopeSpec, world: World) -> PicoScope:
         world.clock,
         world.make or Make(clock_error=clock_error),
         world.faults.get("scope", ()),
+        world.plant.analogue_input,
     )
     return PicoScope(
         clock=world.clock,

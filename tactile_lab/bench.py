@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList, ListCapability
+from tactile_lab.generator import AnalogueInput, Generator, GeneratorCapability
 from tactile_lab.quantity import Unit
 from tactile_lab.table import SceneTable
 
@@ -180,6 +181,30 @@ class ListCoil(Coil, Protocol):
         ...
 
 
+class AnalogueCoil(Coil, Protocol):
+    """A current source that also follows a generator at its analogue input."""
+
+    def follow(self, points: CurrentList, grain: float) -> None:
+        """Follow the analogue input, on which `points` come soon; at 0 A until then.
+
+        Args:
+            points: as the generator plays them, A.
+            grain: step of the generator's converter, A.
+
+        Raises:
+            LimitError: what source, coil or heat budget do not allow.
+        """
+        ...
+
+    def followed_from(self, earliest: float, latest: float) -> None:
+        """The generator began between two clock times, s; what flows is watched."""
+        ...
+
+    def end_follow(self) -> None:
+        """Follow the set-point alone again, 0 A, once the generator has ended."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class CoilCapability:
     """What a source can do, as far as is known before it is opened.
@@ -189,12 +214,15 @@ class CoilCapability:
         bipolar: gives current of both signs.
         update_interval: time between two set-points to plan with, s.
         lists: what lists it plays by its own clock (a `ListCoil`), or None.
+        analogue: its analogue input, where the scope's generator is wired to it (an
+            `AnalogueCoil`), or None.
     """
 
     title: str
     bipolar: bool
     update_interval: float
     lists: ListCapability | None = None
+    analogue: AnalogueInput | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,6 +294,7 @@ class ScopeCapability:
         ranges: full-scale ranges, V.
         bits: resolution of its converter.
         fastest: highest streaming rate for 1, 2, ... enabled channels, S/s.
+        generator: what its waveform generator can (a `GeneratorScope`), or None.
     """
 
     gapless: bool
@@ -273,6 +302,7 @@ class ScopeCapability:
     ranges: tuple[float, ...]
     bits: int
     fastest: tuple[float, ...]
+    generator: GeneratorCapability | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -383,6 +413,15 @@ class Scope(Protocol):
         ...
 
 
+class GeneratorScope(Scope, Protocol):
+    """A digitiser with an arbitrary waveform generator."""
+
+    @property
+    def generator(self) -> Generator:
+        """The generator; usable while the scope is open."""
+        ...
+
+
 class FieldMeter(Protocol):
     """A teslameter."""
 
@@ -416,6 +455,7 @@ class Bench:
         name: for people.
         simulated: whether physics is computed.
         clock: the time all of it lives in.
+        generator: the scope's, where it is wired to the source's analogue input.
         place_probes: puts the probes of the circuit's voltages on "ground", "supply"
             or back on the "circuit"; None where a person must.
         accuracy: says, after a run, how accurate the computed physics was.
@@ -427,5 +467,6 @@ class Bench:
     coil: Coil | None = None
     scope: Scope | None = None
     field_meter: FieldMeter | None = None
+    generator: Generator | None = None
     place_probes: Callable[[str], None] | None = None
     accuracy: Callable[[], str] | None = None

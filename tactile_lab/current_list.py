@@ -44,6 +44,57 @@ class ListCapability:
         """Time to load a list of so many points, s."""
         return self.load_fixed + points * self.load_point
 
+    def following(self, wave: Waveform, digits: int = 5) -> CurrentList:
+        """The list that follows `wave` most closely.
+
+        Points lie where the current moves: it changes by the same small step in each,
+        unless the shortest dwell is too long for that. Each holds the mean of its time.
+
+        Args:
+            wave: A against s from 0, without jumps; it begins and ends at 0 A.
+            digits: decimals of a current on the wire.
+
+        Raises:
+            LimitError: it is longer than the source can play.
+        """
+        moved = np.abs(np.diff(wave.value))
+        lasts = np.diff(wave.time)
+        range_ = float(np.ptp(np.append(wave.value, 0.0)))
+        shortest = self.shortest + self.resolution  # rounding may take as much away
+        # half, for a point may be nearly twice as long as its share
+        least = np.minimum(lasts / (self.longest / 2), lasts / shortest)
+
+        def points_of(step: float) -> FloatArray:
+            """Points that each piece of the wave gets; parts of one count, too."""
+            return np.clip(moved / step, least, lasts / shortest)
+
+        room = self.points - 1
+        if least.sum() > room:
+            raise LimitError(
+                f"{show(wave.end, 's')} are longer than {self.points} points of "
+                f"{show(self.longest / 2, 's')} each. Ask for a shorter trial."
+            )
+        step = max(FINEST * range_, 10.0**-digits)
+        if points_of(step).sum() > room:
+            low, high = step, max(range_, step) * wave.time.size
+            for _ in range(HALVINGS):
+                step = (low * high) ** 0.5
+                low, high = (
+                    (step, high) if points_of(step).sum() > room else (low, step)
+                )
+            step = high
+        share = points_of(step)
+        reached = np.concatenate([[0.0], np.cumsum(share)])
+        points = max(1, int(reached[-1] * (1 + 1e-12)))
+        edges = np.interp(np.linspace(0, reached[-1], points + 1), reached, wave.time)
+        edges = np.round(edges / self.resolution) * self.resolution
+        means = np.diff(_integral(wave, edges)) / np.diff(edges)
+        currents = np.append(np.round(means, digits) + 0.0, 0.0)
+        dwells = np.append(np.diff(edges), self.shortest)
+        return CurrentList(
+            currents, np.round(dwells / self.resolution) * self.resolution
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class CurrentList:
@@ -106,59 +157,6 @@ class CurrentList:
             and np.array_equal(self.currents, other.currents)
             and np.array_equal(self.dwells, other.dwells)
         )
-
-    @classmethod
-    def following(
-        cls, wave: Waveform, can: ListCapability, digits: int = 5
-    ) -> CurrentList:
-        """The list that follows `wave` most closely.
-
-        Points lie where the current moves: it changes by the same small step in each,
-        unless the shortest dwell is too long for that. Each holds the mean of its time.
-
-        Args:
-            wave: A against s from 0, without jumps; it begins and ends at 0 A.
-            can: what the source plays.
-            digits: decimals of a current on the wire.
-
-        Raises:
-            LimitError: it is longer than the source can play.
-        """
-        moved = np.abs(np.diff(wave.value))
-        lasts = np.diff(wave.time)
-        range_ = float(np.ptp(np.append(wave.value, 0.0)))
-        shortest = can.shortest + can.resolution  # rounding may take as much away
-        # half, for a point may be nearly twice as long as its share
-        least = np.minimum(lasts / (can.longest / 2), lasts / shortest)
-
-        def points_of(step: float) -> FloatArray:
-            """Points that each piece of the wave gets; parts of one count, too."""
-            return np.clip(moved / step, least, lasts / shortest)
-
-        room = can.points - 1
-        if least.sum() > room:
-            raise LimitError(
-                f"{show(wave.end, 's')} are longer than {can.points} points of "
-                f"{show(can.longest / 2, 's')} each. Ask for a shorter trial."
-            )
-        step = max(FINEST * range_, 10.0**-digits)
-        if points_of(step).sum() > room:
-            low, high = step, max(range_, step) * wave.time.size
-            for _ in range(HALVINGS):
-                step = (low * high) ** 0.5
-                low, high = (
-                    (step, high) if points_of(step).sum() > room else (low, step)
-                )
-            step = high
-        share = points_of(step)
-        reached = np.concatenate([[0.0], np.cumsum(share)])
-        points = max(1, int(reached[-1] * (1 + 1e-12)))
-        edges = np.interp(np.linspace(0, reached[-1], points + 1), reached, wave.time)
-        edges = np.round(edges / can.resolution) * can.resolution
-        means = np.diff(_integral(wave, edges)) / np.diff(edges)
-        currents = np.append(np.round(means, digits) + 0.0, 0.0)
-        dwells = np.append(np.diff(edges), can.shortest)
-        return cls(currents, np.round(dwells / can.resolution) * can.resolution)
 
 
 def _integral(wave: Waveform, time: FloatArray) -> FloatArray:

@@ -8,9 +8,10 @@ from typing import Literal
 from tactile_lab.current_list import CurrentList
 from tactile_lab.waveform import Waveform
 
-Way = Literal["set-points", "list"]
-"""How a current is played: sent point by point by this computer's clock, or loaded as
-a list that the source plays by its own."""
+Way = Literal["set-points", "list", "generator"]
+"""How a current is played: sent point by point by this computer's clock, loaded as a
+list that the source plays by its own, or as a waveform that the scope's generator plays
+into the source's analogue input."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,18 +20,21 @@ class Drive:
 
     Attributes:
         current: A against s from 0 to the trial's length, as far as it can follow.
-        points: the list that is played instead of set-points, or None.
-        force: N, as the bench believes it comes from a list; None for set-points, whose
-            force depends on what was before.
+        points: what source or generator plays instead of set-points, or None.
+        gain: of the analogue input through which the generator plays, A/V; None for
+            the other ways.
+        force: N, as the bench believes it comes from `points`; None for set-points,
+            whose force depends on what was before.
         error: largest difference between the force asked for and the one given, N;
             None where the trial asks for a current.
         why: why this way.
         warning: where the coil cannot follow what is asked, or None.
-        load: time to load the list, s.
+        load: time to load `points`, s.
     """
 
     current: Waveform
     points: CurrentList | None = None
+    gain: float | None = None
     force: Waveform | None = None
     error: float | None = None
     why: str = ""
@@ -40,4 +44,6 @@ class Drive:
     @property
     def way(self) -> Way:
         """By which way."""
-        return "set-points" if self.points is None else "list"
+        if self.points is None:
+            return "set-points"
+        return "list" if self.gain is None else "generator"

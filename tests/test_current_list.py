@@ -27,7 +27,7 @@ def test_it_is_playable_and_stays_within_a_step_of_the_wave(pieces):
     time = np.concatenate([[0.0], np.cumsum([length for length, _ in pieces]), [0]])
     time[-1] = time[-2] + 0.5
     wave = Waveform(time, np.array([0.0, *(value for _, value in pieces), 0.0]))
-    points = CurrentList.following(wave, KEPCO)
+    points = KEPCO.following(wave)
     assert 1 < len(points) <= KEPCO.points
     assert points.dwells.min() >= KEPCO.shortest * (1 - 1e-9)
     assert points.dwells.max() <= KEPCO.longest
@@ -49,7 +49,7 @@ def test_it_is_playable_and_stays_within_a_step_of_the_wave(pieces):
 
 def test_a_pulse_is_met_to_half_a_percent_and_holds_cost_one_point():
     pulse = Waveform.pulse(1.0, ramp=0.25, hold=4.0, rest=1.0)
-    points = CurrentList.following(pulse, KEPCO)
+    points = KEPCO.following(pulse)
     assert len(points) < 410
     time = np.linspace(0, pulse.end, 20_001)
     assert np.abs(points.at(time) - pulse.at(time)).max() <= 0.0051
@@ -58,10 +58,10 @@ def test_a_pulse_is_met_to_half_a_percent_and_holds_cost_one_point():
 def test_what_does_not_fit_gets_coarser_points_and_what_never_fits_is_refused():
     phase = np.linspace(0, 1, 5001)
     wave = Waveform(10 * phase, np.sin(2 * np.pi * 20 * phase))
-    points = CurrentList.following(wave, KEPCO)
+    points = KEPCO.following(wave)
     assert 900 < len(points) <= 1002
     with pytest.raises(LimitError, match="longer than"):
-        CurrentList.following(Waveform.pulse(1.0, ramp=1, hold=6000), KEPCO)
+        KEPCO.following(Waveform.pulse(1.0, ramp=1, hold=6000))
 
 
 def test_a_steep_list_says_how_steep():

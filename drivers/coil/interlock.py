@@ -41,6 +41,19 @@ STEADY = 0.1
 LAG = 0.02
 """Time by which the measured current may lag behind a list, s."""
 
+LIST = (
+    "The source plays a list that gives",
+    "the list did not start or was cut short, or the circuit is open. Check the front "
+    "panel and the leads",
+)
+GENERATOR = (
+    "The scope's generator asks for",
+    "it did not start, its lead to the source's analogue input is loose, the gain in "
+    "[coil.generator] is another, or the circuit is open. Check the leads, and the "
+    "source's analogue input",
+)
+"""What is said of a current that is not what is played: what plays, and what to do."""
+
 THERMOMETER_EVERY = 1.0
 """Time between two looks at the coil's resistance, s."""
 
@@ -102,6 +115,7 @@ class Interlock:
         self._readback = ReadbackCheck()
         self._setpoint: float | None = None
         self._list: tuple[CurrentList, float, float] | None = None
+        self._player = LIST
         self._changed = time
         self._looked = -math.inf
 
@@ -114,9 +128,16 @@ class Interlock:
         if setpoint is not None:
             self.heat.flow(time, setpoint if on else 0.0)
 
-    def plays(self, points: CurrentList, earliest: float, latest: float) -> None:
+    def plays(
+        self,
+        points: CurrentList,
+        earliest: float,
+        latest: float,
+        player: tuple[str, str] = LIST,
+    ) -> None:
         """A list has begun between `earliest` and `latest` s; counts all its heat."""
         self.flows(latest, None, on=True)
+        self._player = player
         self._list = points, earliest, latest
         self.heat.spend_list(points, earliest)
 
@@ -151,7 +172,7 @@ class Interlock:
         if self._list is not None:
             points, earliest, latest = self._list
             within = points.between(asked - latest - LAG, time - earliest)
-            return self._readback.list_complaint(within, measured)
+            return self._readback.list_complaint(within, measured, self._player)
         if self._setpoint is None or time - self._changed <= STEADY:
             return None
         why = self._readback.complaint(
@@ -253,25 +274,26 @@ class ReadbackCheck:
         )
 
     def list_complaint(
-        self, within: tuple[float, float], measured: float
+        self, within: tuple[float, float], measured: float, player: tuple[str, str]
     ) -> str | None:
         """Why a list that gives what lies `within` must stop, or None; A."""
         if not self._deviates(within, measured):
             return None
         told = " to ".join(show(current, "A") for current in dict.fromkeys(within))
+        plays, check = player
         return (
-            f"The source plays a list that gives {told} now but "
-            f"{show(measured, 'A')} flows, {self.deviating} readings in a row: the "
-            "list did not start or was cut short, or the circuit is open. Check the "
-            "front panel and the leads."
+            f"{plays} {told} now but {show(measured, 'A')} flows, {self.deviating} "
+            f"readings in a row: {check}."
         )
 
     def _deviates(self, within: tuple[float, float], measured: float) -> bool:
         """Whether one reading too many lies outside what is expected, A."""
         low, high = within
-        allowed = max(DEVIATION_SHARE * max(abs(low), abs(high)), DEVIATION)
+        largest = max(abs(low), abs(high))
+        allowed = max(DEVIATION_SHARE * largest, DEVIATION)
         if low - allowed <= measured <= high + allowed:
-            self.deviating = 0
+            if largest > allowed:  # no current agrees with whatever is wrong
+                self.deviating = 0
             return False
         self.deviating += 1
         return self.deviating >= DEVIATING_READINGS

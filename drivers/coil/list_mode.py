@@ -50,6 +50,24 @@ def check_list(points: CurrentList, limits: CoilLimits, row: CoilDialect) -> Lis
                 f"A dwell of {show(dwell, 's')} cannot be played; the source takes "
                 f"{show(mode.shortest, 's')} to {show(mode.longest, 's')}."
             )
+    check_points(points, limits, row)
+    return mode
+
+
+def check_points(
+    points: CurrentList, limits: CoilLimits, row: CoilDialect, grain: float = 0.0
+) -> None:
+    """Refuse currents that may not be played, by whatever keeps their time.
+
+    Args:
+        points: the last must be 0 A.
+        limits: in force.
+        row: the source's dialect.
+        grain: step of what makes the currents, A: a slope may seem so much steeper.
+
+    Raises:
+        LimitError: a current or step is beyond a limit, or they do not end at 0 A.
+    """
     for current in points.currents:
         check_current(float(current), limits, row)
     if points.currents[-1] != 0.0:
@@ -57,13 +75,13 @@ def check_list(points: CurrentList, limits: CoilLimits, row: CoilDialect) -> Lis
             f"The list ends at {show(float(points.currents[-1]), 'A')}; it must end at "
             "0 A, because its last point lasts until someone stops it."
         )
-    if points.steepest > limits.fastest * (1 + 1e-3):
+    grained = grain / float(points.dwells.min())
+    if points.steepest > limits.fastest * (1 + 1e-3) + grained:
         raise LimitError(
             f"Steps of up to {show(points.steepest, 'A/s')} exceed the limit of "
             f"{show(limits.fastest, 'A/s')}. Use smaller or longer steps, or allow "
             "more by list_slew in [coil.limits] of the bench file."
         )
-    return mode
 
 
 def load(wire: CoilWire, mode: ListMode, points: CurrentList) -> None:

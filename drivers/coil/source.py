@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from drivers.coil.guard import Guard, in_process
-from drivers.coil.interlock import Interlock, check_current, narrowed
-from drivers.coil.list_mode import check_list, load
+from drivers.coil.interlock import GENERATOR, Interlock, check_current, narrowed
+from drivers.coil.list_mode import check_list, check_points, load
 from drivers.coil.wire import CoilWire
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading
@@ -36,6 +36,8 @@ class CoilSource:
         guard: armed while the output is on; None for the one that fits the port.
         guarded: False leaves a source without guard, for tests of something else.
         spy: told of every byte, or None.
+        analogue: whether something is wired to its analogue input, so that more may
+            flow than its set-point.
     """
 
     def __init__(
@@ -49,6 +51,7 @@ class CoilSource:
         guard: Guard | None = None,
         guarded: bool = True,
         spy: Spy | None = None,
+        analogue: bool = False,
     ) -> None:
         self.dialect = dialect
         self.warnings: list[str] = []
@@ -73,6 +76,8 @@ class CoilSource:
         self._interval = dialect.promised_interval(baud)
         self._setpoint: float | None = None
         self._loaded: CurrentList | None = None
+        self._analogue = analogue
+        self._follows: CurrentList | None = None
         self._commanded = clock.now()
         self._energised = False
         self._reached = False
@@ -240,6 +245,49 @@ class CoilSource:
         self._wire.set_zero()
         self._took(0.0)
 
+    def follow(self, points: CurrentList, grain: float) -> None:
+        """Follow the analogue input, on which `points` come soon; at 0 A until then.
+
+        The set-point stays 0 A, and what flows is unknown until `end_follow`.
+
+        Args:
+            points: as the generator plays them, A.
+            grain: step of the generator's converter, A.
+
+        Raises:
+            LimitError: nothing is wired to the input, a current, step or heat beyond
+                a limit, or the output is off or not at 0 A.
+            InterlockError: the guard is gone; the output is off by then.
+        """
+        self._interlock.refuse_when_tripped()
+        mode, now = self.dialect.analogue, self._clock.now()
+        if mode is None or not self._analogue:
+            raise LimitError(
+                "Nothing is wired to the source's analogue input; see [coil.generator] "
+                "of the bench file."
+            )
+        check_points(points, self._limits, self.dialect, grain)
+        self._trip_on(self._interlock.before_setting(now))
+        if not self._energised or self._setpoint != 0.0:
+            raise LimitError("A generator starts with the output on and at 0 A.")
+        self._interlock.heat.refuse_list(points, now)
+        self._follows, self._setpoint = points, None
+        for line in mode.on:
+            self._wire.command(line)
+
+    def followed_from(self, earliest: float, latest: float) -> None:
+        """The generator began between two clock times, s; what flows is watched."""
+        if self._follows is not None:
+            self._interlock.plays(self._follows, earliest, latest, GENERATOR)
+
+    def end_follow(self) -> None:
+        """Follow the set-point alone again, 0 A, once the generator has ended."""
+        for line in self.dialect.analogue.off if self.dialect.analogue else ():
+            self._wire.command(line)
+        self._follows = None
+        self._wire.set_zero()
+        self._took(0.0)
+
     def read_current(self) -> Reading:
         """Measured output current, A; now and then the resistance is looked at too.
 
@@ -299,12 +347,14 @@ class CoilSource:
                 "The source was never reached: this program switched nothing on, and "
                 "what its output does is unknown.",
             )
-        self._given_up = None
+        self._given_up = self._follows = None
+        # with a voltage at the analogue input the set-point is not all that flows, and
+        # a set-point of what flows would double it
         report = self._wire.switch_off(
             setpoint=self._setpoint,
             slew=self._limits.slew,
             exchange=self._interval / MARGIN,
-            ramp=ramp,
+            ramp=ramp and not (self._analogue and self._setpoint is None),
         )
         self._commanded = self._clock.now()
         if report.verified:

@@ -11,6 +11,7 @@ from typing import Any
 
 from drivers.opened import Opened
 from drivers.picoscope import status
+from drivers.picoscope.generator import CAPABILITY, PicoGenerator
 from drivers.picoscope.ring import StreamRing
 from drivers.picoscope.sample_count import SampleCount
 from drivers.picoscope.sdk import INPUTS, RANGES, TIME_UNITS
@@ -117,7 +118,13 @@ class PicoScope(Opened):
             ranges=tuple(RANGES),
             bits=16 - self._unit.shift if self._unit.full_scale else 8,
             fastest=GUARANTEED[:inputs],
+            generator=CAPABILITY,
         )
+
+    @property
+    def generator(self) -> PicoGenerator:
+        """The waveform generator; usable while the scope is open and its thread's."""
+        return PicoGenerator(self._unit)
 
     @property
     def poll_interval(self) -> float:

@@ -11,7 +11,16 @@ import os
 import struct
 import sys
 from collections.abc import Iterable, Mapping
-from ctypes import POINTER, c_float, c_int8, c_int16, c_int32, c_uint32, c_void_p
+from ctypes import (
+    POINTER,
+    c_double,
+    c_float,
+    c_int8,
+    c_int16,
+    c_int32,
+    c_uint32,
+    c_void_p,
+)
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +64,19 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     ),
     "ps3000aGetStreamingLatestValues": (c_int16, STREAMING_READY, c_void_p),
     "ps3000aStop": (c_int16,),
+    "ps3000aSetSigGenBuiltIn": (
+        c_int16, c_int32, c_uint32, c_int16, c_float, c_float, c_float, c_float, _enum,
+        _enum, c_uint32, c_uint32, _enum, _enum, c_int16,
+    ),
+    "ps3000aSetSigGenArbitrary": (
+        c_int16, c_int32, c_uint32, c_uint32, c_uint32, c_uint32, c_uint32, _int16s,
+        c_int32, _enum, _enum, _enum, c_uint32, c_uint32, _enum, _enum, c_int16,
+    ),
+    "ps3000aSigGenArbitraryMinMaxValues": (
+        c_int16, _int16s, _int16s, _uint32s, _uint32s,
+    ),
+    "ps3000aSigGenFrequencyToPhase": (c_int16, c_double, _enum, c_uint32, _uint32s),
+    "ps3000aSigGenSoftwareControl": (c_int16, c_int16),
 }  # fmt: skip
 """Argument types by function; all return PICO_STATUS, an unsigned 32-bit integer."""
 

@@ -117,6 +117,16 @@ MEANINGS: dict[int, Meaning] = {
         "record.sample_rate or use fewer inputs",
         LimitError,
     ),
+    0x2E: Meaning(
+        "SIG_GEN_PARAM", "the generator cannot do this; an A model has none", LimitError
+    ),
+    0x30: Meaning(
+        "SIGGEN_TRIGGER_SOURCE", "the generator holds no waveform that waits for this"
+    ),
+    0x38: Meaning(
+        "SIGGEN_OFFSET_VOLTAGE", "beyond the generator's voltage", LimitError
+    ),
+    0x39: Meaning("SIGGEN_PK_TO_PK", "beyond the generator's voltage", LimitError),
     0x3A: Meaning("CANCELLED", "the operation was cancelled; start again"),
     0x3C: Meaning("INVALID_CALL", "this call is not possible now; start again"),
     DRIVER_FUNCTION: Meaning(

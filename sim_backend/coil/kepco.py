@@ -103,6 +103,7 @@ KEPCO = SourceModel(
     max_line=127,
     max_queries=4,
     rewrite=_digits,
+    analogue=(0.5, 2e3),
 )
 
 PLAIN = SourceModel(rating=(2.0, 20.0), commands=_plain)

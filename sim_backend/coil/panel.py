@@ -5,6 +5,7 @@ The commands that move them differ by model: `sim_backend.coil.kepco` and others
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ class CoilPanel:
         clock: the bench's time.
         rating: largest current A and voltage V.
         output_on: whether the output is on when first connected.
+        analogue: A/V and bandwidth, Hz, of its analogue input.
     """
 
     def __init__(
@@ -40,7 +42,9 @@ class CoilPanel:
         clock: Clock,
         rating: tuple[float, float],
         output_on: bool = False,
+        analogue: tuple[float, float] | None = None,
     ) -> None:
+        self.analogue = analogue
         self._plant = plant
         self._clock = clock
         self.rating = rating
@@ -72,6 +76,12 @@ class CoilPanel:
         self.on_change(PanelChange("set", time, current))
         if self.current_mode:
             self._plant.set_current(time, current)
+
+    def wire_analogue_input(self) -> None:
+        """Wire a generator to the analogue input, if there is one."""
+        if self.analogue is not None:
+            self._plant.gain, bandwidth = self.analogue
+            self._plant.lag = 1 / (2 * math.pi * bandwidth)
 
     def play_list(self, yes: bool) -> None:
         """Play the list, or go back to the set-point."""
@@ -126,6 +136,7 @@ class SourceModel:
         max_line, max_queries: what one message may hold.
         rewrite: what its number parser makes of a line.
         standard: has SCPI's error queue.
+        analogue: A/V and bandwidth, Hz, of its analogue input; None where it has none.
     """
 
     rating: tuple[float, float]
@@ -136,6 +147,7 @@ class SourceModel:
     max_queries: int | None = None
     rewrite: Callable[[bytes], bytes] = bytes
     standard: bool = True
+    analogue: tuple[float, float] | None = None
 
 
 def bare(action: Callable[[], None]) -> Handler:

@@ -55,7 +55,7 @@ class SimCoilSource(CoilPanel):
                 f"for {', '.join(MODELS)}."
             )
         known = MODELS[model]
-        super().__init__(plant, clock, known.rating, output_on)
+        super().__init__(plant, clock, known.rating, output_on, known.analogue)
         self.reply_end = known.reply_end
         self.clearing = known.clearing
         self._rewrite = known.rewrite
@@ -85,7 +85,10 @@ class RowCoil(CoilPanel):
     """
 
     def __init__(self, plant: DrivenCoil, row: CoilDialect, clock: Clock) -> None:
-        super().__init__(plant, clock, (row.current, row.voltage))
+        mode = row.analogue
+        analogue = None if mode is None else (mode.gain, mode.bandwidth)
+        rating = row.current, row.voltage
+        super().__init__(plant, clock, rating, analogue=analogue)
         self._row = row
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")

@@ -10,7 +10,16 @@ import ctypes
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from ctypes import POINTER, c_float, c_int8, c_int16, c_int32, c_uint32, c_void_p
+from ctypes import (
+    POINTER,
+    c_double,
+    c_float,
+    c_int8,
+    c_int16,
+    c_int32,
+    c_uint32,
+    c_void_p,
+)
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +27,14 @@ from numpy.typing import NDArray
 
 from sim_backend.picoscope import codes as unit
 from sim_backend.picoscope.faults import ScopeFault
+from sim_backend.picoscope.generator import (
+    CLOCK,
+    MEMORY,
+    PHASE,
+    Output,
+    SimulatedGenerator,
+    nowhere,
+)
 from sim_backend.picoscope.scope import Make, SimulatedPicoScope
 from sim_backend.plant.scope_source import SampleSource
 from tactile_lab.clock import Clock
@@ -67,6 +84,7 @@ class FakePs3000a:
         clock: the time the scope lives in.
         make: what the scope is and how it is connected.
         faults: what goes wrong, and when.
+        output: what the waveform generator is wired to.
     """
 
     def __init__(
@@ -75,7 +93,10 @@ class FakePs3000a:
         clock: Clock,
         make: Make | None = None,
         faults: Sequence[ScopeFault] = (),
+        output: Output = nowhere,
     ) -> None:
+        error = (make or Make()).clock_error
+        self.generator = SimulatedGenerator(clock, output, error)
         self.device = SimulatedPicoScope(source, clock, make or Make(), faults)
         self.errors: list[BaseException] = []
         self.in_callback = False
@@ -248,3 +269,60 @@ class FakePs3000a:
     @header(c_int16)
     def _stop(self) -> int:
         return self.device.stop()
+
+    @header(
+        c_int16, c_int32, c_uint32, c_int16, c_float, c_float, c_float, c_float,
+        c_int32, c_int32, c_uint32, c_uint32, c_int32, c_int32, c_int16,
+    )  # fmt: skip
+    def _set_sig_gen_built_in(
+        self, offset: int, peaks: int, wave: int, *rest: Any
+    ) -> int:
+        if self.device.streaming:
+            return unit.BUSY
+        # PS3000A_DC_VOLTAGE, the only one that is of use here; triggered by nothing
+        if wave != 8 or peaks or any(rest):
+            return unit.INVALID_PARAMETER
+        return self.generator.hold(offset)
+
+    @header(
+        c_int16, c_int32, c_uint32, c_uint32, c_uint32, c_uint32, c_uint32,
+        POINTER(c_int16), c_int32, c_int32, c_int32, c_int32, c_uint32, c_uint32,
+        c_int32, c_int32, c_int16,
+    )  # fmt: skip
+    def _set_sig_gen_arbitrary(
+        self, offset: int, peaks: int, start: int, stop: int, increment: int,
+        dwell: int, samples: Any, size: int, sweep: int, operation: int, index: int,
+        shots: int, sweeps: int, edge: int, trigger: int, level: int,
+    ) -> int:  # fmt: skip
+        if self.device.streaming:
+            return unit.BUSY
+        if not samples:
+            return unit.NULL_PARAMETER
+        unused = (increment, dwell, sweep, operation, index, sweeps, edge, level)
+        # one shot at the software's trigger (PS3000A_SIGGEN_SOFT_TRIG)
+        if start != stop or any(unused) or shots != 1 or trigger != 4:
+            return unit.INVALID_PARAMETER
+        return self.generator.load(offset, peaks, start, samples[:size])
+
+    @header(
+        c_int16, POINTER(c_int16), POINTER(c_int16), POINTER(c_uint32),
+        POINTER(c_uint32),
+    )  # fmt: skip
+    def _sig_gen_arbitrary_min_max_values(
+        self, low: Any, high: Any, least: Any, most: Any
+    ) -> int:
+        low[0], high[0], least[0], most[0] = -32768, 32767, 1, MEMORY
+        return unit.OK
+
+    @header(c_int16, c_double, c_int32, c_uint32, POINTER(c_uint32))
+    def _sig_gen_frequency_to_phase(
+        self, frequency: float, index: int, length: int, phase: Any
+    ) -> int:
+        if index:
+            return unit.INVALID_PARAMETER
+        phase[0] = round(frequency * length / MEMORY * PHASE / CLOCK)
+        return unit.OK
+
+    @header(c_int16, c_int16)
+    def _sig_gen_software_control(self, state: int) -> int:
+        return self.generator.trigger()

@@ -103,11 +103,13 @@ class Plant(DrivenCoil):
     def field(self, time: float) -> float:
         """Flux density of the electromagnet at `time` s, T."""
         with self._lock:
+            self._reach(time)
             return float(self.magnet.field(self._effective(time)))
 
     def force(self, time: float) -> float:
         """Force on the cantilever at `time` s, the constant attraction included, N."""
         with self._lock:
+            self._reach(time)
             drive = float(self.magnet.force(self._effective(time)))
             return drive * self.options.force + self.options.attraction
 
@@ -163,6 +165,7 @@ class Plant(DrivenCoil):
         end = started + (first_sample + n) * interval
         codes = np.empty((len(channels), n), dtype=np.int16)
         with self._lock:
+            self._reach(end)
             inputs = self._inputs(tuple(channels), started, full_scale, shift)
             signals = [each.signal for each, _ in inputs]
             self._sensor.need((s for s in signals if s in NEEDS), start)

@@ -30,6 +30,9 @@ from tactile_lab.trial import Outcome, Trial
 MOST_UNLIKE = 0.25
 """Part of the sampled current's variance that a list may leave open."""
 
+MOST_SCALED = 0.03
+"""Part by which the current that a generator asks for may be another."""
+
 MOST_LONGER = 3e-3
 """Time by which a list may come too late half-way, s."""
 
@@ -203,10 +206,13 @@ class Account:
             del self.edges[CLUSTER:-CLUSTER]
             self.edges.extend(found)
 
-    def note_list(self, played: PlayedList, shunt: Trace | None, lag: float) -> None:
+    def note_list(
+        self, played: PlayedList, shunt: Trace | None, lag: float, code: float
+    ) -> None:
         """A list has been played: find it in the binned coil current, where there is.
 
-        Its points are written down as the samples show them, `lag` s before.
+        Its points are written down as the samples show them, `lag` s before. One code
+        of that current is `code` A.
         """
         seen = None
         if self._origin is not None and shunt is not None:
@@ -223,6 +229,14 @@ class Account:
         else:
             self.write_current(seen.edge.sampled - self.axis(played.began) - lag)
             self.edges.append(seen.edge)
+            sure = code / 2 / float(np.ptp(played.points.currents))
+            if played.generated and abs(seen.scale - 1) > MOST_SCALED + sure:
+                self.warn(
+                    f"The coil current that was sampled is {seen.scale:.3g} ± "
+                    f"{sure:.1g} (half a code) of the one that the generator was to "
+                    "give. What was sampled is kept. Multiply gain in [coil.generator] "
+                    "by that, or check the shunt's resistance."
+                )
             if abs(seen.longer) > MOST_LONGER:
                 self.warn(
                     f"The source took {show(seen.longer, 's', 2)} longer than asked "

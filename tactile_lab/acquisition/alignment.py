@@ -103,11 +103,13 @@ class SeenList:
         edge: where it began, on both clocks.
         unlike: part of the current's variance that the list does not account for.
         longer: by how much its second half came later than its first, s.
+        scale: the current that was seen as a part of the list's.
     """
 
     edge: Edge
     unlike: float
     longer: float
+    scale: float
 
 
 def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
@@ -129,7 +131,10 @@ def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
     shift, unlike = _best(points, began, inside, shifts)
     latest = played.latest - zero + COIL_LAG
     edge = Edge(began + shift, played.earliest - zero, latest)
-    return SeenList(edge, unlike, _longer(points, began + shift, inside))
+    asked = points.mean(inside.time - began - shift, inside.width)
+    seen = inside.mean.astype(np.float64)
+    scale = float(np.cov(asked, seen)[0, 1] / (np.var(asked, ddof=1) or 1.0))
+    return SeenList(edge, unlike, _longer(points, began + shift, inside), scale)
 
 
 def _longer(points: CurrentList, began: float, seen: Trace) -> float:

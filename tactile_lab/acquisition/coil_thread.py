@@ -9,16 +9,21 @@ from typing import cast
 import numpy as np
 
 from tactile_lab.acquisition.ending import CoilState
+from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
 from tactile_lab.acquisition.stop import Lease, StopRequest
-from tactile_lab.bench import Coil, ListCoil, OffReport
+from tactile_lab.bench import AnalogueCoil, Coil, ListCoil, OffReport
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList
+from tactile_lab.drive import Drive
 from tactile_lab.errors import InstrumentError
 from tactile_lab.waveform import Waveform
 
 READ_BACK_EVERY = 0.25
 """Seconds between read-backs while the set-point rests."""
+
+READ_BACK_PLAYED = 0.1
+"""Seconds between read-backs while a list plays, which needs nothing sent."""
 
 READ_BACK_AT_LEAST = 1.0
 """Seconds between read-backs while it moves: each costs a part of an update."""
@@ -56,16 +61,18 @@ class Applied:
 
 @dataclass(frozen=True)
 class PlayedList:
-    """A list of currents that the source plays by its own clock.
+    """A list of currents that source or generator plays by its own clock.
 
     Attributes:
         points: the list.
         earliest, latest: between which clock times it began, s.
+        generated: whether the scope's generator plays it.
     """
 
     points: CurrentList
     earliest: float
     latest: float
+    generated: bool = False
 
     @property
     def began(self) -> float:
@@ -83,11 +90,14 @@ class CoilThread(InstrumentThread):
 
     Each set-point is the waveform's value at the time it is sent, so a late one is
     never queued: the latest value wins and slots that passed unused are counted. A
-    list is loaded, started and watched; the source keeps its time.
+    list is loaded, started and watched; the source, or the scope's generator at its
+    analogue input, keeps its time.
 
     Attributes:
         loaded: the list that the source holds, or None.
         list: the list of this trial, playing or played, or None.
+        generator: plays lists into the source's analogue input; None where it is not
+            wired.
     """
 
     def __init__(
@@ -117,6 +127,8 @@ class CoilThread(InstrumentThread):
         self.list: PlayedList | None = None
         self._load: CurrentList | None = None
         self._start_list = False
+        self._generated: CurrentList | None = None
+        self.generator: GeneratorPlayer | None = None
         self._playing = False
         self._passed = 0
 
@@ -142,14 +154,19 @@ class CoilThread(InstrumentThread):
         """Whether a list plays."""
         return self._playing
 
-    def load_list(self, points: CurrentList) -> None:
-        """Ask for a list to be loaded; it is once `loaded` is this one."""
-        self._load = points
+    def load_list(self, drive: Drive) -> None:
+        """Ask for a drive's list to be loaded; it is once `loaded` is this one."""
+        self._load = drive.points
         self.clock.notify()
 
     def play_list(self) -> None:
         """Ask for the loaded list to be played; `list` tells when it began."""
         self.list, self._start_list = None, True
+        self.clock.notify()
+
+    def play_generated(self, points: CurrentList) -> None:
+        """Ask for what the generator holds to be played; `list` tells when it began."""
+        self.list, self._generated = None, points
         self.clock.notify()
 
     def take_warnings(self) -> list[str]:
@@ -183,6 +200,8 @@ class CoilThread(InstrumentThread):
                 self.clock.notify()
             if self._load is not None or self._start_list:
                 self._begin_list(cast("ListCoil", self.coil))
+            if self._generated is not None and self.generator is not None:
+                self._begin_generated(self._generated, self.generator)
             if self.list is not None and self._playing:
                 self._watch(self.list, self.clock.now())
             now = self.clock.now()
@@ -192,6 +211,8 @@ class CoilThread(InstrumentThread):
 
     def make_safe_and_close(self) -> None:
         """Switch off, verify by read-back, close."""
+        if self.generator is not None and self._playing:
+            self.generator.ramp_down(self.coil.beat)
         self.off = self.coil.safe_off()
         self.live = False
         try:
@@ -204,6 +225,7 @@ class CoilThread(InstrumentThread):
     def _called(self) -> bool:
         due = self._waveform is not None and self.clock.now() >= self._next
         asked = self._energise or self._load is not None or self._start_list
+        asked = asked or self._generated is not None
         return due or asked or self._leaving or self._stop.requested
 
     def _wake(self) -> float:
@@ -247,12 +269,26 @@ class CoilThread(InstrumentThread):
             self._read = asked
         self.clock.notify()
 
+    def _begin_generated(self, points: CurrentList, player: GeneratorPlayer) -> None:
+        """Have the source follow the generator, and start that."""
+        coil = cast("AnalogueCoil", self.coil)
+        self._generated = None
+        coil.follow(points, player.grain)
+        self._playing = True
+        began = player.start()
+        coil.followed_from(*began)
+        self.list = PlayedList(points, *began, generated=True)
+        self._passed, self._read = 0, began[0]
+        self.clock.notify()
+
     def _watch(self, played: PlayedList, now: float) -> None:
         """Note the points that have passed, read back now and then, end the list."""
-        points, coil = played.points, cast("ListCoil", self.coil)
+        points, coil = played.points, self.coil
         passed = int(np.searchsorted(points.starts, now - played.latest, side="right"))
         for k in range(self._passed, passed):
             at, current = float(points.starts[k]), float(points.currents[k])
+            if k > 0 and current == points.currents[k - 1]:
+                continue  # a generator repeats what stands still
             point = Applied(
                 played.earliest + at, played.began + at, current, None, listed=True
             )
@@ -260,11 +296,15 @@ class CoilThread(InstrumentThread):
             self._applied.append(point)
         self._passed = max(passed, self._passed)
         if now >= played.end:
-            coil.end_list()
+            if played.generated:
+                cast("AnalogueCoil", coil).end_follow()
+                cast("GeneratorPlayer", self.generator).ended()
+            else:
+                cast("ListCoil", coil).end_list()
             self._playing = False
             self._note(self._read_back(now, 0.0))
             self.clock.notify()
-        elif now - self._read >= READ_BACK_EVERY:
+        elif now - self._read >= READ_BACK_PLAYED:
             # judged by the driver; it belongs to no one point, so it is no `Applied`
             reading = coil.read_current()
             self.measured, self._read = reading.value, reading.time

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tactile_lab.acquisition.coil_thread import CoilThread
+from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instrument_thread import InstrumentThread
 from tactile_lab.acquisition.meter_thread import MeterThread
 from tactile_lab.acquisition.scope_thread import ScopeThread
@@ -34,9 +35,14 @@ class Instruments:
     def of(cls, bench: Bench, stop: StopRequest, lease: Lease) -> Instruments:
         """Threads for what the bench has; none started, nothing opened."""
         clock = bench.clock
+        coil = CoilThread(bench.coil, clock, stop, lease) if bench.coil else None
+        scope = ScopeThread(bench.scope, clock) if bench.scope else None
+        if coil is not None and scope is not None and bench.generator is not None:
+            slew = coil.coil.limits.slew
+            coil.generator = GeneratorPlayer(bench.generator, scope, slew)
         return cls(
-            coil=CoilThread(bench.coil, clock, stop, lease) if bench.coil else None,
-            scope=ScopeThread(bench.scope, clock) if bench.scope else None,
+            coil=coil,
+            scope=scope,
             meter=MeterThread(bench.field_meter, clock) if bench.field_meter else None,
         )
 

@@ -19,6 +19,7 @@ from tactile_lab.acquisition.account import Account
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
@@ -29,7 +30,7 @@ from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.current_list import CurrentList
-from tactile_lab.drive import Drive
+from tactile_lab.drive import Drive, Way
 from tactile_lab.errors import (
     InstrumentError,
     RecordingError,
@@ -131,10 +132,13 @@ class Runner:
     def _connect(self) -> None:
         self._account.state(events.RunState.CONNECTING, "opening instruments")
         self.instruments.open(self._pump.until)
+        coil = self.instruments.coil
+        if coil is not None and (generator := coil.generator) is not None:
+            generator.silence()  # before anything can follow it
+            self._pump.until(lambda: generator.quiet)
         for text in self._program.doubts(self.instruments.settings):
             self._account.warn(text)
         self._pump.start_stream()
-        coil = self.instruments.coil
         if coil is not None:
             coil.energise()
             self._pump.until(lambda: coil.live)
@@ -167,7 +171,7 @@ class Runner:
         asked = self._program.asked_field if trial.hold is not None else None
         coil = self.instruments.coil
         if coil is not None and drive is not None and drive.points is not None:
-            self._start_list(coil)
+            self._start(coil, drive.points, drive.way)
         begin, start = self._begin(index, trial)
         end = begin + trial.length
         # a current that waits for a person is watched as long as that takes
@@ -329,23 +333,28 @@ class Runner:
             return None
         before = coil.last.setpoint if coil.last is not None else 0.0
         drive = self._program.drive_for(trial, coil.coil.update_interval, before)
-        if drive.points is not None and not drive.points.same_as(coil.loaded):
-            self._load(coil, drive.points)
+        holder = coil if drive.gain is None else coil.generator
+        if drive.points is not None and holder is not None:
+            if not drive.points.same_as(holder.loaded):
+                self._load(holder, drive)
         return drive
 
-    def _load(self, coil: CoilThread, points: CurrentList) -> None:
-        """Have a list loaded; nothing is streamed meanwhile."""
+    def _load(self, holder: CoilThread | GeneratorPlayer, drive: Drive) -> None:
+        """Have the drive's list loaded; nothing is streamed meanwhile."""
         start = self._account.now
         self._pump.stop_stream()
-        coil.load_list(points)
-        self._pump.until(lambda: coil.loaded is points)
+        holder.load_list(drive)
+        self._pump.until(lambda: holder.loaded is drive.points)
         self._account.pause(start, self._account.now)
         self._pump.start_stream()
         self._rest(2 * BASELINE)
 
-    def _start_list(self, coil: CoilThread) -> None:
+    def _start(self, coil: CoilThread, points: CurrentList, way: Way) -> None:
         """Have the loaded list played, and wait until it has begun."""
-        coil.play_list()
+        if way == "generator":
+            coil.play_generated(points)
+        else:
+            coil.play_list()
         self._pump.until(lambda: coil.list is not None)
 
     def _play_current(self, drive: Drive | None, begin: float, end: float) -> int:
@@ -374,7 +383,8 @@ class Runner:
             self._account.note_edges(shunt)
         coil = self.instruments.coil
         if coil is not None and coil.list is not None:
-            self._account.note_list(coil.list, shunt, self._program.coil_lag)
+            code = self._codes().get("coil_current", 0.0)
+            self._account.note_list(coil.list, shunt, self._program.coil_lag, code)
 
 
 def _missing(*failures: BaseException | None) -> str | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.instrument_thread import InstrumentThread
+from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
 from tactile_lab.bench import Block, Channel, Scope, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError, RecordingError
@@ -34,6 +34,13 @@ class ScopeThread(InstrumentThread):
         self._wanted: tuple[tuple[Channel, ...], float] | None = None
         self._halt = False
         self._due: float | None = None
+        self._jobs: deque[Callable[[], None]] = deque()
+        self.before_close: Callable[[], None] | None = None
+
+    def do(self, job: Callable[[], None]) -> None:
+        """Ask for `job` to be done in the scope's thread, between two polls."""
+        self._jobs.append(job)
+        self.clock.notify()
 
     def stream_from(self, channels: Sequence[Channel], interval: float) -> None:
         """Ask for a stream; `stream` is set once it runs."""
@@ -82,7 +89,10 @@ class ScopeThread(InstrumentThread):
         while not self._leaving:
             now = self.clock.now()
             if self._halt:
-                self._end_stream()
+                self.end_stream()
+            for job in drained(self._jobs):
+                job()
+                self.clock.notify()
             if self._wanted is not None and self.stream is None:
                 self.stream = self.scope.start(*self._wanted)
                 self.settings.update(self.scope.settings())
@@ -102,6 +112,8 @@ class ScopeThread(InstrumentThread):
         """Stop the stream and close."""
         try:
             try:
+                if self.before_close is not None and self.opened:
+                    self.before_close()
                 self.scope.stop()
                 if self.opened and self.failure is None:
                     self.settings_after = self.scope.settings()
@@ -112,7 +124,7 @@ class ScopeThread(InstrumentThread):
         self.stream = None
 
     def _called(self) -> bool:
-        if self._leaving or self._halt:
+        if self._leaving or self._halt or self._jobs:
             return True
         if self._wanted is not None and self.stream is None:
             return True
@@ -123,7 +135,8 @@ class ScopeThread(InstrumentThread):
             return None
         return poll if self._due is None else min(poll, self._due)
 
-    def _end_stream(self) -> None:
+    def end_stream(self) -> None:
+        """Hand over the last samples and stop; only in the scope's thread."""
         if self.stream is not None:
             self._poll()
             self.scope.stop()

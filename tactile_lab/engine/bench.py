@@ -85,12 +85,15 @@ def equipped(
         made: Instrument = make(kind, table)
         return made
 
+    scope = instrument(ScopeDriver, bool(needed.channels))
+    wired = spec.coil is not None and spec.coil.generator is not None
     return Bench(
         name=spec.name,
         simulated=spec.simulated,
         clock=clock,
         coil=instrument(CoilDriver, needed.coil),
-        scope=instrument(ScopeDriver, bool(needed.channels)),
+        scope=scope,
+        generator=getattr(scope, "generator", None) if wired else None,
         field_meter=instrument(FieldMeterDriver, needed.field_meter),
         **also,
     )

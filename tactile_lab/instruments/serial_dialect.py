@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from tactile_lab.bench import CoilLimits
 from tactile_lab.current_list import ListCapability
 from tactile_lab.errors import SceneError
-from tactile_lab.quantity import Current, Duration, Pause, Voltage, show
+from tactile_lab.quantity import Current, Duration, Pause, Unit, Voltage, show
 
 MARGIN = 1.5
 """Factor by which the promised update interval exceeds the typical one."""
@@ -121,6 +121,23 @@ class ListMode(Strict):
     longest: Duration
 
 
+class AnalogueMode(Strict):
+    """An input that adds a current to the set-point, in proportion to its voltage.
+
+    Attributes:
+        gain: A/V, as the maker says; a bench file may know it better.
+        range: largest voltage it takes, V.
+        bandwidth: Hz, into a coil; a bench file may know it better.
+        on, off: lines that have the source follow it, and no longer.
+    """
+
+    gain: Annotated[float, Unit("A/V", above=0.0)]
+    range: Annotated[float, Unit("V", above=0.0)]
+    bandwidth: Annotated[float, Unit("Hz", above=0.0)]
+    on: Lines = ()
+    off: Lines = ()
+
+
 class Dialect(Strict):
     """What every dialect has.
 
@@ -195,6 +212,7 @@ class CoilDialect(SerialDialect):
             relies on output state and set-point.
         join: text that joins a line and the error query into one; "": two lines.
         list: list mode, None where the model has none worth using.
+        analogue: analogue input, None where the model has none.
     """
 
     role: Literal["coil"]
@@ -218,6 +236,7 @@ class CoilDialect(SerialDialect):
     measures_when_off: bool = True
     join: str = ";:"
     list: ListMode | None = None
+    analogue: AnalogueMode | None = None
 
     def try_templates(self, where: str) -> None:
         """Fill in every template with extremes.

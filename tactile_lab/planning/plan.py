@@ -22,6 +22,14 @@ if TYPE_CHECKING:
     from tactile_lab.model.simulate import Result
 
 
+BY_WAY = {
+    "set-points": "by set-points",
+    "list": "by lists",
+    "generator": "by the generator",
+}
+"""What the plan calls trials played so."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Plan:
     """What a run of a scene takes, needs, leaves out, and where it falls short.
@@ -208,7 +216,7 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     pauses = cost.duration - cost.streamed - loading
     paused = f", {_time(pauses)} of it pauses" if pauses > 1e-9 else ""
     if loading > 1e-9:
-        paused += f", {_time(loading)} to load lists"
+        paused += f", {_time(loading)} to load waveforms"
     yield "duration", f"{_time(cost.duration)}, {count(cost.trials, 'trial')}{paused}"
     channels = len(plan.needs.channels)
     yield (
@@ -228,7 +236,8 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         f"{cost.heat:.2g} of {cost.heat_budget:g} A² s",
     )
     ways = {used.way for used in plan.ways}
-    if cost.update_interval is not None and ways != {"list"}:
+    by_points = not ways or "set-points" in ways
+    if cost.update_interval is not None and by_points:
         yield (
             "set-points",
             f"{1 / cost.update_interval:.3g} a second (one each "
@@ -236,7 +245,7 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
             f"{show(cost.step_current, 'A', 3)} or {show(cost.step_force, 'N', 3)}",
         )
     for used in plan.ways:
-        yield ("by set-points" if used.way == "set-points" else "by lists"), str(used)
+        yield BY_WAY[used.way], str(used)
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
     if plan.preview is not None:

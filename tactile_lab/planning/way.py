@@ -1,7 +1,9 @@
 """By which way the coil gives a trial's force: one rule, for the plan and for the run.
 
-Set-points need nothing but a slow line, and the force goes in stairs. A list that the
-source plays by its own clock has steps as short as its dwell, and takes time to load.
+Set-points need nothing but a slow line, and the force goes in stairs. The scope's
+generator, where it is wired to the source's analogue input, has short steps and loads
+at once. A list that the source plays by its own clock has steps as short as its dwell,
+and takes time to load.
 The first of these whose force is as near as the scene wants is taken, else the nearest.
 """
 
@@ -14,10 +16,15 @@ from functools import lru_cache
 import numpy as np
 
 from tactile_lab.bench import CoilLimits
-from tactile_lab.current_list import CurrentList, ListCapability
+from tactile_lab.current_list import ListCapability
 from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, SceneError
-from tactile_lab.instruments.registry import BY_PERSON, coil_capability
+from tactile_lab.generator import GeneratedCurrent
+from tactile_lab.instruments.registry import (
+    BY_PERSON,
+    coil_capability,
+    scope_capability,
+)
 from tactile_lab.instruments.serial_dialect import MARGIN
 from tactile_lab.lag import Lag
 from tactile_lab.magnetics import Magnet
@@ -30,6 +37,9 @@ from tactile_lab.waveform import Waveform
 
 AT_ZERO = 1e-5
 """Current that counts as none, A."""
+
+SAMPLED = frozenset({"V_C1", "V_C2", "V_K", "coil_current", "I_DS", "spikes", "rate"})
+"""Signals for which the scope is opened."""
 
 LEADS = 3
 """Times a current is led by what the one before left behind."""
@@ -62,21 +72,34 @@ def drive_for(
     way, enough = scene.coil.way, scene.force_accuracy
     if asked is None or asked.peak == 0 or way == "set-points":
         return steps
-    range_ = float(np.ptp(np.append(asked.value, 0.0)))
-    if way == "auto" and steps.error is not None and steps.error <= enough * range_:
+    near = enough * float(np.ptp(np.append(asked.value, 0.0)))
+    if way == "auto" and _error(steps) <= near:
         return steps
-    try:
-        points = _list(trial, scene, wanted, asked, before)
-    except LimitError as reason:
-        if way == "list":
-            raise SceneError(
-                f'trial "{trial.label}" cannot be played as a list: {reason} Leave '
-                '[coil] way = "list" out.'
-            ) from reason
-        return replace(steps, why=f"{steps.why}. No list: {reason}")
-    if points.error is None or steps.error is None or points.error < steps.error:
-        return points
-    return steps
+    found, reasons = [steps], []
+    for name, can in (("generator", _generated), ("list", _lists)):
+        if way not in ("auto", name):
+            continue
+        try:
+            drive = _timed(trial, scene, wanted, asked, before, can(scene))
+        except LimitError as reason:
+            if way == name:
+                raise SceneError(
+                    f'trial "{trial.label}" cannot be played by way of "{name}": '
+                    f'{reason} Leave [coil] way = "{name}" out.'
+                ) from reason
+            reasons.append(f"No {name}: {reason}")
+            continue
+        if way == "auto" and _error(drive) <= near:
+            return drive
+        found.append(drive)
+    nearest = min(found, key=_error)
+    if nearest is steps and reasons:
+        return replace(steps, why=". ".join((steps.why, *reasons)))
+    return nearest
+
+
+def _error(drive: Drive) -> float:
+    return math.inf if drive.error is None else drive.error
 
 
 def _set_points(
@@ -105,50 +128,90 @@ def _set_points(
     return Drive(played, error=error, why=why, warning=warning)
 
 
-def _list(
-    trial: Trial, scene: Scene, wanted: Waveform, asked: Waveform, before: float
+def _lists(scene: Scene) -> ListCapability:
+    """What lists the source plays.
+
+    Raises:
+        LimitError: none.
+    """
+    coil = scene.bench.coil
+    assert coil is not None
+    source = coil_capability(coil)
+    if source.lists is None:
+        raise LimitError(f"{source.title} plays none.")
+    return source.lists
+
+
+def _generated(scene: Scene) -> GeneratedCurrent:
+    """What currents the scope's generator gives through the source.
+
+    Raises:
+        LimitError: none.
+    """
+    coil, scope = scene.bench.coil, scene.bench.scope
+    assert coil is not None
+    analogue = coil_capability(coil).analogue
+    if analogue is None:
+        raise LimitError(
+            "the bench wires none to the source's analogue input ([coil.generator])."
+        )
+    generator = None if scope is None else scope_capability(scope).generator
+    if generator is None:
+        raise LimitError("the bench's scope has none.")
+    if not scene.asked & SAMPLED:
+        raise LimitError("nothing is sampled, so the scope is not opened.")
+    return GeneratedCurrent(generator=generator, input=analogue)
+
+
+def _timed(
+    trial: Trial,
+    scene: Scene,
+    wanted: Waveform,
+    asked: Waveform,
+    before: float,
+    can: ListCapability | GeneratedCurrent,
 ) -> Drive:
-    """Played as a list, ahead of the lags that the bench knows.
+    """Played by the clock of source or generator, ahead of the lags that are known.
 
     Raises:
         LimitError: it cannot be, and why.
     """
     coil, magnet, meter = scene.bench.coil, scene.bench.magnet, scene.bench.field_meter
     assert coil is not None
-    source = coil_capability(coil)
-    can = source.lists
-    if can is None:
-        raise LimitError(f"{source.title} plays none.")
     if trial.pause:
         raise LimitError("in a pause nothing is recorded.")
     if meter is not None and meter.driver == BY_PERSON and trial.hold is not None:
-        raise LimitError("a person reads the field, for which a list does not wait.")
+        raise LimitError("a person reads the field, for which it would not wait.")
     for current in (before, float(wanted.value[-1])):
         if abs(current) > AT_ZERO:
             raise LimitError(
-                "a list begins and ends at 0 A, and this trial does not "
+                "it begins and ends at 0 A, and this trial does not "
                 f"({show(current, 'A')})."
             )
-    return _nearest_list(wanted, asked, magnet, coil.limits, source.bipolar, can)
+    if isinstance(can, GeneratedCurrent):
+        # its bandwidth is far above the waveform's: it delays, as a short lag does
+        magnet = replace(magnet, coil_lag=magnet.coil_lag + can.input.lag)
+    bipolar = coil_capability(coil).bipolar
+    return _nearest(wanted, asked, magnet, coil.limits, bipolar, can)
 
 
 @lru_cache(maxsize=64)  # protocols repeat their presentations
-def _nearest_list(
+def _nearest(
     wanted: Waveform,
     asked: Waveform,
     magnet: Magnet,
     limits: CoilLimits,
     bipolar: bool,
-    can: ListCapability,
+    can: ListCapability | GeneratedCurrent,
 ) -> Drive:
-    """The list whose force, behind the lags that the bench knows, is nearest."""
+    """The points whose force, behind the lags that the bench knows, is nearest."""
     found = _listed(wanted, asked, magnet, limits, can)
     if magnet.lag == Lag():
         return found
     ahead, late = Waveform.constant(0.0), wanted
     for _ in range(LEADS):
         lead = ahead.plus(magnet.lag.led(late, can.shortest))
-        ahead = _within(lead, limits, bipolar)
+        ahead = _within(lead, limits, bipolar, can)
         drive = _listed(ahead, asked, magnet, limits, can)
         if (drive.error or 0.0) < (found.error or 0.0):
             found = drive
@@ -156,9 +219,16 @@ def _nearest_list(
     return found
 
 
-def _within(current: Waveform, limits: CoilLimits, bipolar: bool) -> Waveform:
+def _within(
+    current: Waveform,
+    limits: CoilLimits,
+    bipolar: bool,
+    can: ListCapability | GeneratedCurrent,
+) -> Waveform:
     """What source and coil can of a current that runs ahead of the lags, A."""
     most = limits.current
+    if isinstance(can, GeneratedCurrent):
+        most = min(most, can.most)
     if limits.resistance is not None:
         most = min(most, limits.compliance / limits.resistance)
     least = -most if bipolar else 0.0
@@ -170,9 +240,9 @@ def _listed(
     asked: Waveform,
     magnet: Magnet,
     limits: CoilLimits,
-    can: ListCapability,
+    can: ListCapability | GeneratedCurrent,
 ) -> Drive:
-    """The list nearest to `wave` A within the slew that lists may have."""
+    """The points nearest to `wave` A within the slew that they may have."""
     slew, steepest, warning = limits.fastest, wave.steepest, None
     if steepest > slew * (1 + 1e-9):
         wave = cut(slewed(wave, slew, 0.0), wave.end)
@@ -181,11 +251,15 @@ def _listed(
     ends = wave.value.copy()
     ends[[0, -1]] = 0.0
     wave = Waveform(wave.time, ends)
-    points = CurrentList.following(wave, can)
+    points = can.following(wave)
     load = can.load_time(len(points))
     shortest = show(float(points.dwells[:-1].min()), "s", 3)
-    why = f"{len(points)} points of {shortest} and more, loaded in {show(load, 's', 2)}"
-    drive = Drive(wave, points, error=0.0, why=why, warning=warning, load=load)
+    each = f"{shortest} and more"
+    if isinstance(can, GeneratedCurrent):
+        each = f"{shortest} by the scope's generator ({show(can.input.gain, 'A/V')})"
+    why = f"{len(points)} points of {each}, loaded in {show(load, 's', 2)}"
+    gain = can.input.gain if isinstance(can, GeneratedCurrent) else None
+    drive = Drive(wave, points, gain, error=0.0, why=why, warning=warning, load=load)
     force = magnet.force_for(_field(drive, magnet), beyond="hold")
     error = _difference(asked, force)
     # what it is between two points of the list matters to nobody
@@ -194,7 +268,7 @@ def _listed(
 
 
 def _field(drive: Drive, magnet: Magnet) -> Waveform:
-    """The field of a list, as the current that would hold it, A."""
+    """The field of its points, as the current that would hold it, A."""
     points = drive.points
     assert points is not None
     steps = np.column_stack([points.starts, points.currents])

@@ -22,7 +22,7 @@ from tactile_lab.instruments.registry import (
     ScopeDriverName,
 )
 from tactile_lab.magnetics import Magnet
-from tactile_lab.quantity import Voltage
+from tactile_lab.quantity import Unit, Voltage
 from tactile_lab.table import SceneTable
 
 WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field")
@@ -46,6 +46,20 @@ Baud = Annotated[int, Field(ge=50, le=4_000_000)]
 
 
 @dataclass(frozen=True, kw_only=True)
+class GeneratorWiring(SceneTable):
+    """``[coil.generator]``: the scope's generator drives the source's analogue input.
+
+    Attributes:
+        gain: current per volt of the generator, A/V, as measured with the lead in
+            place; what the source's row says unless given.
+        bandwidth: of the source behind that input, with the coil, Hz; the same.
+    """
+
+    gain: Annotated[float, Unit("A/V", above=0.0)] | None = None
+    bandwidth: Annotated[float, Unit("Hz", above=0.0)] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class CoilSpec(SceneTable):
     """``[coil]`` of a bench: the current source.
 
@@ -56,6 +70,7 @@ class CoilSpec(SceneTable):
         baud: symbols a second; the row's own unless given.
         options: keys of the driver's own.
         limits: each narrows what model and coil allow.
+        generator: how the scope's generator is wired to it; None: it is not.
     """
 
     driver: Annotated[CoilDriverName, Located] = "serial"
@@ -64,6 +79,7 @@ class CoilSpec(SceneTable):
     baud: Baud | None = None
     options: dict[str, Any] = field(default_factory=dict)
     limits: CoilLimits = field(default_factory=CoilLimits)
+    generator: GeneratorWiring | None = None
 
 
 def _wired(channel: Channel) -> Channel:

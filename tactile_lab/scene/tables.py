@@ -258,11 +258,12 @@ class CoilUse(SceneTable):
     Attributes:
         strict: refuse a waveform faster than slew or update grid, do not limit it.
         way: "set-points" sent one by one, a "list" that the source plays by its own
-            clock; "auto" takes the first of them that is accurate enough.
+            clock, the scope's "generator" into the source's analogue input; "auto"
+            takes the first of set-points, generator, list that is accurate enough.
         accuracy: largest error of the force, as a part of its range, that is accurate
             enough; what the protocol needs unless given.
     """
 
     strict: bool = False
-    way: Literal["auto", "set-points", "list"] = "auto"
+    way: Literal["auto", "set-points", "list", "generator"] = "auto"
     accuracy: Annotated[float, Field(gt=0, le=1)] | None = None
