@@ -23,7 +23,7 @@ WAVE = (
     "protocol.ramp=250 ms",
     "protocol.hold=0.5 s",
     "protocol.rest=0.2 s",
-    "record.sample_rate=100 kS/s",
+    "record.sample_rate=50 kS/s",
     "coil.way=generator",
 )
 
@@ -125,10 +125,9 @@ def test_a_scope_that_is_lost_while_it_plays_ends_with_the_output_off(run_scene,
     assert ended.state is RunState.FAULTED and ended.off.verified
 
 
-@pytest.mark.parametrize("gain", ["0.48 A/V", "0.6 A/V"])
-def test_a_gain_that_is_not_the_true_one_ends_the_run(run_scene, bench, gain, tmp_path):
+def test_a_gain_that_is_not_the_true_one_ends_the_run(run_scene, bench, tmp_path):
     file = tmp_path / "wrong.toml"
-    file.write_text(bench.read_text() + f'gain = "{gain}"\n')
+    file.write_text(bench.read_text() + 'gain = "0.48 A/V"\n')
     ended = run_scene(*WAVE, scene=load("demo", bench=file)).done
     assert ended.state is RunState.FAULTED and ended.off.verified
     assert "[coil.generator]" in ended.reason

@@ -30,7 +30,8 @@ enum {
     INVALID_VOLTAGE_RANGE = 0x0F, INVALID_CHANNEL = 0x10,
     STREAMING_FAILED = 0x14, NULL_PARAMETER = 0x16,
     INVALID_SAMPLE_INTERVAL = 0x2B, INVALID_COUPLING = 0x45,
-    BUFFERS_NOT_SET = 0x46, REQUEST_INVALID = 0x11B
+    BUFFERS_NOT_SET = 0x46, REQUEST_INVALID = 0x11B, BUSY = 0x27,
+    SIGGEN_TRIGGER_SOURCE = 0x30, SIGGEN_OFFSET_VOLTAGE = 0x38, SIGGEN_PK_TO_PK = 0x39
 };
 enum { HANDLE = 0x1234, INPUTS = 4, PERIOD = 249, TABLE = 64 };
 
@@ -45,6 +46,9 @@ static struct {
     uint64_t next;
     uint32_t place, ring;
     uint32_t power;
+    int32_t hold;
+    int waiting, started, samples, peak;
+    uint32_t phase, swing;
 } u;
 
 /* fill n samples of an input from sample k on, from a table of many periods */
@@ -256,6 +260,70 @@ API PICO_STATUS CALL ps3000aGetStreamingLatestValues(int16_t handle, StreamingRe
         announce(&c);
     }
     return OK;
+}
+
+/* the waveform generator: 20 MHz, a phase of 32 bits, 2^15 samples, 4 V */
+API PICO_STATUS CALL ps3000aSetSigGenBuiltIn(
+    int16_t handle, int32_t offset, uint32_t peaks, int16_t wave, float start, float stop,
+    float increment, float dwell, ENUM sweep, ENUM operation, uint32_t shots,
+    uint32_t sweeps, ENUM edge, ENUM trigger, int16_t level) {
+    if (handle != HANDLE) return INVALID_HANDLE;
+    if (u.streaming) return BUSY;
+    if (wave != 8 || peaks || start != 0 || stop != 0 || increment != 0 || dwell != 0 ||
+        sweep || operation || shots || sweeps || edge || trigger || level)
+        return INVALID_PARAMETER;
+    if (abs(offset) > 2000000) return SIGGEN_OFFSET_VOLTAGE;
+    u.hold = offset, u.waiting = u.started = 0;
+    return OK;
+}
+
+API PICO_STATUS CALL ps3000aSetSigGenArbitrary(
+    int16_t handle, int32_t offset, uint32_t peaks, uint32_t start, uint32_t stop,
+    uint32_t increment, uint32_t dwell, int16_t *samples, int32_t size, ENUM sweep,
+    ENUM operation, ENUM index, uint32_t shots, uint32_t sweeps, ENUM edge, ENUM trigger,
+    int16_t level) {
+    if (handle != HANDLE) return INVALID_HANDLE;
+    if (u.streaming) return BUSY;
+    if (!samples) return NULL_PARAMETER;
+    if (offset || increment || dwell || sweep || operation || index || sweeps || edge ||
+        level || start != stop || !start || size < 1 || size > 32768 || shots != 1 ||
+        trigger != 4)
+        return INVALID_PARAMETER;
+    if (peaks > 4000000) return SIGGEN_PK_TO_PK;
+    u.phase = start, u.samples = size, u.swing = peaks, u.waiting = 1, u.peak = 0;
+    for (int i = 0; i < size; i++)
+        if (abs(samples[i]) > u.peak) u.peak = abs(samples[i]);
+    return OK;
+}
+
+API PICO_STATUS CALL ps3000aSigGenArbitraryMinMaxValues(
+    int16_t handle, int16_t *low, int16_t *high, uint32_t *least, uint32_t *most) {
+    if (handle != HANDLE) return INVALID_HANDLE;
+    *low = -32768, *high = 32767, *least = 1, *most = 32768;
+    return OK;
+}
+
+API PICO_STATUS CALL ps3000aSigGenFrequencyToPhase(int16_t handle, double frequency,
+                                                   ENUM index, uint32_t length,
+                                                   uint32_t *phase) {
+    if (handle != HANDLE) return INVALID_HANDLE;
+    if (index) return INVALID_PARAMETER;
+    *phase = (uint32_t)(frequency * length / 32768 * 4294967296.0 / 20e6 + 0.5);
+    return OK;
+}
+
+API PICO_STATUS CALL ps3000aSigGenSoftwareControl(int16_t handle, int16_t state) {
+    (void)state;
+    if (handle != HANDLE) return INVALID_HANDLE;
+    if (!u.waiting) return SIGGEN_TRIGGER_SOURCE;
+    u.started++;
+    return OK;
+}
+
+API int emulator_generator(int what) {
+    int known[] = {u.hold, u.waiting, u.started, u.samples, u.peak, (int)u.phase,
+                   (int)u.swing};
+    return known[what];
 }
 
 API PICO_STATUS CALL ps3000aStop(int16_t handle) {

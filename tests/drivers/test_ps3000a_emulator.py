@@ -17,7 +17,12 @@ from drivers.picoscope.sdk import ENVIRONMENT, load
 from sim_backend.picoscope.sdk import FUNCTIONS
 from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
-from tactile_lab.errors import LimitError, LinkLostError, SamplesLostError
+from tactile_lab.errors import (
+    LimitError,
+    LinkLostError,
+    RefusedError,
+    SamplesLostError,
+)
 
 SOURCE = Path(__file__).with_name("ps3000a_emulator.c")
 TWO = (
@@ -145,3 +150,28 @@ def test_the_fake_exports_what_the_compiled_library_does(library_file: Path) -> 
         assert len(argtypes) == len(function.argtypes)
         widths = [ctypes.sizeof(a) for a in argtypes]
         assert widths == [ctypes.sizeof(a) for a in function.argtypes]
+
+
+def test_the_generator_speaks_the_compiled_abi(
+    emulator: Any, library_file: Path
+) -> None:
+    with PicoScope(clock=SimulatedClock(), library=str(library_file)) as scope:
+        scope.generator.hold(-1.25)
+        assert emulator.emulator_generator(0) == -1_250_000  # uV
+        volts = 1.5 * np.sin(np.linspace(0, np.pi, 101)).round(9)
+        scope.generator.load(volts, 2**17 / 20e6 / 32)
+        found = [emulator.emulator_generator(k) for k in (1, 2, 3, 4, 5, 6)]
+        assert found == [1, 0, 101, 32767, 32, 3_000_000]
+        scope.start(TWO, 128e-9)
+        scope.generator.start()  # a stream may run
+        assert emulator.emulator_generator(2) == 1
+        with pytest.raises(RefusedError, match="busy"):
+            scope.generator.hold(0.0)  # not for this
+        scope.stop()
+        for wrong, each in ((np.array([0, 2.5, 0]), 2**17 / 20e6), (volts, 5e-3)):
+            with pytest.raises(LimitError):
+                scope.generator.load(wrong, each)
+        with pytest.raises(LimitError, match="begin and end at 0 V"):
+            scope.generator.load(np.ones(5), 2**17 / 20e6)
+        with pytest.raises(LimitError, match="does not fit"):
+            scope.generator.load(np.zeros(40_000), 2**17 / 20e6)

@@ -256,3 +256,18 @@ def test_list(coil: CoilSource) -> None:
     wait(coil, points.duration)
     coil.end_list()
     assert coil.safe_off().verified
+
+
+@pytest.mark.skipif(
+    "TACTILE_LAB_OPERATOR" not in os.environ, reason="asks a person for a voltage"
+)
+def test_analogue_input(coil: CoilSource) -> None:
+    """What flows with 0 A set and 0.2 V at the analogue input."""
+    coil.energise()
+    print("\nWithin 20 s: 0.2 V to the analogue input.")
+    wait(coil, 20.0)
+    try:
+        fact("current at 0 A set, A", coil.read_current().value)
+    except InstrumentError as tripped:
+        fact("current at 0 A set", tripped)
+    assert coil.safe_off().verified

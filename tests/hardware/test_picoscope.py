@@ -185,3 +185,35 @@ def test_pulled_while_streaming(scope: PicoScope, plug: str) -> None:
     scope.close()
     print("Put everything back; going on in 15 s.")
     time.sleep(15)
+
+
+def test_generator(scope: PicoScope) -> None:
+    """With the generator's output at input A: its time, ends and voltage."""
+    scope.open()
+    generator, each = scope.generator, 2**17 / 20e6 / 8
+    generator.hold(0.0)
+    generator.load(np.interp(np.arange(301), [0, 100, 200, 300], [0, 1, 1, 0]), each)
+    stream = scope.start([Channel(signal="V_K", input="A", range=2.0)], 1e-5)
+    taken = []
+    for k in range(40):
+        time.sleep(scope.poll_interval)
+        if k == 10:
+            begun = time.perf_counter()
+            generator.start()
+            fact("starting takes, s", f"{time.perf_counter() - begun:.2g}")
+        block = scope.poll()
+        taken += [] if block is None else [block.codes[0]]
+    gain, offset = stream.volts_per_code(0)
+    volts = np.concatenate(taken) * gain + offset
+    fact("before, V", round(float(volts[: 1 << 12].mean()), 4))
+    fact("after, V", round(float(volts[-(1 << 12) :].mean()), 4))
+    fact("held, V", round(float(np.median(volts[volts > 0.9])), 4))
+    above = np.flatnonzero(volts > 0.5)
+    lasts = float(above[-1] - above[0]) * stream.interval
+    fact("from half to half, s", f"{lasts:.5f} of {200 * each:.5f}")
+    try:
+        generator.hold(0.0)
+        fact("set while a stream runs", "taken")
+    except InstrumentError as refused:
+        fact("set while a stream runs", refused)
+    assert lasts == pytest.approx(200 * each, rel=1e-3)
