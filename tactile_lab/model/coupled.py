@@ -1,7 +1,7 @@
 """The solver's loop where T1 saturates: V_C2 acts back on V_C1, both are one system.
 
-Each step is collocated for both voltages at once and ends at a spike at the latest:
-the step that passes V_fire is repeated to end there.
+Each step is solved for both voltages at once, as power series in time or, where that is
+stiff, by collocation. It ends at a spike at the latest.
 """
 
 from __future__ import annotations
@@ -63,10 +63,22 @@ from tactile_lab.model.node_a import (
 )
 from tactile_lab.model.pair import (
     COLUMNS,
-    collocate_pair,
+    GROWTH,
+    LEFT_1,
+    LEFT_2,
+    LENGTH,
+    MOVED,
+    STAYS_1,
+    STAYS_2,
+    STEP,
+    UNITS,
+    V_END,
+    Y_END,
+    collocated,
+    end_inside,
     first_crossing,
     flow,
-    series_of,
+    shortened,
 )
 from tactile_lab.model.spiking import (
     COUNT,
@@ -82,6 +94,9 @@ from tactile_lab.model.spiking import (
     grown,
 )
 from tactile_lab.model.tableau import ORDER
+from tactile_lab.model.taylor import MOST, ROWS, end_at, expanded, highest, to_chebyshev
+from tactile_lab.model.taylor import V as OF_V_C2
+from tactile_lab.model.taylor import Y as OF_V_C1
 from tactile_lab.model.transistor import (
     A_BY_1,
     A_BY_2,
@@ -91,7 +106,9 @@ from tactile_lab.model.transistor import (
     TO_C2,
     reach,
 )
-from tactile_lab.model.truncation import carried, longer, missing, unseen
+
+FEW_UNITS = 4.0
+"""A collocated step shorter than this, in units of the fastest rate, is not stiff."""
 
 
 @inner
@@ -147,7 +164,8 @@ def _build(stamp: int) -> Callable[..., Any]:
         b = np.empty(ORDER + 1)
         part = np.empty(ORDER + 1)
         d = np.empty(ORDER + 1)
-        after_reset = 0.0
+        c = np.empty((ROWS, MOST + 2))
+        step = np.empty(STEP)
         for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
@@ -180,98 +198,95 @@ def _build(stamp: int) -> Callable[..., Any]:
             if held:
                 v = par[V_FIRE]
             flow(B0, y, v, held, par, f)
-            rate = -f[A_BY_1] - f[C2_BY_2] + abs(f[A_BY_2]) + abs(f[C2_BY_1])
-            h = T
             moving = abs(f[TO_A]) > -1e-14 * f[A_BY_1] * high
-            if V1 != V0 or moving or abs(f[TO_C2]) > -1e-14 * f[C2_BY_2] * high:
-                h = min(h, max(2.0 / rate, 1e-280))
+            moving |= abs(f[TO_C2]) > -1e-14 * f[C2_BY_2] * high
+            stiff = V1 == V0 and not moving
+            h = T
             tries = 0
-            to_spike = fresh = False
             while s < T:
                 held = S[RESUME] >= 0.0
-                if to_spike:
-                    pass
-                elif s + 1.0001 * h >= T:
-                    h = T - s
-                elif s + 1.8 * h > T:
-                    h = 0.5 * (T - s)
-                if held:
-                    h = min(h, S[RESUME])
+                room = min(T - s, S[RESUME]) if held else T - s
                 tries += 1
                 if tries > 200000 or h <= 0.0:
                     status = STUCK
                     break
-                limit = max(above, v - y)
                 wanted = max(SHARE * tolerance, 6e-16 * max(abs(y), abs(v)))
-                done, unsolved = collocate_pair(
-                    s, h, y, v, held, V0, p, low, high, limit, wanted, par, W, f,
-                    matrix, right,
-                )  # fmt: skip
-                if done < 0:
-                    h *= 0.2
-                    to_spike = False
-                    counts[REJECTED] += 1
-                    continue
-                counts[ITERATIONS] += done
-                series_of(y, W, 0, a)
-                series_of(v, W, ORDER, b)
-                y1, v1 = y + W[ORDER - 1], v + W[2 * ORDER - 1]
-                big_1, big_2 = max(abs(y), abs(y1)), max(abs(v), abs(v1))
-                left_1, left_2 = missing(a, big_1), missing(b, big_2)
                 flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
-                layer_1 = unseen(f[TO_A], -f[A_BY_1], h, left_1, a)
-                layer_2 = 0.0
-                if not held:
-                    layer_2 = unseen(f[TO_C2], -f[C2_BY_2], h, left_2, b)
-                growth = min(
-                    longer(a, big_1, wanted, 0.0), longer(b, big_2, wanted, 0.0)
-                )
-                if max(left_1 + layer_1, left_2 + layer_2) > 3.0 * wanted:
-                    h *= min(max(0.1, growth), 0.5)
-                    to_spike = False
-                    counts[REJECTED] += 1
-                    continue
+                rate = -f[A_BY_1] - f[C2_BY_2] + abs(f[A_BY_2]) + abs(f[C2_BY_1])
+                degree = 0
+                if not stiff:
+                    degree = expanded(
+                        s, room, y, v, held, V0, p, rate, wanted, par, g, c, step
+                    )
+                    counts[ITERATIONS] += 1
+                    h = step[LENGTH]
+                if degree == 0:
+                    if 1.0001 * h >= room:
+                        h = room
+                    elif 1.8 * h > room:
+                        h = 0.5 * room
+                    stiff = True
+                    done = collocated(
+                        s, h, y, v, held, V0, p, low, high, max(above, v - y), wanted,
+                        f, par, W, g, matrix, right, a, b, step,
+                    )  # fmt: skip
+                    if done < 0:
+                        h = step[LENGTH]
+                        counts[REJECTED] += 1
+                        continue
+                    counts[ITERATIONS] += done
+                    stiff = h * rate > FEW_UNITS
                 # B carries the rounding of its exponent: so does V_C1
-                depth = abs(par[DIVIDER] - min(y, y1))
-                floor_1 = 5e-16 * (big_1 + 12.0 * depth) + unsolved
-                floor_2 = 1e-15 * (big_2 + abs(par[V_FIRE])) + unsolved
-                error_2 = left_2 + layer_2 + floor_2
-                if not held and not to_spike:
+                depth = abs(par[DIVIDER] - min(y, step[Y_END]))
+                floor_1 = 5e-16 * (max(abs(y), abs(step[Y_END])) + 12.0 * depth)
+                floor_2 = 1e-15 * (max(abs(v), abs(step[V_END])) + abs(par[V_FIRE]))
+                inside = step[LEFT_2] + floor_2 + math.sqrt(E[E_22])
+                x, whole, u = step[UNITS], h, 2.0
+                if not held and (
+                    degree == 0
+                    or highest(c[OF_V_C2], degree, x) > par[V_FIRE] - 2.0 * inside
+                ):
                     S[SEARCHES] += 1.0
-                    inside = error_2 + math.sqrt(E[E_22])
+                    if degree:
+                        to_chebyshev(c[OF_V_C2], degree, x, part, b)
                     u, doubt = first_crossing(b, par[V_FIRE], inside, part, d)
                     if doubt:
                         S[DOUBT] = 1.0
-                    if u < 1.0:
-                        h *= u
-                        to_spike = True
-                        continue
-                    to_spike = u == 1.0
+                if u < 1.0:
+                    h *= u
+                    x *= u
+                    step[STAYS_1] = max(step[STAYS_1], step[LEFT_1])
+                    step[STAYS_2] = max(step[STAYS_2], step[LEFT_2])
+                    if degree:
+                        end_at(c, degree, x, step)
+                    else:
+                        end_inside(u, y, v, W, right, step)
                 counts[STEPS] += 1
                 counts[EXPANSIONS] += 1
                 node[Y_LARGEST_ERROR] = max(
                     node[Y_LARGEST_ERROR],
-                    math.sqrt(E[E_11]) + left_1 + layer_1 + floor_1,
+                    math.sqrt(E[E_11]) + step[LEFT_1] + floor_1,
                 )
                 transform(
-                    E, 1.0 + right[ORDER - 1, 1], right[ORDER - 1, 2],
-                    right[2 * ORDER - 1, 1], 1.0 + right[2 * ORDER - 1, 2],
-                )  # fmt: skip
-                stays_1 = carried(a, left_1) + layer_1 + floor_1
+                    E, step[MOVED], step[MOVED + 1], step[MOVED + 2], step[MOVED + 3]
+                )
+                stays_1 = step[STAYS_1] + floor_1
                 stays_2 = EPS * h
                 if not held:
                     # V_C2 follows what is wrong with V_C1 during the step
-                    stays_2 = carried(b, left_2) + layer_2 + floor_2
-                    stays_2 += abs(right[2 * ORDER - 1, 1]) * max(
-                        0.05 * left_1, stays_1
-                    )
+                    stays_2 = step[STAYS_2] + floor_2
+                    stays_2 += abs(step[MOVED + 2]) * max(0.05 * step[LEFT_1], stays_1)
                 widen(E, stays_1, stays_2)
                 if keep_1:
                     n = counts[ROWS_1]
                     step_rows = more_rows(step_rows, n)
                     step_rows[n, 0], step_rows[n, 1], step_rows[n, 2] = t, s, h
+                    if degree:
+                        to_chebyshev(c[OF_V_C1], degree, x, part, d)
+                    else:
+                        shortened(a, min(u, 1.0), part, d)
                     for i in range(ORDER + 1):
-                        step_rows[n, 3 + i] = a[i]
+                        step_rows[n, 3 + i] = d[i]
                     counts[ROWS_1] += 1
                 counts[PIECES] += 1
                 if keep_2:
@@ -279,18 +294,20 @@ def _build(stamp: int) -> Callable[..., Any]:
                     piece_rows = more_rows(piece_rows, n)
                     piece_rows[n, 0], piece_rows[n, 1], piece_rows[n, 2] = t, s, h
                     piece_rows[n, 3] = ORDER
+                    if degree:
+                        to_chebyshev(c[OF_V_C2], degree, x, part, d)
+                    else:
+                        shortened(b, min(u, 1.0), part, d)
                     # the series is all: nothing is left for the exponential
-                    piece_rows[n, 4] = b[0] + series_at(b, ORDER, -1.0)
+                    piece_rows[n, 4] = d[0] + series_at(d, ORDER, -1.0)
                     piece_rows[n, 5] = 2.0 * h if held else -1.0
                     for i in range(ORDER + 1):
-                        piece_rows[n, 6 + i] = b[i]
+                        piece_rows[n, 6 + i] = d[i]
                     for i in range(ORDER + 1, MOST_TERMS + 1):
                         piece_rows[n, 6 + i] = 0.0
                     counts[ROWS_2] += 1
-                y, v = y1, v1
-                h_next = h * min(max(growth, 0.2), 30.0)
-                if fresh and not held and not to_spike:
-                    fresh, after_reset = False, h
+                y, v = step[Y_END], step[V_END]
+                h_next = h * step[GROWTH]
                 if not (abs(y) < np.inf and abs(v) < np.inf):
                     status = NOT_FINITE
                     break
@@ -300,17 +317,16 @@ def _build(stamp: int) -> Callable[..., Any]:
                 s = following
                 if held:
                     S[RESUME] -= h
-                if to_spike:
-                    to_spike = False
+                if u <= 1.0:
                     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
                     flow(B, y, v, False, par, f)
                     flow(B, y, v, True, par, g)
                     # where it only grazes V_fire, the step is all that is known
-                    slope = max(f[TO_C2], (error_2 + math.sqrt(E[E_22])) / h)
+                    slope = max(f[TO_C2], inside / h)
                     late = (par[V_FIRE] - v) / slope
                     error = math.sqrt(E[E_22]) / slope + EPS * (t + s)
                     # does the series stay above V_fire by more than its error?
-                    x = 1.0 + 2.0 * min(max(2.0 * error / h, 1e-7), 0.02)
+                    x = 2.0 * u - 1.0 + 2.0 * min(max(2.0 * error / whole, 1e-7), 0.02)
                     beyond = b[0] + series_at(b, ORDER, x) - par[V_FIRE]
                     if beyond <= 0.0:
                         S[DOUBT] = 1.0
@@ -336,7 +352,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     s = following
                     transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
                     S[RESUME], v = par[T_EPS], par[V_FIRE]
-                    last, tries = False, 0
+                    last, tries, stiff = False, 0, False
                 if last:
                     s = T
                 h = h_next
@@ -344,8 +360,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     v = restart(
                         B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f, g
                     )
-                    fresh = True
-                    h = after_reset if after_reset > 0.0 else h
+                    stiff = False
             node[Y], S[VOLTAGE] = y, v
             if status != DONE:
                 break

@@ -244,7 +244,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                 stays = carried(a, left)
                 B_s = B_at(V_P_at(s, V0, p, par[TAU]), par)
                 rate = par[LAMBDA] + B_s * math.exp(-y / par[V_T]) / par[V_T]
-                layer = unseen(slope_at(B_s, y, par), rate, h, left, a)
+                rise = slope_at(B_s, y, par)
+                layer = unseen(rise, rate, h, left, a)
+                # exp(-V_C1/V_T) on the way up, gone before the first nodes
+                if par[V_T] < 3.0 * NODES[0] * h * rise:
+                    closing = (rate - par[LAMBDA]) * par[V_T]
+                    layer = max(layer, closing * par[V_T] / rise)
                 growth = longer(a, biggest, wanted, rate * h)
                 if left + layer > 3.0 * wanted:
                     h *= min(max(0.1, longer(a, biggest, wanted, 0.0)), 0.5)

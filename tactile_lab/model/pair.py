@@ -10,7 +10,14 @@ from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import TAU_L, V_RESET, series_at, to_series
 from tactile_lab.model.node_a import LAMBDA, TAU, V_T, B_at, V_P_at, slope_at
-from tactile_lab.model.tableau import DIFFERENTIATE, NODES, ORDER, POINTS
+from tactile_lab.model.tableau import (
+    DIFFERENTIATE,
+    NODES,
+    ORDER,
+    POINTS,
+    TO_SERIES,
+)
+from tactile_lab.model.threshold import crossing
 from tactile_lab.model.transistor import (
     A_BY_1,
     A_BY_2,
@@ -20,10 +27,19 @@ from tactile_lab.model.transistor import (
     TO_C2,
     currents,
 )
+from tactile_lab.model.truncation import carried, longer, missing, unseen
 
 MOST_ITERATIONS = 10
 COLUMNS = 3
 """Right-hand sides: the correction, and the effect of either voltage at the start."""
+LENGTH, UNITS, Y_END, V_END, LEFT_1, LEFT_2, STAYS_1, STAYS_2, GROWTH = range(9)
+"""A step: its length, s, and in units of the fastest rate; both voltages at its end, V;
+what they are wrong by within it and at its end, V; how much longer the next may be."""
+MOVED = 9
+"""From here on, what a volt at the start moves at the end: V_C1 by V_C1, by V_C2, V_C2
+by V_C1, by V_C2."""
+STEP = 13
+"""Numbers of a step."""
 
 
 @inner
@@ -159,6 +175,73 @@ def series_of(start: float, W: FloatArray, first: int, a: FloatArray) -> None:
 
 
 @inner
+def end_inside(
+    u: float, y: float, v: float, W: FloatArray, right: FloatArray, step: FloatArray
+) -> None:
+    """Let a collocated step end at the fraction u of it."""
+    step[Y_END], step[V_END] = y, v
+    for m in range(4):
+        step[MOVED + m] = 1.0 if m in (0, 3) else 0.0
+    for i in range(ORDER):
+        # the polynomial that is 1 at node i and 0 at the others
+        weight = 1.0 if u == 1.0 and i == ORDER - 1 else 0.0
+        if u < 1.0:
+            x = 2.0 * u - 1.0
+            weight = TO_SERIES[0, i + 1] + series_at(TO_SERIES[:, i + 1], ORDER, x)
+        step[Y_END] += weight * W[i]
+        step[V_END] += weight * W[ORDER + i]
+        for m in range(4):
+            step[MOVED + m] += weight * right[ORDER * (m // 2) + i, 1 + m % 2]
+
+
+@inner
+def shortened(a: FloatArray, u: float, part: FloatArray, b: FloatArray) -> None:
+    """Fill b with the series a on the fraction u of its step."""
+    for i in range(ORDER + 1):
+        part[i] = series_at(a, ORDER, 2.0 * u * POINTS[i] - 1.0)
+    to_series(part, b)
+    b[0] += a[0]
+
+
+@inner
+def collocated(
+    s: float, h: float, y: float, v: float, held: bool, V0: float, p: float,
+    low: float, high: float, most: float, wanted: float, slopes: FloatArray,
+    par: FloatArray, W: FloatArray, f: FloatArray, matrix: FloatArray,
+    right: FloatArray, a: FloatArray, b: FloatArray, step: FloatArray,
+) -> int:  # fmt: skip
+    """A step from s to s + h, `slopes` being `flow` at s; returns the iterations.
+
+    Fills a and b with the series of V_C1 and V_C2. Returns -1 where it does not
+    converge or misses `wanted` V, and in `step` how long to make it instead.
+    """
+    done, unsolved = collocate_pair(
+        s, h, y, v, held, V0, p, low, high, most, wanted, par, W, f, matrix, right
+    )
+    step[LENGTH] = 0.2 * h
+    if done < 0:
+        return -1
+    series_of(y, W, 0, a)
+    series_of(v, W, ORDER, b)
+    end_inside(1.0, y, v, W, right, step)
+    big_1, big_2 = max(abs(y), abs(step[Y_END])), max(abs(v), abs(step[V_END]))
+    left_1, left_2 = missing(a, big_1), missing(b, big_2)
+    layer_1 = unseen(slopes[TO_A], -slopes[A_BY_1], h, left_1, a) + unsolved
+    layer_2 = unsolved
+    if not held:
+        layer_2 += unseen(slopes[TO_C2], -slopes[C2_BY_2], h, left_2, b)
+    growth = min(longer(a, big_1, wanted, 0.0), longer(b, big_2, wanted, 0.0))
+    step[LENGTH] = h * min(max(0.1, growth), 0.5)
+    if max(left_1 + layer_1, left_2 + layer_2) > 3.0 * wanted + unsolved:
+        return -1
+    step[LENGTH], step[GROWTH], step[UNITS] = h, min(max(growth, 0.2), 30.0), 1e300
+    step[LEFT_1], step[LEFT_2] = left_1 + layer_1, left_2 + layer_2
+    step[STAYS_1] = carried(a, left_1) + layer_1
+    step[STAYS_2] = carried(b, left_2) + layer_2
+    return done
+
+
+@inner
 def first_crossing(
     a: FloatArray, level: float, error: float, part: FloatArray, d: FloatArray
 ) -> tuple[float, bool]:
@@ -185,17 +268,7 @@ def first_crossing(
         if d[0] + size >= -error:
             if steep < abs(d[1]):
                 if d[1] > 0.0 and part[ORDER] >= 0.0:
-                    low, high = u, top
-                    for _ in range(80):
-                        middle = 0.5 * (low + high)
-                        x = 2.0 * middle - 1.0
-                        if (a[0] - level) + series_at(a, ORDER, x) < 0.0:
-                            low = middle
-                        else:
-                            high = middle
-                        if high - low <= 1e-16 * high:
-                            break
-                    return high, doubt
+                    return crossing(a, level, u, top), doubt
                 if d[1] < 0.0 and part[0] >= -error:
                     doubt = True
             elif size > error and width > 1e-12:

@@ -71,6 +71,18 @@ def test_compiled_rivals_converge(circuit, method):
     assert fine.evaluations > 2 * coarse.evaluations
 
 
+def test_where_t1_saturates_ours_needs_fewer_evaluations_than_the_rivals():
+    """Of what no load changes; by collocation alone it took three times theirs."""
+    force = Waveform.through([(0, 0), (0.05, 0), (0.05, 0.2)])
+    problem = Problem("", Circuit(saturation=True), force, 0.3)
+    exact, found = ours(problem, 9.0, 1e-12), ours(problem, 9.0, 1e-7)
+    assert error(found, exact) < 1e-9
+    for method in (rivals.DORMAND_PRINCE, rivals.RODAS):
+        rival = rivals.stepped(problem, 9.0, method, 1e-9)
+        assert error(rival, exact) > 1e-10
+        assert found.evaluations < rival.evaluations
+
+
 def test_a_rival_stops_in_time_and_says_nan():
     with pytest.raises(OutOfTimeError, match="evaluations"):
         rivals.stepped(PROBLEM, 1e-5, rivals.RODAS, 1e-9)
