@@ -54,7 +54,7 @@ def test_keys_go_from_spike_to_spike(lab) -> None:
     (folder,) = lab.runs(1)
     window, view = lab.window, lab.window.centre.view
     window.screen_.open_run(folder)
-    lab.until(lambda: window.screen_.run is not None)
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
     spikes = window.screen_.run.spikes
     window.actions_._tab(3)
     view.show_span(0.0, 0.2)

@@ -11,7 +11,7 @@ def opened(lab):
     (folder,) = lab.runs(1)
     window = lab.window
     window.screen_.open_run(folder)
-    lab.until(lambda: window.screen_.run is not None)
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
     window.centre.view.show_all()
     return window, [one for one in window.screen_.run.holds if not one.pause]
 
@@ -49,9 +49,9 @@ def test_a_row_of_the_table_shows_that_step_by_mouse_and_by_key(lab) -> None:
 
 
 def test_a_line_of_the_log_on_a_step_shows_it(lab) -> None:
-    lab.complete_run()
+    folder = lab.complete_run()
     window, log = lab.window, lab.window.centre.log
-    lab.until(lambda: window.screen_.run is not None)
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
     steps = [one for one in window.screen_.run.holds if not one.pause]
     view = window.centre.view
     view.show_all()
