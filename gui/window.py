@@ -24,6 +24,7 @@ from gui.header.header import Header
 from gui.look.theme import Theme
 from gui.parts import column
 from gui.preferences import Preferences
+from gui.review.cursor_statistics import CursorStatistics
 from gui.review.panel import ReviewPanel
 from gui.review.spike_tools import SpikeTools
 from gui.run_actions import RunActions
@@ -84,6 +85,7 @@ class Window(QMainWindow):
             session, self.preferences, self.screen_, self.centre.stack
         )
         self.spikes = SpikeTools(self.review.spikes, self.centre.stack, session)
+        CursorStatistics(self.centre.stack, session)
         self._leaving = False
         self._connect()
         self.render_state()

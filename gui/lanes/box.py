@@ -20,11 +20,14 @@ from gui.lanes.source import Source
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
 from gui.plots.axis import guarded
-from gui.plots.numbers import decimals, nice_range, number, value_ticks
+from gui.plots.numbers import decimals, nice_range, number, signed, value_ticks
 from tactile_lab.trace import Trace
 
 DOTS = 160
 """Most rate markers drawn; more would be a smear and slow."""
+
+NEAR = 4
+"""Pixels within which a line across is grabbed."""
 
 APART = 5
 """Pixels from which on samples are marked one by one."""
@@ -86,6 +89,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
     Attributes:
         painted: what is shown, as the numbers on the card want it.
         locked: whether the range stays as it is.
+        levels: where lines across are, in shown units; two at most.
         top: whether it is the highest, where the names of holds are.
     """
 
@@ -95,6 +99,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         self.lane, self._stage = lane, stage
         self.painted, self._twin = Painted(), Trace.nothing()
         self.locked = self.top = False
+        self.levels: list[float] = []
         self.axis = ValueAxis(stage, self)
         self.sigRangeChangedManually.connect(self._lock)
         self.forget()
@@ -141,7 +146,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
     def zoom(self, factor: float, y: float) -> None:
         """Zoom the values by `factor` (above 1: in) about a height in the scene, px."""
         low, high = self.shown
-        about = low + (self.geometry().bottom() - y) / self.height() * (high - low)
+        about = self.value_at(y)
         self._lock()
         self.setYRange(
             about - (about - low) / factor, about + (high - about) / factor, padding=0
@@ -149,12 +154,9 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
 
     def show_between(self, bottom: float, top: float) -> None:
         """Show the values between two heights in the scene, px."""
-        low, high = self.shown
-        each, foot = (high - low) / self.height(), self.geometry().bottom()
+        ends = self.value_at(bottom), self.value_at(top)
         self._lock()
-        self.setYRange(
-            low + each * (foot - bottom), low + each * (foot - top), padding=0
-        )
+        self.setYRange(*ends, padding=0)
 
     def boundingRect(self) -> QRectF:
         """The plot with its axis and its tag."""
@@ -167,9 +169,8 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         stage, runs = self._stage, list(self.painted.runs)
         if not runs:
             return
-        view, (low, high) = stage.view, self.shown
         wide, tall = self.width(), self.height()
-        frame = Frame(0.0, wide, 0.0, tall, view.start, view.end, low, high)
+        frame = self._frame(wide)
         on = Drawing(painter, frame, stage.source, stage.tokens)
         painter.save()
         painter.setClipRect(QRectF(0, -5, wide, tall + 9))
@@ -177,10 +178,63 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         if len(runs) > 1:
             self._runs(on, runs)
         else:
+            self._beyond(on)
             self._traces(on, runs[0], self._twin)
+        self._levels(on)
         painter.restore()
         if len(runs) == 1:
             self._tag(on)
+
+    def level_at(self, y: float) -> int | None:
+        """Number of the line across at a height in the scene, px."""
+        frame = self._frame(0.0)
+        for number_, level in enumerate(self.levels):
+            if abs(frame.y1(level) + self.y() - y) <= NEAR:
+                return number_
+        return None
+
+    def value_at(self, y: float) -> float:
+        """The value at a height in the scene, px, in shown units."""
+        low, high = self.shown
+        share: float = (self.geometry().bottom() - y) / max(self.height(), 1.0)
+        return low + share * (high - low)
+
+    def _frame(self, width: float) -> Frame:
+        view, (low, high) = self._stage.view, self.shown
+        return Frame(0.0, width, 0.0, self.height(), view.start, view.end, low, high)
+
+    def _levels(self, on: Drawing) -> None:
+        """The lines across, with their values and what lies between the two."""
+        painter, frame, tokens = on.painter, on.frame, on.tokens
+        places = max(self.lane.places, decimals((frame.high - frame.low) / 200))
+        for number_, level in enumerate(self.levels):
+            y = round(frame.y1(level)) + 0.5
+            painter.setPen(paint.pen(tokens.accent, Qt.PenStyle.DashLine))
+            painter.drawLine(QPointF(0, y), QPointF(frame.right, y))
+            words = f"{number(level, places)} {self.lane.unit}"
+            if number_:
+                words += f"  Δ {signed(level - self.levels[0], places)}"
+            above = y - 8 if y > 18 else y + 9
+            at = QPointF(frame.right - 5, above)
+            paint.write(painter, at, words, tokens.accent, align=1.0)
+
+    def _beyond(self, on: Drawing) -> None:
+        """Shade where the input left its range: the trace is a limit there."""
+        painter, frame, tokens = on.painter, on.frame, on.tokens
+        named = False
+        for start, end in on.source.beyond(self.lane.key).tolist():
+            if end < frame.start or start > frame.end:
+                continue
+            left, right = max(frame.x1(start), 0.0), min(frame.x1(end), frame.right)
+            part = QRectF(left, -5, max(right - left, 1.0), frame.bottom + 9)
+            painter.fillRect(part, QColor(tokens.amber_soft))
+            painter.fillRect(
+                part.adjusted(0, 0, 0, 3 - part.height()), QColor(tokens.amber)
+            )
+            if not named:
+                at = QPointF(left + 4, frame.bottom - 7)
+                paint.write(painter, at, "beyond the input's range", tokens.amber)
+                named = True
 
     def _fit(self, traces: list[Trace], source: Source, room: float) -> None:
         """Choose the value range: round, and steady while the data allows it.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from gui.lanes.box import LaneBox
 from gui.lanes.card import LaneCard
 from gui.lanes.compare import MARKS
@@ -20,9 +22,19 @@ from gui.look.theme import Theme
 from gui.parts import line
 from gui.plots.numbers import number, signed
 
+if TYPE_CHECKING:
+    from tactile_lab.store.statistics import Statistics
+
+ROOM = 96
+"""Height of a card from which on there is room for statistics, px."""
+
 
 class LaneRow:
-    """One lane: its card with the line below it, and its plot in the scene."""
+    """One lane: its card with the line below it, and its plot in the scene.
+
+    Attributes:
+        statistics: of the samples between the cursors; None where nobody knows.
+    """
 
     def __init__(self, lane: Lane, stage: Stage, theme: Theme) -> None:
         self.lane = lane
@@ -30,6 +42,7 @@ class LaneRow:
         self.card.setAccessibleDescription(f"{lane.plain} against time")
         self.rule = line()
         self.box = LaneBox(lane, stage)
+        self.statistics: Statistics | None = None
         self._stage, self._theme = stage, theme
         self.tint()
 
@@ -93,7 +106,24 @@ class LaneRow:
             f"{'—' if value is None else number(value, places)}"
             for name, value, colour in (("A", a, tokens.accent), ("B", b, tokens.V_C1))
         ]
-        return f"{' &nbsp;'.join(words)} &nbsp;Δ {delta}"
+        return f"{' &nbsp;'.join(words)} &nbsp;Δ {delta}{self._between()}"
+
+    def _between(self) -> str:
+        """Least, largest, mean and rms of the samples from A to B, as two lines."""
+        found, scale = self.statistics, self.lane.scale
+        if found is None:
+            self.card.setToolTip("")
+            return ""
+        values = found.low, found.high, found.mean, found.rms
+        low, high, mean, rms = (number(scale * v, self.lane.places) for v in values)
+        less = number(scale * found.deviation, self.lane.places + 2)
+        self.card.setToolTip(
+            f"Of {found.samples} samples from A to B, {self.lane.unit}: min {low}, "
+            f"max {high}, mean {mean}, rms {rms}, rms about the mean {less}"
+        )
+        if self.card.height() < ROOM:
+            return ""
+        return f"<br>min {low} &nbsp;max {high}<br>mean {mean} &nbsp;rms {rms}"
 
     def _values(self, source: Source, time: float) -> tuple[float | None, ...]:
         return values_at(self.lane, source, time, self.box.painted)

@@ -125,9 +125,7 @@ class Marks(Layer):
             if inside and box.valued:
                 painter.setPen(pen)
                 painter.drawLine(QPointF(AXIS, at.y()), QPointF(stage.right, at.y()))
-                low, high = box.shown
-                share = (place.bottom() - at.y()) / max(place.height(), 1.0)
-                here = number(low + share * (high - low), lane.places)
+                here = number(box.value_at(at.y()), lane.places)
                 self._tell(painter, QPointF(AXIS - 2, at.y()), here, 1.0)
             if not lane.raster:
                 found = values_at(lane, stage.source, time, box.painted)
@@ -149,8 +147,8 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
     """The plots of all lanes; drags pan, the wheel zooms, cursors are grabbed."""
 
     box_zoomed = Signal(float, float)
-    menu_asked = Signal(object, float, object)
-    """The lane under the pointer, the time there, s, and where on the screen."""
+    menu_asked = Signal(object, object, object)
+    """The lane under the pointer, and where that is: in the scene, on the screen."""
     drawn = Signal()
 
     def __init__(self, stage: Stage, places: Callable[[], Places]) -> None:
@@ -161,6 +159,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         self.boxes: list[LaneBox] = []
         self.crosshair = False
         self._cursor: int | None = None
+        self._level: tuple[LaneBox, int] | None = None
         self._pressed: QPointF | None = None
         self._from = 0.0
         self._marks = Marks(stage)
@@ -277,12 +276,13 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
             box = self.lane_at(at.y())
             if box is not None:
                 screen = event.globalPosition().toPoint()
-                self.menu_asked.emit(box, self.time_at(at.x()), screen)
+                self.menu_asked.emit(box, at, screen)
         elif at.x() < AXIS:
             super().mousePressEvent(event)
         elif event.button() is Qt.MouseButton.LeftButton:
             self._pressed, self._from = at, self.stage.view.start
             self._cursor = self._near_cursor(at.x())
+            self._level = self._near_level(at) if self._cursor is None else None
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Drag on, or move the crosshair."""
@@ -292,6 +292,9 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
             self._show_shape(at)
         elif self._cursor is not None:
             view.move_cursor(self._cursor, self.time_at(at.x()))
+        elif self._level is not None:
+            box, which = self._level
+            box.levels[which] = box.value_at(at.y())
         elif self.stage.zoom_box:
             self._marks.box = self._boxed(pressed, at)
         elif abs(pressed.x() - at.x()) > 3:
@@ -305,7 +308,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End of the drag."""
         box, pressed = self._marks.box, self._pressed
-        self._pressed = self._cursor = self._marks.box = None
+        self._pressed = self._cursor = self._level = self._marks.box = None
         if pressed is None:
             super().mouseReleaseEvent(event)
         elif box is not None and box.width() > 4:
@@ -344,9 +347,15 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         shape = Qt.CursorShape.ArrowCursor
         if self._near_cursor(at.x()) is not None:
             shape = Qt.CursorShape.SizeHorCursor
-        elif at.x() < AXIS and self.lane_at(at.y()) is not None:
+        elif self._near_level(at) or (at.x() < AXIS and self.lane_at(at.y())):
             shape = Qt.CursorShape.SizeVerCursor
         self.viewport().setCursor(shape)
+
+    def _near_level(self, at: QPointF) -> tuple[LaneBox, int] | None:
+        """The line across at a place: its lane and its number."""
+        box = self.lane_at(at.y())
+        which = None if box is None else box.level_at(at.y())
+        return None if box is None or which is None else (box, which)
 
     def _near_cursor(self, x: float) -> int | None:
         frame = self.stage.whole()

@@ -93,6 +93,10 @@ class Source:
         """What people noted, and at which time, s."""
         return []
 
+    def beyond(self, signal: str) -> FloatArray:
+        """Stretches in which a signal's input left its range, shape (k, 2), s."""
+        return NONE.reshape(0, 2)
+
     @property
     def members(self) -> Sequence[Member]:
         """The runs it shows in each lane: itself, or those it compares."""

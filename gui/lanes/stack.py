@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, Signal
+from PySide6.QtCore import QPoint, QPointF, Signal
 from PySide6.QtWidgets import QFrame, QMenu
 
 from gui.lanes.arrangement import Arrangement
@@ -19,7 +20,10 @@ from gui.lanes.scene import LaneScene
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
-from gui.parts import column, empty, lines, row
+from gui.parts import column, lines, row
+
+if TYPE_CHECKING:
+    from tactile_lab.store.statistics import Statistics
 
 STEPS = 40
 """Most steps that the menu offers to jump to."""
@@ -29,6 +33,7 @@ class LaneStack(QFrame):
     """The lanes of one source: cards, and beside them their plots in one scene."""
 
     export_asked = Signal()
+    source_changed = Signal()
     arranged = Signal()
     """Lanes were moved, resized or hidden by hand."""
 
@@ -62,16 +67,29 @@ class LaneStack(QFrame):
         wanted = self.arrangement.ordered(lanes)
         if [one.lane for one in self.rows] == wanted:
             return
-        empty(self._cards)
-        self.rows = [LaneRow(lane, self.stage, self._theme) for lane in wanted]
-        for one in self.rows:
+        before = {one.lane: one for one in self.rows}
+        self.rows = [before.get(lane) or self._made(lane) for lane in wanted]
+        for gone in (one for one in before.values() if one.lane not in wanted):
+            for widget in (gone.card, gone.rule):
+                widget.hide()
+                self._cards.removeWidget(widget)
+                widget.deleteLater()
+        self._stack_cards()
+        self.arrange()
+
+    def _made(self, lane: Lane) -> LaneRow:
+        made = LaneRow(lane, self.stage, self._theme)
+        made.card.resized.connect(partial(self._resize, made))
+        made.card.moved.connect(partial(self.move_lane, made))
+        made.card.dropped.connect(self.arranged)
+        return made
+
+    def _stack_cards(self) -> None:
+        """Put cards and plots in the order of the rows."""
+        for one in self.rows:  # a widget that is added again goes to the end
             self._cards.addWidget(one.card)
             self._cards.addWidget(one.rule)
-            one.card.resized.connect(partial(self._resize, one))
-            one.card.moved.connect(partial(self.move_lane, one))
-            one.card.dropped.connect(self.arranged)
         self.scene.show_boxes([one.box for one in self.rows])
-        self.arrange()
 
     def show_source(self, source: Source) -> None:
         """Show another source in the same lanes."""
@@ -88,6 +106,7 @@ class LaneStack(QFrame):
             one.tint()
         self.refresh()
         self.show_values()
+        self.source_changed.emit()
 
     def hide_lane(self, key: str, hidden: bool) -> None:
         """Hide or show one lane."""
@@ -105,9 +124,7 @@ class LaneStack(QFrame):
         one, other = self.rows.index(which), self.rows.index(shown[at])
         self.rows[one], self.rows[other] = self.rows[other], self.rows[one]
         self.arrangement.put([one.lane.key for one in self.rows])
-        for each in self.rows:  # a widget that is added again goes to the end
-            self._cards.addWidget(each.card)
-            self._cards.addWidget(each.rule)
+        self._stack_cards()
         self.arrange()
 
     def _resize(self, which: LaneRow, by: float) -> None:
@@ -168,6 +185,12 @@ class LaneStack(QFrame):
         """Whether the user folded this lane away."""
         return key in self.arrangement.hidden
 
+    def show_statistics(self, found: Mapping[str, Statistics]) -> None:
+        """Show what the samples between the cursors come to, by signal."""
+        for one in self.rows:
+            one.statistics = found.get(one.lane.key)
+        self.show_values()
+
     def _follow_picture(self) -> None:
         """What is at the right edge has moved with the picture."""
         if not self.source.running:
@@ -183,13 +206,18 @@ class LaneStack(QFrame):
         self.move_lane(which, way)
         self.arranged.emit()
 
-    def _ask(self, box: LaneBox, time: float, at: QPoint) -> None:
-        """The menu of a lane, at a time, s."""
+    def _ask(self, box: LaneBox, here: QPointF, at: QPoint) -> None:
+        """The menu of a lane, at a place in it."""
+        time, value = self.scene.time_at(here.x()), box.value_at(here.y())
         menu, view, lane = QMenu(self), self.view, box.lane
         menu.setAccessibleName(lane.plain)
 
         def lock(on: bool) -> None:
             box.locked = on
+            self.refresh()
+
+        def levels(new: Sequence[float] = ()) -> None:
+            box.levels = [*box.levels[-1:], *new] if new else []
             self.refresh()
 
         locked = menu.addAction("Keep this range", lambda: lock(not box.locked))
@@ -215,6 +243,9 @@ class LaneStack(QFrame):
         for which, name in enumerate("AB"):
             put = partial(view.put_cursor, which, time)
             menu.addAction(f"Cursor {name} here", put)
+        level = menu.addAction("Level line here", lambda: levels([value]))
+        level.setEnabled(box.valued)
+        menu.addAction("Remove level lines", levels).setEnabled(bool(box.levels))
         cross = menu.addAction("Crosshair", self.scene.toggle_crosshair)
         cross.setCheckable(True)
         cross.setChecked(self.scene.crosshair)

@@ -15,6 +15,7 @@ from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.store.layout import BIN
+from tactile_lab.store.overrange import overrange
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
@@ -64,6 +65,7 @@ class RunSource(Source):
         self.holds = [_hold(trial) for trial in self.trials]
         self.simulated = run.simulated
         self.moves_probes = _moves_probes(run)
+        self._beyond = {name: overrange(run, name) for name in run.signals}
         self._gain = float(run.attributes.get("newtons_per_ampere", 1.0)) or 1.0
         self._slow = _slow(run, self._gain)
         slow = (name for name, (time, _) in self._slow.items() if time.size)
@@ -127,6 +129,10 @@ class RunSource(Source):
         return self.model.trace(signal, start, end, count)
 
     # --- samples
+
+    def beyond(self, signal: str) -> FloatArray:
+        """As the scope told it, block by block."""
+        return self._beyond.get(signal, super().beyond(signal))
 
     def measured(self, signal: str, start: float, end: float, count: int) -> Trace:
         """The stored signal; where zoomed in, samples as soon as they are read.

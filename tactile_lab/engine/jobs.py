@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from tactile_lab.engine.model_parts import StoredParts
     from tactile_lab.scene.scene import Scene
     from tactile_lab.store.spike_shapes import SpikeShapes
+    from tactile_lab.store.statistics import Statistics
     from tactile_lab.trace import FloatArray
 
 LONGEST = 300.0
@@ -194,6 +195,22 @@ def shapes_of_run(engine: Engine, folder: Path, times: FloatArray) -> SpikeShape
 
     with Run.load(folder) as run:
         return spike_shapes(run, times)
+
+
+def statistics_of_run(
+    engine: Engine, folder: Path, start: float, end: float
+) -> dict[str, Statistics]:
+    """Statistics of each stored signal from `start` to `end` s of a run, by name.
+
+    Raises:
+        RunFolderError: the stretch has no sample, or too many.
+    """
+    from tactile_lab.store.run import Run
+    from tactile_lab.store.statistics import statistics
+
+    with Run.load(folder) as run:
+        names = run.signals
+        return {name: statistics(run.signal(name), start, end) for name in names}
 
 
 _SOLVING = threading.Lock()

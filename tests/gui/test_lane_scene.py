@@ -394,3 +394,49 @@ def test_an_arrangement_that_cannot_be_read_changes_nothing(text):
     arrangement.restore(text)
     assert arrangement.ordered(lanes)[0].key == "V_K"
     assert arrangement.weight(lanes[0]) == lanes[0].weight
+
+
+def test_level_lines_are_put_dragged_and_told(app, stack):
+    lane, bare = box(stack, "V_C1"), stack.scene.grab().toImage()
+    at = middle(stack, "V_C1")
+    under = lane.value_at(at.y())
+    choose(app, stack, "V_C1", "Level line here")
+    assert lane.levels == [pytest.approx(under, abs=0.05)]
+    settle(app)
+    assert stack.scene.grab().toImage() != bare
+    start = QPoint(at.x(), round(lane.y() + lane.height() / 2))
+    lane.levels = [lane.value_at(start.y())]
+    drag(stack, start, start - QPoint(0, 20))
+    assert lane.levels[0] == pytest.approx(lane.value_at(start.y() - 20), abs=0.02)
+    choose(app, stack, "V_C1", "Remove level lines")
+    assert lane.levels == []
+
+
+def test_a_stretch_beyond_the_range_is_shaded(app, stack, monkeypatch):
+    bare = stack.scene.grab().toImage()
+    beyond = {"V_C1": np.array([[7.0, 9.0]])}
+    nothing = np.empty((0, 2))
+    monkeypatch.setattr(
+        LiveSource, "beyond", lambda self, signal: beyond.get(signal, nothing)
+    )
+    seen = stack.scene.grab().toImage()
+    for key, marked in (("V_C1", True), ("V_K", False)):
+        lane = box(stack, key)
+        at = QPoint(round(stack.stage.whole().x1(8.0)), round(lane.y() + 4))
+        assert (seen.pixelColor(at) != bare.pixelColor(at)) is marked, key
+
+
+def test_lanes_that_stay_keep_their_range_when_another_comes(app, stack):
+    lane = box(stack, "V_C1")
+    lane.zoom(2.0, lane.y() + 10)
+    lane.levels = [0.5]
+    shown_before = lane.shown
+    stack.show_lanes(lanes_for(("force", "V_C1", "V_K", "spikes"), twin=True))
+    settle(app)
+    assert box(stack, "V_C1") is lane
+    assert lane.shown == shown_before and lane.levels == [0.5]
+    assert box(stack, "residual").isVisible()
+    stack.show_lanes(lanes_for(("force", "V_C1", "V_K", "spikes"), twin=False))
+    settle(app)
+    assert stack.row("residual") is None
+    assert shown(stack) == ["force", "V_C1", "V_K", "spikes", "rate"]

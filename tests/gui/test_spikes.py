@@ -54,7 +54,7 @@ def test_keys_go_from_spike_to_spike(lab) -> None:
     (folder,) = lab.runs(1)
     window, view = lab.window, lab.window.centre.view
     window.screen_.open_run(folder)
-    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    lab.until(lambda: window.session.run.name == f"Looking at {folder.name}")
     spikes = window.screen_.run.spikes
     window.actions_._tab(3)
     view.show_span(0.0, 0.2)
@@ -69,3 +69,22 @@ def test_keys_go_from_spike_to_spike(lab) -> None:
     assert f"Spike 1 of {spikes.size}" in page.facts.text()
     assert "peak" in page.facts.text()
     window.actions_._tab(0)
+
+
+def test_cards_tell_statistics_between_the_cursors(lab) -> None:
+    (folder,) = lab.runs(1)
+    window, view = lab.window, lab.window.centre.view
+    window.screen_.open_run(folder)
+    lab.until(lambda: window.session.run.name == f"Looking at {folder.name}")
+    row = window.centre.stack.row("V_C1")
+    view.place_cursors(0.4, 0.2)
+    lab.until(lambda: row.statistics is not None)
+    with Run.load(folder) as run:
+        signal = run.signal("V_C1")
+        values = signal[signal.between(0.2, 0.4)]
+    assert row.statistics.samples == values.size
+    assert row.statistics.mean == pytest.approx(values.mean())
+    assert f"mean {values.mean():.3f}" in row.card.toolTip()
+    view.move_cursor(0, 0.3)
+    assert row.statistics is None, "what it was of is gone"
+    view.clear_cursors()
