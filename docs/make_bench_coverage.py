@@ -26,8 +26,10 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.analysis.estimate import Z95
-from tactile_lab.deviation import Deviation, DrivenCircuit
+from tactile_lab.analysis.charging import Charging
+from tactile_lab.analysis.estimate import Z95, Estimate
+from tactile_lab.analysis.rate_force import RateLaw
+from tactile_lab.deviation import Deviation
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import Circuit
@@ -49,6 +51,24 @@ Told = Iterator[tuple[str, float, float, float, float]]
 
 
 @dataclass(frozen=True)
+class Truth:
+    """What is true of a repeat's bench.
+
+    Attributes:
+        circuit: with its true parameters.
+        force: on the run's time axis, N.
+        offset: of the followers, V.
+        field: of the electromagnet per current, T/A, and to either side of it the
+            width of the core's loop, A.
+    """
+
+    circuit: Circuit
+    force: Waveform
+    offset: float
+    field: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Case:
     """One scene, what is drawn for it, and what it tells with an interval.
 
@@ -57,16 +77,18 @@ class Case:
         changes: to it.
         told: numbers with interval and truth, of a run.
         code: of V_C1, V; the channel's offset is drawn within one.
+        core: whether the width of the core's loop is drawn too, up to 50 mA.
     """
 
     scene: str
     changes: tuple[str, ...]
-    told: Callable[[RunData, dict[str, Any], DrivenCircuit], Told]
+    told: Callable[[RunData, dict[str, Any], Truth], Told]
     code: float = 4 / 254
+    core: bool = False
 
 
-def drawn(case: Case, seed: int) -> tuple[list[str], Deviation]:
-    """What is wrong in the believed bench with that seed, as changes to the scene."""
+def drawn(case: Case, seed: int) -> tuple[list[str], Deviation, float]:
+    """Changes to the scene, what is wrong in its bench, and the core's loop, A."""
     rng = np.random.default_rng([seed, 2026])
     deviation = Deviation(
         input_bias=rng.normal(0, 20e-12 / Z95),
@@ -75,18 +97,24 @@ def drawn(case: Case, seed: int) -> tuple[list[str], Deviation]:
         force=rng.normal(0, GEOMETRY / Z95),
         lag=rng.normal(0, 1e-3 / Z95),
     )
+    core = float(rng.uniform(0, 0.05)) if case.core else 0.0
     units = {"input_bias": "A", "offset": "V", "V_GS": "V", "lag": "s"}
     changes = [
         f'simulated.deviation.{name}="{getattr(deviation, name)!r} {unit}"'
         for name, unit in units.items()
     ]
-    return [
-        *changes,
-        f"simulated.deviation.force={deviation.force!r}",
-        f"simulated.clock_error={rng.normal(0, 20e-6)!r}",
-        f"simulated.seed={seed}",
-        f"bench.magnet.geometry_uncertainty={GEOMETRY}",
-    ], deviation
+    return (
+        [
+            *changes,
+            f"simulated.deviation.force={deviation.force!r}",
+            f"simulated.clock_error={rng.normal(0, 20e-6)!r}",
+            f"simulated.seed={seed}",
+            f'simulated.hysteresis="{core!r} A"',
+            f"bench.magnet.geometry_uncertainty={GEOMETRY}",
+        ],
+        deviation,
+        core,
+    )
 
 
 def of(name: str, found: dict[str, Any] | None, truth: float) -> Told:
@@ -101,13 +129,13 @@ def around(name: str, value: float | None, half: float | None, truth: float) -> 
         yield name, value, value - half, value + half, truth
 
 
-def hold(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+def hold(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """Tau and V_GS by the circuit's own law."""
     yield from of("tau", values.get("tau_s"), true.circuit.tau)
     yield from of("V_GS", values.get("V_GS_V"), true.circuit.V_GS)
 
 
-def bipolar(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+def bipolar(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """Tau, changes of I_DS and the same per force."""
     yield from of("tau", values.get("tau_s"), true.circuit.tau)
     made = simulate(true.circuit, true.force, keep=("V_P",), until=run.duration)
@@ -137,13 +165,13 @@ def at_rest(circuit: Circuit, V_P: float) -> float:
     return float(I_DS(circuit, V_P, rest_V_C1(circuit, V_P)))
 
 
-def force_scale(run: RunData, true: DrivenCircuit) -> float:
+def force_scale(run: RunData, true: Truth) -> float:
     """True over believed force."""
     at = run.force.time[int(np.argmax(np.abs(run.force.value)))] + 1e-3
     return float(true.force.at(at) / run.force.at(at))
 
 
-def sine_sweep(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+def sine_sweep(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """Gain and phase of each frequency, the truth by a long sine."""
     from tactile_lab.analysis.response import gain
 
@@ -164,7 +192,7 @@ def sine_sweep(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Tol
         yield from of(f"phase, {name}", phases, settled.phase.value + turn)
 
 
-def threshold(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+def threshold(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """The critical force and the V_GS that explains it."""
     yield from around(
         "critical force",
@@ -176,7 +204,64 @@ def threshold(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told
         yield "V_GS", (low + high) / 2, low, high, true.circuit.V_GS
 
 
-def critical(run: RunData, true: DrivenCircuit) -> float:
+def rate_force(run: RunData, values: dict[str, Any], true: Truth) -> Told:
+    """Slopes of the rate; the truth of the true sensor at the force that is named."""
+    exact = Estimate(true.circuit.V_GS, 0.0, true.circuit.V_GS, true.circuit.V_GS)
+    one = Estimate(1.0, 0.0, 1.0, 1.0)
+    law = RateLaw(
+        V_GS=exact, scale=one, scatter=0.0, intervals=0, correlation=0.0,
+        charging=Charging(true.circuit),
+    )  # fmt: skip
+    yield from of("V_GS", values.get("rate_law_V_GS_V"), true.circuit.V_GS)
+    yield from of(
+        "force over stated", values.get("rate_law_scale"), force_scale(run, true)
+    )
+    for which, found in zip(
+        ("least", "largest"), values.get("slopes") or (), strict=False
+    ):
+        truth = law.slope(found["force_N"], run.protocol.ramp).value
+        yield from of(f"slope at the {which} force", found["slope_Hz_per_N"], truth)
+
+
+def wiring(run: RunData, values: dict[str, Any], true: Truth) -> Told:
+    """Offset and gain of each voltage channel, and V_GS."""
+    for name in ("V_C1", "V_C2"):
+        found = values.get("channels", {}).get(name, {})
+        offset = found.get("offset_V"), found.get("offset_uncertainty_V_95")
+        yield from around("offset of a channel", *offset, true.offset)
+        gain = found.get("gain"), found.get("gain_uncertainty_95")
+        yield from around("gain of a channel", *gain, 1.0)
+    yield from of("V_GS", values.get("V_GS"), true.circuit.V_GS)
+
+
+def calibration(run: RunData, values: dict[str, Any], true: Truth) -> Told:
+    """The slope of B2(I), and a field by the mean curve on either branch."""
+    if "slope_T_per_A" not in values:
+        return
+    per, loop = true.field
+    low, high = values["slope_low_95"], values["slope_high_95"]
+    yield "slope of B2(I)", values["slope_T_per_A"], low, high, per
+    for branch in (-1, 1):
+        known = float(np.interp(0.5, values["current_A"], values["field_T"]))
+        yield from around(
+            "field at 0.5 A",
+            known,
+            values["uncertainty_T"],
+            per * (0.5 + branch * loop),
+        )
+
+
+def force_check(run: RunData, values: dict[str, Any], true: Truth) -> Told:
+    """Forces by the field that was read."""
+    forces = values.get("F_minus_F0_by_field_N", ())
+    bands = values.get("F_minus_F0_uncertainty_N_95", ())
+    for trial, force, band in zip(run.results, forces, bands, strict=False):
+        if trial.held is not None and trial.level:
+            truth = float(true.force.at(sum(trial.held) / 2))
+            yield from around("F(I) - F(0) by the field", force, band, truth)
+
+
+def critical(run: RunData, true: Truth) -> float:
     """Least true force that fires, with ramp and hold as the coil gave them, N."""
     trial = next(t for t in run.results if t.level)
     start, end = trial.start, trial.start + trial.duration
@@ -197,7 +282,7 @@ def critical(run: RunData, true: DrivenCircuit) -> float:
     return high
 
 
-def identification(run: RunData, values: dict[str, Any], true: DrivenCircuit) -> Told:
+def identification(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """V_GS, tau and the input bias from V_C1 and spikes."""
     names = ("V_GS", "tau", "I_bias")
     for name, found in identify_run(run, names).estimates.items():
@@ -221,12 +306,28 @@ CASES = {
     "bipolar, ±50 and 100 mN": Case(
         "bipolar", ('protocol.levels=["50 mN","-50 mN","100 mN"]',), bipolar
     ),
-    "bipolar as shipped": Case("bipolar", (), bipolar, 10 / 254),
-    "sine_sweep, 0.05 and 0.4 Hz": Case(
+    "bipolar as shipped": Case("bipolar", (), bipolar),
+    "sine_sweep, 0.05 and 0.8 Hz": Case(
         "sine_sweep",
-        ("protocol.count=2", 'protocol.lowest="0.05 Hz"', 'protocol.highest="0.4 Hz"'),
+        ("protocol.count=2", 'protocol.lowest="0.05 Hz"', 'protocol.highest="0.8 Hz"'),
         sine_sweep,
     ),
+    "rate_force, three forces": Case(
+        "rate_force",
+        (
+            'record.signals=["V_K","spikes"]',
+            'protocol.levels=["85 mN","120 mN","180 mN"]',
+        ),
+        rate_force,
+    ),
+    "wiring_check": Case("wiring_check", (), wiring),
+    "calibrate_field": Case(
+        "calibrate_field",
+        ("protocol.points=7", "protocol.loops=1"),
+        calibration,
+        core=True,
+    ),
+    "force_check": Case("force_check", (), force_check),
     "threshold_search": Case(
         "threshold_search", ('record.signals=["V_K","spikes"]',), threshold
     ),
@@ -239,7 +340,7 @@ CASES = {
 def repeat(name: str, seed: int) -> dict[str, Any]:
     """One run of a case: name, value, low, high and truth of each number it told."""
     case = CASES[name]
-    changes, deviation = drawn(case, seed)
+    changes, deviation, core = drawn(case, seed)
     with tempfile.TemporaryDirectory() as scratch:
         done = Execution(
             load(case.scene, [*case.changes, *changes]), Path(scratch)
@@ -247,7 +348,9 @@ def repeat(name: str, seed: int) -> dict[str, Any]:
         run = read(done.folder)
     believed = run.belief
     assert believed is not None
-    true = believed.deviating(deviation)
+    circuit, force = believed.deviating(deviation)
+    field = believed.magnet.B2_per_ampere, core
+    true = Truth(circuit, force, deviation.offset, field)
     told: list[tuple[str, float, float, float, float]] = []
     refused = ""
     try:

@@ -110,8 +110,10 @@ def _slope(run: Measurement) -> Conclusion:
     for t in (min(rated, key=_level), max(rated, key=_level)):
         level, hold = _level(t), t.hold or (0.0, 0.0)
         slope, known = law.slope(level, hold[0]), run.uncertain(level)
-        if known is not None:
-            slope = slope.widened(slope.value * known / level)
+        if known is not None:  # the force is another there, and so is a newton
+            off = 1 + known / level
+            other = law.slope(level * off, hold[0]).value * off
+            slope = slope.widened(abs(other - slope.value))
         found.append((level, slope))
     told = " and ".join(
         f"{slope.text('Hz/mN', 1e-3)} at {show(level, 'N')}" for level, slope in found

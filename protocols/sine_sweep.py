@@ -266,11 +266,11 @@ def _degrees(phase: float) -> float:
 
 
 def _known(run: Measurement, trial: MeasuredTrial, found: Gain) -> Gain:
-    """The gain with the force's uncertainty, the phase with the clocks'."""
+    """The force's uncertainty on the gain, that of clocks and lag on the phase."""
     size, phase = found.gain, found.phase
     if run.force_uncertainty is not None:
         part = float(run.force_uncertainty.of(found.amplitude)) / found.amplitude
         size = size.widened(size.value * part)
-    if trial.clock_uncertainty is not None:
-        phase = phase.widened(2 * math.pi * found.frequency * trial.clock_uncertainty)
+    late = trial.clock_uncertainty or 0.0, run.lag_uncertainty or 0.0
+    phase = phase.widened(*(2 * math.pi * found.frequency * time for time in late))
     return replace(found, gain=size, phase=phase)

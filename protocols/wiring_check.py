@@ -97,6 +97,8 @@ class WiringCheck(Protocol):
                 "hum_V": size,
                 "offset_V": known.offset if known else None,
                 "gain": known.gain if known else None,
+                "offset_uncertainty_V_95": known.known if known else None,
+                "gain_uncertainty_95": known.gain_known if known else None,
                 "error_V": known.error if known else None,
             }
             sentences.append(
@@ -215,7 +217,7 @@ def _gate(
     trace = run.trace("V_C1")
     one = CODE if trace is None else _known(run, trace)
     # without a calibration the channel's offset may be a code
-    error = math.hypot(one, one) / Z95 if known else math.hypot(one, CODE) / Z95
+    error = known.error if known else math.hypot(one, CODE) / Z95
     try:
         gate = explaining_V_GS(circuit, V_C1, error)
     except NotIdentifiableError as reason:

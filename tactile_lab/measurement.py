@@ -159,6 +159,8 @@ class Measurement:
         circuit: the sensor as it is believed to be, to compare with, or None.
         bias_uncertainty: half of the 95 % band of the current a measuring follower
             draws from C2, A.
+        lag_uncertainty: the same of the lags of coil and core together, s; None where
+            the bench does not state it.
         searched: whether spikes were looked for.
         settings: settings read back, by instrument, then by name.
         conditions: temperature, operator, sensor and notes, as text by name.
@@ -179,6 +181,7 @@ class Measurement:
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
     bias_uncertainty: float = 0.0
+    lag_uncertainty: float | None = None
     searched: bool = True
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
     conditions: Mapping[str, str] = dataclasses.field(default_factory=dict)

@@ -145,7 +145,8 @@ def fit_field(
         residual=line.scatter,
         drift=drift,
         warming=warming,
-        uncertainty=math.hypot(2 * noise, half_width, drift or 0.0),
+        # a field that came from saturation lies at the loop's edge, not about its mean
+        uncertainty=half_width + math.hypot(2 * noise, drift or 0.0),
         warnings=tuple(warnings),
     )
 

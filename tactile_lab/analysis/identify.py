@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_lab.analysis.belief import PART
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Z95, Estimate
 from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, scatter
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import DrivenCircuit
@@ -31,6 +31,9 @@ LOOSE = 0.5
 """A parameter known worse than this part of itself is not identified."""
 LOOSE_VOLTAGE = 0.1
 """The same for voltages, V."""
+TIMES = ("clocks", "lag")
+"""Causes of uncertainty that move V_C1 at the edges of the force, and hardly elsewhere.
+"""
 DIFFERENCE = np.array(1e-4)
 
 
@@ -105,7 +108,9 @@ def identify(
         )  # fmt: skip
         x = np.asarray(solved.x, dtype=np.float64)
         weights = problem.weights(problem.residual(x))
-    found = _identified(problem, x, weights, _systematic(problem, x, displaced))
+        causes = _systematic(problem, x, displaced)
+        weights = _without_edges(weights, causes)
+    found = _identified(problem, x, weights, [moved for _, moved in causes])
     return replace(found, warnings=(*unused, *found.warnings))
 
 
@@ -129,16 +134,24 @@ def _systematic(
     problem: Residuals,
     x: FloatArray,
     displaced: Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]],
-) -> list[FloatArray]:
-    """Half of the 95 % band each systematic cause gives all residuals, V."""
+) -> list[tuple[str, FloatArray]]:
+    """Half of the 95 % band each systematic cause gives all residuals, V, by name."""
     here = problem.residual(x)
     moved = displaced(problem.circuit(x))
-    causes = [(problem.under(driven) - here) / PART for _, driven in moved]
+    causes = [(name, (problem.under(driven) - here) / PART) for name, driven in moved]
     if problem.bins and problem.offset:
         shifted = np.zeros(problem.size)
         shifted[: problem.bins] = problem.offset
-        causes.append(shifted)
+        causes.append(("offset", shifted))
     return causes
+
+
+def _without_edges(
+    weights: FloatArray, causes: Sequence[tuple[str, FloatArray]]
+) -> FloatArray:
+    """Weights that trust little what a small error of a time moves far, as at edges."""
+    late = [moved / Z95 for name, moved in causes if name in TIMES]
+    return 1 / np.sqrt(1 / weights**2 + sum((moved**2 for moved in late), np.array(0)))
 
 
 def _identified(

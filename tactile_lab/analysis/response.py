@@ -53,7 +53,8 @@ def gain(
             sum of Bessel functions), and its phase not at all.
         leak: time constant with which a transient dies away, s; fitted if given.
 
-    Intervals hold the scatter of the answer, correlated as it is, and the steps.
+    Intervals hold the scatter of the answer, correlated as it is, and the steps. What
+    answers the cause beside its sine, such as steps of a source, is no scatter.
 
     Raises:
         NotIdentifiableError: less than a cycle, too few points, or no cause.
@@ -76,18 +77,25 @@ def gain(
     if abs(given) < 1e-12:
         raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
     left = np.asarray(answer) - design @ out
-    freedom = t.size - design.shape[1]
+    # what the cause does beside its sine, such as a source's steps, is no scatter: the
+    # answer follows it, a little late
+    steps = np.asarray(cause) - design @ into
+    late = np.gradient(steps)
+    beside = np.column_stack([steps, late - design @ (inverse @ late)])
+    if np.abs(beside).max() > 1e-9 * abs(given):
+        left -= beside @ (np.linalg.pinv(beside) @ left)
+    freedom = t.size - design.shape[1] - beside.shape[1]
     alike = correlated(left)
     scatter = math.sqrt(float(np.sum(left**2)) / max(freedom, 1))
     error = scatter * math.sqrt(alike * float(np.sum(inverse[0] ** 2)))
     free = max(1, int(freedom / alike))
     size = max(abs(got), 1e-300)
     first = 2 / math.pi * step_bias
-    steps = 2 / math.pi * first * min(1.0, math.sqrt(math.pi * first / size))
+    codes = 2 / math.pi * first * min(1.0, math.sqrt(math.pi * first / size))
     ratio = got / given
     return Gain(
         frequency,
-        Estimate.of(abs(ratio), error / abs(given), free).widened(steps / abs(given)),
+        Estimate.of(abs(ratio), error / abs(given), free).widened(codes / abs(given)),
         Estimate.of(float(np.angle(ratio)), error / size, free),
         abs(given),
     )

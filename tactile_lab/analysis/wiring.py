@@ -86,8 +86,12 @@ class ChannelCalibration:
 
     @property
     def error(self) -> float:
-        """Standard uncertainty of a voltage so corrected, V."""
-        return math.hypot(self.known, self.known) / Z95
+        """Standard uncertainty of a voltage so corrected, V.
+
+        An offset that is not corrected is still there, and what is not known of it.
+        """
+        left = 0.0 if self.corrects else abs(self.offset)
+        return math.hypot(self.known, self.known + left) / Z95
 
     @property
     def text(self) -> str:

@@ -75,6 +75,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             belief=_belief(run, scene),
             compared=scene.compared,
             bias_uncertainty=_bias_uncertainty(scene),
+            lag_uncertainty=scene.bench.magnet.lag_uncertainty,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
             asks_I_DS="I_DS" in scene.record.signals,

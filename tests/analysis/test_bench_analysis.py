@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tactile_lab.analysis.estimate import Z95
 from tactile_lab.analysis.field_calibration import (
     FieldStep,
     calibration_text,
@@ -46,7 +47,8 @@ def test_the_calibration_finds_slope_and_loop():
     assert found.slope.low < 0.0112 < found.slope.high
     assert found.half_width == pytest.approx(4e-4, rel=0.05)
     assert found.half_width_current == pytest.approx(4e-4 / 0.0112, rel=0.05)
-    assert found.uncertainty >= found.half_width
+    # readings that came from either end of the loop, and their own noise
+    assert found.uncertainty == pytest.approx(4e-4 + 2 * 5e-6, rel=0.02)
     assert found.warnings == ()
     assert 0.0 in found.current
 
@@ -84,7 +86,7 @@ def test_a_drift_widens_the_uncertainty_and_a_large_one_is_refused():
     steady, drifted = fit_field(loop()), fit_field([*loop(), *again(1e-4)])
     assert steady.drift is None
     assert drifted.drift == pytest.approx(1e-4, abs=1e-5)
-    assert drifted.uncertainty == pytest.approx(np.hypot(4e-4, 1e-4), rel=0.05)
+    assert drifted.uncertainty == pytest.approx(4e-4 + 1e-4, rel=0.05)
     with pytest.raises(NotIdentifiableError, match=r"drifted by 300 µT.*limit 2 %"):
         fit_field([*loop(noise=0), *again(3e-4)])
 
@@ -209,6 +211,8 @@ def test_no_channel_is_corrected_by_less_than_its_own_uncertainty():
     assert not within.corrects
     assert within.corrected(4.3) == 4.3
     assert "nothing is corrected" in within.text
+    # the true offset may be twice what was seen of it
+    assert Z95 * within.error == pytest.approx(np.hypot(0.0197, 2 * 0.0197))
     beyond = calibrate_channel(-0.06, 4.94, 5.0, known=0.0197)
     assert beyond.corrects
     assert beyond.corrected(4.24) == pytest.approx(4.3)

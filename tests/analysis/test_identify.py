@@ -105,6 +105,22 @@ def test_an_uncertain_force_and_offset_widen_the_intervals():
         assert 0.5 * half < 2 * moved < 2 * half
 
 
+def test_what_is_not_known_of_times_blurs_the_edges_alone():
+    trace, _ = run_of(Circuit())
+    names, later = ("V_GS", "tau"), FORCE.shifted(PART * 5e-3)
+    sure, late = (
+        identify(
+            Circuit(), names, FORCE, FORCE.end, V_C1=trace,
+            displaced=lambda c, moved=moved: [
+                ("clocks", DrivenCircuit(c, f)) for f in moved
+            ],
+        ).estimates
+        for moved in ((), (later,))
+    )  # fmt: skip
+    for name in names:
+        assert late[name].half < 1.2 * sure[name].half
+
+
 def test_spikes_of_a_saturating_t1_are_no_evidence():
     _, spikes = run_of(Circuit())
     with pytest.raises(NotIdentifiableError, match="T1 saturates"):

@@ -39,6 +39,17 @@ def test_its_intervals_hold_under_harmonics_noise_and_converter_steps():
     assert found.gain.half < 0.12
 
 
+def test_steps_of_the_source_are_no_scatter():
+    """A source that is set 22 times a second gives a sine in stairs."""
+    steps = np.floor(TIME * 22) / 22
+    cause = 0.05 * np.sin(2 * np.pi * 0.5 * steps)
+    rng = np.random.default_rng(1)
+    answer = 2.4 * cause + rng.normal(0, 1e-3, TIME.size)
+    found = gain(TIME, cause, answer, 0.5)
+    assert found.gain.low < 2.4 < found.gain.high
+    assert found.gain.half < 0.003
+
+
 def test_too_little_is_refused():
     with pytest.raises(NotIdentifiableError, match="less than one cycle"):
         gain(TIME[:50], np.sin(TIME[:50]), np.sin(TIME[:50]), 0.5)
