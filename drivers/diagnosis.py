@@ -18,6 +18,7 @@ from drivers.coil.guard import Guard
 from drivers.picoscope.sdk import load
 from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.dialects import coil_dialect
+from tactile_lab.lab import lab
 
 NEEDED = ("numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb")
 DISK_TRIAL = 64 * 1024 * 1024
@@ -58,8 +59,15 @@ def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
         guard,
         wake_up,
         lambda: disk(folder, needed_rate),
+        defaults,
     )
     return [asdict(finding) for finding in (*(look() for look in looks), *ports())]
+
+
+def defaults() -> Diagnosis:
+    """What the lab has set, and where."""
+    said = "; ".join(f"{key}: {value}" for key, value in lab().rows)
+    return Diagnosis(topic="lab", state="ok", text=said)
 
 
 def python() -> Diagnosis:

@@ -18,6 +18,7 @@ from gui.session.session import Session
 from gui.tool_tips import ToolTips
 from gui.window import Window
 from tactile_lab.engine.threads import start
+from tactile_lab.lab import Lab
 
 FRAME = QSize(8, 40)
 """Room for what the desktop draws around the window, px."""
@@ -42,6 +43,7 @@ def main(
     out: Path | None = None,
     bench: str | None = None,
     theme: str = "system",
+    lab: Lab | None = None,
 ) -> int:
     """Open the window and stay until it is closed.
 
@@ -50,6 +52,7 @@ def main(
         out: folder for run folders; None for that of the preferences.
         bench: "sim", a bench file, "none"; None for that of the preferences.
         theme: "system", "light" or "dark".
+        lab: what counts where the preferences name nothing.
 
     Returns:
         Exit code: 0, or 4 where the coil's safe state could not be verified.
@@ -60,8 +63,9 @@ def main(
     chosen = Theme(theme)
     chosen.apply()
     settings = QSettings()
-    wishes = Preferences(settings)
+    wishes = Preferences(settings, lab)
     session = Session(out or wishes.folder)
+    session.run.notes = lab.notes if lab else {}
     session.run.reports = wishes.reports
     window = Window(session, chosen, settings)
     window.resize(window.size().boundedTo(window.screen().availableSize() - FRAME))

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import click
 
+from tactile_lab.commands.terminal import refusing
+from tactile_lab.lab import lab
+
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
 INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
 
@@ -49,4 +52,6 @@ def command(
             f"Qt does not load: {error}. On Debian its libraries come with: apt-get "
             "install libegl1 libgl1 libxkbcommon0 libdbus-1-3 libfontconfig1"
         ) from error
-    sys.exit(app.main(target, out=out, bench=bench, theme=theme))
+    with refusing():
+        known = lab()
+    sys.exit(app.main(target, out=out, bench=bench, theme=theme, lab=known))

@@ -7,6 +7,8 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QSettings, Signal
 
+from tactile_lab.lab import Lab
+
 MOST = 8
 """Recent scenes and benches that are kept."""
 
@@ -26,12 +28,16 @@ class Preferences(QObject):
 
     Args:
         settings: where they are kept; None keeps nothing.
+        lab: what counts where nothing was chosen.
     """
 
     changed = Signal()
 
-    def __init__(self, settings: QSettings | None = None) -> None:
+    def __init__(
+        self, settings: QSettings | None = None, lab: Lab | None = None
+    ) -> None:
         super().__init__()
+        self._lab = lab or Lab()
         self._settings = settings
         self._values = dict(DEFAULTS)
         self._recent: list[str] = []
@@ -48,16 +54,17 @@ class Preferences(QObject):
     @property
     def folder(self) -> Path:
         """For runs, where the command line names none."""
-        return Path(self._values["folder"] or "runs")
+        return Path(self._values["folder"] or self._lab.runs)
 
     @property
     def bench(self) -> str:
         """Bench file that is connected at the start, "sim", or "none".
 
-        Where none was chosen it is the one that answered last, if it is still there.
+        Where none was chosen it is the one that answered last, if it is still there,
+        else the lab's.
         """
         last = str(self._values["last_bench"])
-        return self.chosen_bench or (last if Path(last).is_file() else "sim")
+        return self.chosen_bench or (last if Path(last).is_file() else self._lab.bench)
 
     @property
     def chosen_bench(self) -> str:

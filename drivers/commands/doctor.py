@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.options import json_option
+from tactile_lab.commands.options import json_option, runs_option
 from tactile_lab.commands.terminal import print_json, refusing, say
 
 PROBLEM = 1
@@ -14,14 +14,7 @@ BYTES_PER_SAMPLE = 2
 
 
 @click.command()
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("runs"),
-    show_default=True,
-    metavar="DIR",
-    help="Where runs are to be stored.",
-)
+@runs_option
 @click.option(
     "--rate",
     type=click.FloatRange(min=0, min_open=True),

@@ -25,7 +25,7 @@ from tactile_lab.engine.events import (
     Samples,
     TaskEvent,
 )
-from tactile_lab.engine.jobs import write_report
+from tactile_lab.engine.jobs import follow_run, write_report
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.quantity import show
@@ -203,7 +203,7 @@ class LiveRun(LiveTask):
         if lost is not None:
             words += f", {lost} samples lost"
         self._log.add(Severity.INFO, "store", words)
-        self.report(folder)
+        self.report(folder, follow=True)
         self.ended.emit(done)
         if not off.verified:
             status.set_fault("The coil's state is unknown after the run.", off.text)
@@ -216,12 +216,32 @@ class LiveRun(LiveTask):
             if done.state is events.RunState.COMPLETE:
                 self.completed.emit()
 
-    def report(self, folder: Path) -> None:
-        """Have the report of a run in `folder` written, where reports are wanted."""
+    def report(self, folder: Path, *, follow: bool = False) -> None:
+        """Have the report of a run in `folder` written, where reports are wanted.
+
+        Args:
+            folder: of the run.
+            follow: then do what the lab has follow each run.
+        """
+
+        def told(reply: Reply[None]) -> None:
+            self._report(folder, reply)
+            if follow:
+                self._follow(folder)
+
         if self.reports:
-            self._link.ask(
-                lambda reply: self._report(folder, reply), write_report, folder
-            )
+            self._link.ask(told, write_report, folder)
+        elif follow:
+            self._follow(folder)
+
+    def _follow(self, folder: Path) -> None:
+        """Have what the lab wants done after a run done."""
+
+        def told(reply: Reply[str]) -> None:
+            if problem := reply.problem or reply.value:
+                self._log.add(Severity.WARNING, "lab", problem)
+
+        self._link.ask(told, follow_run, folder)
 
     def _has_begun(self, event: Begun) -> None:
         plan, coil = self.expectation, self._status.coil

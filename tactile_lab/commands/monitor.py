@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, TextIO
 import click
 
 from tactile_lab.commands.attended import Signals, run_attended
-from tactile_lab.commands.options import noted, notes_option, runs_option, scene_options
+from tactile_lab.commands.options import (
+    noted,
+    notes_option,
+    runs_option,
+    scene_asked,
+    scene_options,
+)
 from tactile_lab.commands.terminal import StatusLine, fail, refusing, say, warn
 
 if TYPE_CHECKING:
@@ -55,9 +61,8 @@ def command(
     with Signals({RECORD: lambda: asked.put(RECORD)}) as signals:
         with refusing():
             from tactile_lab.engine.monitor import Monitor
-            from tactile_lab.scene.load import load
 
-            loaded = load(scene or "monitor", (*ENDLESS, *overrides), bench)
+            loaded = scene_asked(scene or "monitor", (*ENDLESS, *overrides), bench)
             kept = noted(notes)
             monitor = Monitor(loaded, realtime=True, keep=keep)
             signals.look()

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
+
+from tactile_lab.commands.terminal import refusing
+
+if TYPE_CHECKING:
+    from tactile_lab.scene.scene import Scene
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -88,17 +93,48 @@ run_argument: Decorator = click.argument(
     "run", type=click.Path(path_type=Path), shell_complete=_runs
 )
 
+
+def scene_asked(
+    scene: str | None, overrides: tuple[str, ...], bench: str | None
+) -> Scene:
+    """The scene that somebody asked for, on the lab's bench where it names none.
+
+    Raises:
+        SceneError: it cannot be used.
+    """
+    from tactile_lab.lab import lab
+    from tactile_lab.scene.load import load
+
+    return load(scene, overrides, bench, lab().bench)
+
+
 json_option: Decorator = click.option(
     "--json", "as_json", is_flag=True, help="One JSON object on stdout."
 )
 
+
+def runs_folder() -> Path:
+    """Where the lab keeps its runs."""
+    from tactile_lab.lab import lab
+
+    with refusing():
+        return lab().runs
+
+
 runs_option: Decorator = click.option(
     "--out",
     type=click.Path(path_type=Path),
-    default=Path("runs"),
-    show_default=True,
+    default=runs_folder,
+    show_default="./runs, or as lab.toml says",
     metavar="DIR",
     help="Where run folders are put.",
+)
+
+status_option: Decorator = click.option(
+    "--status",
+    metavar="tcp://HOST:PORT",
+    help="Tell other programs how it goes, as JSON lines, and take their stop; port 0 "
+    "takes a free one. See docs/how-to/work-with-other-programs.md.",
 )
 
 notes_option: Decorator = click.option(
@@ -111,14 +147,15 @@ notes_option: Decorator = click.option(
 
 
 def noted(notes: tuple[str, ...]) -> dict[str, str]:
-    """What ``--note`` options say.
+    """What the lab notes with each run, and ``--note`` options say.
 
     Raises:
         SceneError: one has another form.
     """
     from tactile_lab.errors import SceneError
+    from tactile_lab.lab import lab
 
-    found = {}
+    found = lab().notes
     for note in notes:
         key, equals, text = note.partition("=")
         if not (key and equals):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactile_lab.commands.options import json_option, scene_options
+from tactile_lab.commands.options import json_option, scene_asked, scene_options
 from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
 
 if TYPE_CHECKING:
@@ -61,12 +61,12 @@ def command(
     Opens no instrument, and writes nothing but the preview if that is asked for.
     """
     with refusing():
+        from tactile_lab.lab import lab
         from tactile_lab.planning.plan import plan, text
-        from tactile_lab.scene.load import load
 
         if picture is not None:
             check_target(picture)
-        loaded = load(scene, overrides, bench)
+        loaded, lab_says = scene_asked(scene, overrides, bench), lab().rows
         if list_keys:
             _list_keys(loaded, as_json)
             return
@@ -78,6 +78,9 @@ def command(
         print_json({**planned.to_dict(), "figure": str(picture) if picture else None})
     else:
         say(text(planned))
+        say("\nthe lab's defaults")
+        for key, value in lab_says:
+            say(f"  {key:<12}{value}")
         if picture is not None:
             say(f"preview drawn into {picture}")
     for line in planned.warnings:

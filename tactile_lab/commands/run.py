@@ -2,41 +2,40 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from contextlib import suppress
-from dataclasses import asdict, replace
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from tactile_lab.commands.attended import Signals, interrupted, run_attended
+from tactile_lab.commands.attended import Signals, interrupted
+from tactile_lab.commands.one_run import (
+    Narrator,
+    Watchers,
+    answer,
+    concluded,
+    finished,
+    leave,
+    print_run,
+    serve_status,
+)
 from tactile_lab.commands.options import (
     json_option,
     noted,
     notes_option,
     runs_option,
+    scene_asked,
     scene_options,
+    status_option,
 )
 from tactile_lab.commands.read_off import field_reader
-from tactile_lab.commands.terminal import (
-    ProgressLine,
-    fail,
-    print_json,
-    progress,
-    refusing,
-    say,
-    somebody,
-    warn,
-)
+from tactile_lab.commands.terminal import print_json, refusing, say, somebody, warn
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
-    from tactile_lab.acquisition.events import Event
-    from tactile_lab.acquisition.model_comparison import ModelComparison
     from tactile_lab.bench import Bench
-    from tactile_lab.engine.execution import Execution
     from tactile_lab.report.write import Report
     from tactile_lab.scene.scene import Scene
     from tactile_lab.store.compare import Differences
@@ -85,6 +84,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="Run it N times at each value, as a study.",
 )
+@status_option
 @click.option("--no-report", is_flag=True, help="Leave out figure and report.")
 @json_option
 def command(
@@ -100,6 +100,7 @@ def command(
     field: Path | None,
     sweeps: tuple[str, ...],
     repeat: int,
+    status: str | None,
     no_report: bool,
     as_json: bool,
 ) -> None:
@@ -110,7 +111,7 @@ def command(
     interrupted by SIGHUP, SIGINT or SIGTERM with the coil verified off.
     """
     began = time.monotonic()
-    with Signals() as signals:
+    with Signals() as signals, ExitStack() as served:
         with refusing():
             from tactile_lab.engine.execution import Execution
 
@@ -124,18 +125,20 @@ def command(
                     "--transcript": transcripts,
                     "--again": again,
                     "--field": field,
+                    "--status": status,
                 }
                 _refuse_with_sweep([name for name, value in given.items() if value])
                 with interrupted():
                     _sweep(loaded, sweeps, repeat, out, as_json=as_json)
                 return
             signals.look()
-            narrator, person = Narrator(loaded.name), somebody()
+            watchers = Watchers(Narrator(loaded.name), serve_status(status, served))
+            person = somebody()
             execution = Execution(
                 loaded,
                 out,
                 realtime=realtime,
-                emit=narrator,
+                emit=watchers,
                 notes=noted(notes),
                 ask=person,
                 asked_field=field_reader(loaded, person, field),
@@ -144,45 +147,20 @@ def command(
                 record(execution.bench, transcripts)
             for text in execution.plan.warnings:
                 warn(text)
-        narrator.expect(execution)
-        done = finished(execution, signals, narrator)
-        with interrupted():
-            try:
-                for text in _overrange(done):
-                    warn(text)
-                if done.exit_code:
-                    say(f"tactile-lab: {done.told}", sys.stderr)
-                report = None if no_report else _report(done)
-                changed = None if again is None else _differences(again, done)
-                if as_json:
-                    print_json(answer(done, report, changed))
-                else:
-                    _print(done, report, time.monotonic() - began)
-                    if changed is not None:
-                        say(f"against {again}\n{changed}")
-            except (Exception, KeyboardInterrupt) as failure:
-                _unreported(done, failure)
-    # how the run ended, whatever became of telling it
-    if not done.off.verified:
-        fail(done.off.text, done.exit_code)
-    raise click.exceptions.Exit(done.exit_code)
+        done = finished(execution, signals, watchers)
 
+        def tell(done: Executed, report: Report | None) -> None:
+            changed = None if again is None else _differences(again, done)
+            watchers.end(answer(done, report, changed))
+            if as_json:
+                print_json(answer(done, report, changed))
+                return
+            print_run(done, report, time.monotonic() - began)
+            if changed is not None:
+                say(f"against {again}\n{changed}")
 
-def finished(execution: Execution, signals: Signals, narrator: Narrator) -> Executed:
-    """How an execution ended, which is carried out here.
-
-    Raises:
-        click.exceptions.Exit: it could not be begun; told.
-    """
-    try:
-        done = run_attended(execution, signals)
-    except Exception as error:
-        with suppress(OSError):
-            narrator.close()
-        fail(str(error), 3 if execution.coil_left_safe else 4)
-    with suppress(OSError):
-        narrator.close()
-    return done
+        concluded(done, no_report=no_report, tell=tell)
+    leave(done)
 
 
 def _refuse_with_sweep(options: list[str]) -> None:
@@ -225,86 +203,6 @@ def record(bench: Bench, folder: Path) -> None:
             start(folder / f"{name}.txt")
 
 
-class Narrator:
-    """Tells on stderr how the run goes."""
-
-    def __init__(self, label: str) -> None:
-        self._label = label
-        self._progress: ProgressLine | None = None
-        self._trial = ""
-        self._spikes = 0
-        self._rate = 0.0
-        self._model: ModelComparison | None = None
-
-    def expect(self, execution: Execution) -> None:
-        """This is about to run; the model will run beside it."""
-        self._progress = ProgressLine(execution.plan.estimate.duration, self._label)
-        searched = execution.needs.detect_on is not None
-        stored = "V_C1" in execution.needs.stored
-        if execution.scene.compared and (searched or stored):
-            from tactile_lab.acquisition.model_comparison import ModelComparison
-
-            self._model = ModelComparison(execution.scene, searched=searched)
-
-    def __call__(self, event: Event) -> None:
-        """Take an event of the run."""
-        from tactile_lab.acquisition import events
-
-        progress = self._progress
-        if progress is None:
-            return
-        match event:
-            case events.CoilCurrent():
-                if self._model is not None:
-                    self._model.add(event)
-            case events.TrialEnded(outcome=outcome):
-                told = "" if self._model is None else self._model.ended(outcome)
-                if told:
-                    progress.note(told)
-            case events.TrialStarted(trial=trial):
-                self._trial = trial.label
-            case events.SpikesSeen(times=times, rates=rates):
-                self._spikes += len(times)
-                self._rate = rates[-1]
-            case events.Progress(elapsed=elapsed):
-                progress.update(elapsed, self._now())
-            case events.Message(level=level, text=text):
-                progress.note(f"{level}: {text}")
-            case events.StateChanged(state=events.RunState.STOPPING, text=text):
-                progress.note(text)
-
-    def _now(self) -> str:
-        """The trial, and the spikes so far with the last interval's rate."""
-        if not self._spikes:
-            return self._trial
-        told = f"{self._spikes} spikes, last at {self._rate:.3g} Hz"
-        return f"{self._trial}  {told}".strip()
-
-    def close(self) -> None:
-        """Leave the terminal ready for other output."""
-        if self._progress is not None:
-            self._progress.close()
-
-
-def answer(
-    done: Executed, report: Report | None, changed: Differences | None = None
-) -> dict[str, Any]:
-    """The documented object (docs/json.md)."""
-    return {
-        "run": str(done.folder),
-        "status": str(done.state),
-        "spikes": done.spikes,
-        "loss": dict(done.loss),
-        "duration_s": done.duration,
-        "run_time_s": done.took,
-        "reason": done.reason,
-        "coil": done.off.text,
-        "coil_verified_off": done.off.verified,
-        "report": None if report is None else str(report.html),
-        "differences": None if changed is None else asdict(changed),
-    }
-
-
 def _scene(
     path: str | None, overrides: tuple[str, ...], bench: str | None, again: Path | None
 ) -> Scene:
@@ -313,7 +211,7 @@ def _scene(
     from tactile_lab.scene.load import load
 
     if again is None:
-        return load(path, overrides, bench)
+        return scene_asked(path, overrides, bench)
     if path is not None:
         raise SceneError(f"--again {again} repeats that run; leave {path} out.")
     from tactile_lab.store.folder import read_info
@@ -331,68 +229,3 @@ def _differences(again: Path, done: Executed) -> Differences | None:
     except TactileLabError as error:
         warn(f"the runs cannot be compared: {error}")
         return None
-
-
-def _report(done: Executed) -> Report | None:
-    from tactile_lab.errors import TactileLabError
-    from tactile_lab.report.from_run import read
-    from tactile_lab.report.write import write
-
-    try:
-        with progress("writing the report") as update:
-            report = write(done.folder, read(done.folder), progress=update)
-    except (TactileLabError, OSError) as error:
-        warn(f"the report could not be written: {error}")
-        return None
-    for text in report.findings.missing:
-        warn(text)
-    return report
-
-
-def _print(done: Executed, report: Report | None, took: float) -> None:
-    from tactile_lab.report.table import trials_table
-
-    if report is not None:
-        run = report.findings.run
-        say(trials_table(run).text)
-        say()
-        if text := report.findings.conclusion.text:
-            say(f"{text}\n")
-        say(
-            f"{run.duration:.1f} s of experiment in {took:.1f} s "
-            f"({done.took:.1f} s of it running)."
-        )
-        beside = report.findings.beside
-        if beside is not None:
-            say(beside.budget_line)
-            if beside.explanation is not None:
-                say(f"The model misses by more. {beside.explanation.text}")
-        if run.accuracy:
-            say(run.accuracy)
-        if run.loss is not None:
-            say(run.loss.sentence)
-        say(f"figure  {report.png}")
-        say(f"report  {report.html}")
-    say(f"run     {done.folder}")
-
-
-def _overrange(done: Executed) -> tuple[str, ...]:
-    """Which inputs left their range, and when."""
-    from tactile_lab.store.folder import read_info
-
-    if not read_info(done.folder).get("overrange"):
-        return ()
-    from tactile_lab.store.overrange import told
-    from tactile_lab.store.run import Run
-
-    with Run.load(done.folder) as run:
-        return told(run)
-
-
-def _unreported(done: Executed, failure: BaseException) -> None:
-    """Say that the run could not be told of to the end, if that can be said."""
-    text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
-    warn(
-        f"the report was cut short ({text}). The run is kept in {done.folder}; "
-        f"`tactile-lab report {done.folder}` writes it again."
-    )

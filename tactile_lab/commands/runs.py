@@ -8,14 +8,14 @@ from pathlib import Path
 
 import click
 
-from tactile_lab.commands.options import json_option
+from tactile_lab.commands.options import json_option, runs_folder
 from tactile_lab.commands.terminal import print_json, refusing, say
 
 DAY = click.DateTime(["%Y-%m-%d"])
 
 
 @click.command()
-@click.argument("root", default="runs", type=click.Path(path_type=Path))
+@click.argument("root", default=runs_folder, type=click.Path(path_type=Path))
 @click.option("--protocol", metavar="NAME", help="Only runs of this protocol.")
 @click.option("--sensor", metavar="TEXT", help="Only runs whose noted sensor has this.")
 @click.option("--since", type=DAY, metavar="DATE", help="Not before this day.")
@@ -34,7 +34,7 @@ def command(
     search: str,
     as_json: bool,
 ) -> None:
-    """List the runs in folder ROOT (./runs), oldest first."""
+    """List the runs in folder ROOT (./runs, or as lab.toml says), oldest first."""
     with refusing():
         from tactile_lab.quantity import count
         from tactile_lab.store.catalogue import catalogue

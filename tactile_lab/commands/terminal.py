@@ -35,6 +35,7 @@ STYLES = {
     r"^sound$|^ok\b|\bcomplete\b|loss: 0 of": "green",
     r"not identifiable|not determined": "dim",
     r"^(needs|leaves out|takes|resolution, one code|rests on)$": "bold",
+    r"^the lab's defaults$": "bold",
 }
 """What is coloured, and how."""
 

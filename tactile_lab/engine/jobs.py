@@ -20,6 +20,7 @@ from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import RecordingError, RefusedError, TactileLabError
+from tactile_lab.lab import lab
 from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
@@ -165,6 +166,15 @@ def write_report(engine: Engine, folder: Path) -> None:
     if writing.returncode:
         last = (said.strip().splitlines() or ["no message"])[-1]
         raise RecordingError(f"The report was not written: {last}")
+
+
+def follow_run(engine: Engine, folder: Path) -> str:
+    """Call what the lab has follow each run; what went wrong, "" if nothing did.
+
+    Raises:
+        SceneError: the lab's file cannot be read.
+    """
+    return lab().follow(folder)
 
 
 def model_of_run(

@@ -52,6 +52,7 @@ def load(
     scene: str | Path | Scene | None = None,
     overrides: Overrides = (),
     bench: str | Path | None = None,
+    unless_named: str | Path = SIMULATED,
 ) -> Scene:
     """A scene, validated; opens no instrument and writes nothing.
 
@@ -62,6 +63,8 @@ def load(
             SI numbers or texts ("120 mN"), or ``table.key=value`` texts.
         bench: path of a bench file, or "sim" for the built-in simulated bench; replaces
             the scene's own ``[bench]``.
+        unless_named: the same, where the scene has no ``[bench]``; never for the demo
+            that is nobody's choice (`scene` None).
 
     Raises:
         SceneError: something cannot be used as written; names file, key, value, what is
@@ -87,6 +90,8 @@ def load(
             data = read_toml(file, "Scene")
             trust.check(data, file.parent)
     origins = {}
+    if bench is None and scene is not None and "bench" not in data:
+        bench = unless_named
     if bench is not None:
         data["bench"] = (
             {} if bench == SIMULATED else {"file": str(Path(bench).resolve())}

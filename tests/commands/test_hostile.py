@@ -7,7 +7,8 @@ import sys
 
 import pytest
 
-from tactile_lab.store.folder import INFO, RunFolder, is_live
+from tactile_lab.store.folder import RunFolder, is_live
+from tactile_lab.trust import INFO
 
 
 @pytest.fixture

@@ -1,0 +1,280 @@
+"""One run at a terminal: how it goes, how it ended, its report, and what follows it."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from tactile_lab.commands.attended import Signals, interrupted, run_attended
+from tactile_lab.commands.terminal import ProgressLine, fail, progress, say, warn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import ExitStack
+
+    from tactile_lab.acquisition.ending import Executed
+    from tactile_lab.acquisition.events import Event
+    from tactile_lab.acquisition.model_comparison import ModelComparison
+    from tactile_lab.commands.status_server import StatusServer
+    from tactile_lab.engine.execution import Execution
+    from tactile_lab.report.write import Report
+    from tactile_lab.store.compare import Differences
+
+
+class Narrator:
+    """Tells on stderr how the run goes."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._progress: ProgressLine | None = None
+        self._trial = ""
+        self._spikes = 0
+        self._rate = 0.0
+        self._model: ModelComparison | None = None
+
+    def expect(self, execution: Execution) -> None:
+        """This is about to run; the model will run beside it."""
+        self._progress = ProgressLine(execution.plan.estimate.duration, self._label)
+        searched = execution.needs.detect_on is not None
+        stored = "V_C1" in execution.needs.stored
+        if execution.scene.compared and (searched or stored):
+            from tactile_lab.acquisition.model_comparison import ModelComparison
+
+            self._model = ModelComparison(execution.scene, searched=searched)
+
+    def __call__(self, event: Event) -> None:
+        """Take an event of the run."""
+        from tactile_lab.acquisition import events
+
+        progress = self._progress
+        if progress is None:
+            return
+        match event:
+            case events.CoilCurrent():
+                if self._model is not None:
+                    self._model.add(event)
+            case events.TrialEnded(outcome=outcome):
+                told = "" if self._model is None else self._model.ended(outcome)
+                if told:
+                    progress.note(told)
+            case events.TrialStarted(trial=trial):
+                self._trial = trial.label
+            case events.SpikesSeen(times=times, rates=rates):
+                self._spikes += len(times)
+                self._rate = rates[-1]
+            case events.Progress(elapsed=elapsed):
+                progress.update(elapsed, self._now())
+            case events.Message(level=level, text=text):
+                progress.note(f"{level}: {text}")
+            case events.StateChanged(state=events.RunState.STOPPING, text=text):
+                progress.note(text)
+
+    def _now(self) -> str:
+        """The trial, and the spikes so far with the last interval's rate."""
+        if not self._spikes:
+            return self._trial
+        told = f"{self._spikes} spikes, last at {self._rate:.3g} Hz"
+        return f"{self._trial}  {told}".strip()
+
+    def close(self) -> None:
+        """Leave the terminal ready for other output."""
+        if self._progress is not None:
+            self._progress.close()
+
+
+class Watchers:
+    """Who is told of a run: the terminal, and other programs where they asked.
+
+    Args:
+        narrator: tells it at the terminal.
+        server: tells it to other programs; None where nobody asked.
+    """
+
+    def __init__(self, narrator: Narrator, server: StatusServer | None) -> None:
+        self.narrator, self._server = narrator, server
+
+    def expect(self, execution: Execution) -> None:
+        """This is about to run."""
+        self.narrator.expect(execution)
+        if self._server is not None:
+            self._server.stop = execution.stop
+            self._server.tell(
+                "begun",
+                run=str(execution.folder.path),
+                scene=execution.scene.name,
+                simulated=execution.bench.simulated,
+                planned_s=execution.plan.estimate.duration,
+            )
+
+    def __call__(self, event: Event) -> None:
+        """Take an event of the run."""
+        self.narrator(event)
+        if self._server is not None:
+            self._server(event)
+
+    def end(self, result: dict[str, Any]) -> None:
+        """Tell what came of it, as ``--json`` prints it."""
+        if self._server is not None:
+            self._server.stop = None
+            self._server.tell("result", **result)
+
+
+def serve_status(address: str | None, until: ExitStack) -> StatusServer | None:
+    """Who tells other programs of runs until that stack is left; None without address.
+
+    Raises:
+        SceneError: it is no address, or cannot be listened at.
+    """
+    if address is None:
+        return None
+    from tactile_lab.commands.status_server import StatusServer
+
+    server = StatusServer(address)
+    until.callback(server.close)
+    say(f"status {server.address}", sys.stderr)
+    if not server.local:
+        warn(f"every computer that reaches {server.address} can read it and stop runs.")
+    return server
+
+
+def finished(execution: Execution, signals: Signals, watchers: Watchers) -> Executed:
+    """How an execution ended, which is carried out here.
+
+    Raises:
+        click.exceptions.Exit: it could not be begun; told.
+    """
+    watchers.expect(execution)
+    try:
+        done = run_attended(execution, signals)
+    except Exception as error:
+        with suppress(OSError):
+            watchers.narrator.close()
+        fail(str(error), 3 if execution.coil_left_safe else 4)
+    with suppress(OSError):
+        watchers.narrator.close()
+    return done
+
+
+def answer(
+    done: Executed, report: Report | None, changed: Differences | None = None
+) -> dict[str, Any]:
+    """The documented object (docs/json.md)."""
+    return {
+        "run": str(done.folder),
+        "status": str(done.state),
+        "spikes": done.spikes,
+        "loss": dict(done.loss),
+        "duration_s": done.duration,
+        "run_time_s": done.took,
+        "reason": done.reason,
+        "coil": done.off.text,
+        "coil_verified_off": done.off.verified,
+        "report": None if report is None else str(report.html),
+        "differences": None if changed is None else asdict(changed),
+    }
+
+
+def write_report(done: Executed) -> Report | None:
+    """Write the report of a run; None where it cannot be, which is told."""
+    from tactile_lab.errors import TactileLabError
+    from tactile_lab.report.from_run import read
+    from tactile_lab.report.write import write
+
+    try:
+        with progress("writing the report") as update:
+            report = write(done.folder, read(done.folder), progress=update)
+    except (TactileLabError, OSError) as error:
+        warn(f"the report could not be written: {error}")
+        return None
+    for text in report.findings.missing:
+        warn(text)
+    return report
+
+
+def print_run(done: Executed, report: Report | None, took: float) -> None:
+    """Print what a run gave, and where it lies; `took` it s of wall time in all."""
+    from tactile_lab.report.table import trials_table
+
+    if report is not None:
+        run = report.findings.run
+        say(trials_table(run).text)
+        say()
+        if text := report.findings.conclusion.text:
+            say(f"{text}\n")
+        say(
+            f"{run.duration:.1f} s of experiment in {took:.1f} s "
+            f"({done.took:.1f} s of it running)."
+        )
+        beside = report.findings.beside
+        if beside is not None:
+            say(beside.budget_line)
+            if beside.explanation is not None:
+                say(f"The model misses by more. {beside.explanation.text}")
+        if run.accuracy:
+            say(run.accuracy)
+        if run.loss is not None:
+            say(run.loss.sentence)
+        say(f"figure  {report.png}")
+        say(f"report  {report.html}")
+    say(f"run     {done.folder}")
+
+
+def overrange(done: Executed) -> tuple[str, ...]:
+    """Which inputs left their range, and when."""
+    from tactile_lab.store.folder import read_info
+
+    if not read_info(done.folder).get("overrange"):
+        return ()
+    from tactile_lab.store.overrange import told
+    from tactile_lab.store.run import Run
+
+    with Run.load(done.folder) as run:
+        return told(run)
+
+
+def concluded(
+    done: Executed, *, no_report: bool, tell: Callable[[Executed, Report | None], None]
+) -> None:
+    """Tell of a run that ended, write its report, and do what follows a run.
+
+    Nothing in here changes how the run ended: what fails is told.
+
+    Args:
+        done: how it ended.
+        no_report: leave the report out.
+        tell: says more of it, with its report where there is one.
+    """
+    with interrupted():
+        try:
+            for text in overrange(done):
+                warn(text)
+            if done.exit_code:
+                say(f"tactile-lab: {done.told}", sys.stderr)
+            report = None if no_report else write_report(done)
+            tell(done, report)
+            from tactile_lab.lab import lab
+
+            if problem := lab().follow(done.folder):
+                warn(problem)
+        except (Exception, KeyboardInterrupt) as failure:
+            _unreported(done, failure)
+
+
+def _unreported(done: Executed, failure: BaseException) -> None:
+    """Say that the run could not be told of to the end, if that can be said."""
+    text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
+    warn(
+        f"the report was cut short ({text}). The run is kept in {done.folder}; "
+        f"`tactile-lab report {done.folder}` writes it again."
+    )
+
+
+def leave(done: Executed) -> NoReturn:
+    """End the program as the run ended, whatever became of telling it."""
+    if not done.off.verified:
+        fail(done.off.text, done.exit_code)
+    raise click.exceptions.Exit(done.exit_code)

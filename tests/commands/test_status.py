@@ -1,0 +1,132 @@
+"""A run tells other programs how it goes, and takes their stop."""
+
+import json
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tactile_lab.acquisition import events
+from tactile_lab.commands.status_server import UNREAD, StatusServer
+from tactile_lab.errors import SceneError
+
+HOW_TO = Path(__file__).parents[2] / "docs/how-to/work-with-other-programs.md"
+
+
+@pytest.fixture
+def server():
+    served = StatusServer("tcp://127.0.0.1:0")
+    yield served
+    served.close()
+
+
+def connected(server):
+    host, port = server.address.removeprefix("tcp://").split(":")
+    return socket.create_connection((host, int(port)), timeout=60)
+
+
+def test_the_client_of_the_how_to_watches_a_run_and_stops_it(tmp_path):
+    (client,) = re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), flags=re.S)
+    (tmp_path / "client.py").write_text(client)
+    verb = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime", "--json"]
+    verb += ["--status", "tcp://127.0.0.1:0", "--out", str(tmp_path / "runs")]
+    verb += ["--set", "protocol.hold=100 s", "--set", 'protocol.levels=["60 mN"]']
+    verb += ["--set", "record.sample_rate=20 kS/s", "--no-report"]
+    with subprocess.Popen(
+        verb, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as run:
+        address = next(
+            line.split()[1] for line in run.stderr if line.startswith("status tcp")
+        )
+        watched = subprocess.run(
+            [sys.executable, tmp_path / "client.py", address, "0.5"],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        out, _ = run.communicate()
+    assert run.returncode == 130
+    result = json.loads(out)
+    assert result["status"] == "aborted"
+    assert result["reason"] == "stopped by another program"
+    assert result["coil_verified_off"]
+    assert f"aborted in {result['run']}" in watched.stdout
+
+
+def test_who_comes_late_hears_the_newest_state_first(server):
+    for text in ("opening instruments", "running"):
+        server(events.StateChanged(events.RunState.RUNNING, text))
+    server(events.Progress(1.0, 10.0))
+    with connected(server) as link, link.makefile() as lines:
+        assert json.loads(next(lines))["text"] == "running"
+        assert json.loads(next(lines)) == {
+            "event": "progress",
+            "elapsed_s": 1.0,
+            "expected_s": 10.0,
+        }
+
+
+@pytest.mark.parametrize("said", [b"stop\n", b"[]\n", b'{"do": "start"}\n', b"\xff\n"])
+def test_what_is_no_request_is_refused_and_does_nothing(server, said):
+    stopped = []
+    server.stop = stopped.append
+    with connected(server) as link, link.makefile() as lines:
+        link.sendall(said)
+        assert json.loads(next(lines))["event"] == "refused"
+        link.sendall(b'{"do": "stop"}\n')
+        assert json.loads(next(lines))["event"] == "stopping"
+    assert stopped == ["stopped by another program"]
+
+
+def test_an_endless_line_ends_that_client_alone(server):
+    with connected(server) as endless, connected(server) as other:
+        endless.sendall(b"x" * 10_000)
+        assert endless.recv(1000) == b""
+        other.sendall(b"?\n")
+        assert b"refused" in other.recv(1000)
+
+
+def test_a_client_that_does_not_read_is_let_go_of_and_delays_nobody(server):
+    text = "x" * 10_000
+    with connected(server) as deaf, connected(server) as other:
+        deaf.sendall(b"?\n")
+        assert b"refused" in deaf.recv(1000)  # it is served now
+        other.sendall(b"?\n")
+        heard = other.makefile("rb")
+        assert b"refused" in heard.readline()
+        for _ in range(40 * UNREAD // len(text)):
+            server(events.Message("info", text))
+            assert len(heard.readline()) > len(text)
+        with pytest.raises(OSError):
+            while deaf.recv(1 << 20):
+                pass
+            raise ConnectionResetError  # closed is gone, too
+
+
+@pytest.mark.parametrize(
+    "address", ["5025", "udp://127.0.0.1:1", "tcp://:5", "tcp://127.0.0.1", "tcp://a:x"]
+)
+def test_an_address_that_is_none_is_refused(address):
+    with pytest.raises(SceneError, match=r"write tcp://HOST:PORT"):
+        StatusServer(address)
+
+
+def test_a_port_that_is_taken_is_refused_before_anything_is_opened(
+    tactile_lab, server, tmp_path
+):
+    answer = tactile_lab("run", "--status", server.address, "--out", tmp_path / "runs")
+    assert answer.code == 2
+    assert "cannot be listened at" in answer.err
+    assert not (tmp_path / "runs").exists()
+
+
+def test_nothing_of_it_is_loaded_unless_asked(tmp_path):
+    source = (
+        "import sys\nfrom tactile_lab.cli import main\n"
+        "try:\n    main(['plan', 'demo', '--keys'])\nexcept SystemExit:\n    pass\n"
+        "assert 'tactile_lab.commands.one_run' not in sys.modules\n"
+        "import tactile_lab.commands.run\n"
+        "assert 'tactile_lab.commands.status_server' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", source], check=True, capture_output=True)
