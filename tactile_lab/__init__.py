@@ -36,7 +36,7 @@ report show themselves.
     46
 
 A study varies a scene: `study` computes what is missing of it on every core and gives
-one labelled data set (docs/studies.md).
+one labelled data set (docs/studies.md). `design` chooses parts for a wanted behaviour.
 
 A protocol of your own is a subclass of `Protocol` that yields one `Trial` after
 another, in a file that `load` takes. Whatever is refused or fails is a
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from tactile_lab.scene.load import load
     from tactile_lab.scene.scene import Scene
     from tactile_lab.scripting import (
+        design,
         latest,
         plan,
         run,
@@ -82,6 +83,7 @@ __all__ = [
     "TactileLabError",
     "Trial",
     "Waveform",
+    "design",
     "latest",
     "load",
     "plan",
@@ -102,6 +104,7 @@ _HOMES = {
     "TactileLabError": "errors",
     "Trial": "trial",
     "Waveform": "waveform",
+    "design": "scripting",
     "latest": "scripting",
     "load": "scene.load",
     "plan": "scripting",

@@ -22,6 +22,7 @@ VERBS = {
     "plan": "What a scene needs and leaves out, its cost and limits; opens nothing.",
     "simulate": "The model alone, no bench: spikes, error estimate, run time.",
     "study": "One scene at many points, on every core; goes on where it was.",
+    "design": "Parts for a wanted threshold, rate or silence, with their yield.",
     "validate": "The model's solver: error against run time, honesty, stability.",
     "devices": "What is attached, what answers there, which dialect row fits.",
     "doctor": "Environment, drivers, permissions, timing, disk; each with its remedy.",

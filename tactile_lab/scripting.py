@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from tactile_lab.model.simulate import Result
     from tactile_lab.report.write import Report
+    from tactile_lab.studies.chosen import Chosen
 
 
 def plan(
@@ -204,6 +205,23 @@ def study(
     asked = load_study(what, name)
     found = carry_out(asked, Path(out), count=workers, scheduler=scheduler)
     return found.to_xarray()
+
+
+def design(what: str | Path | Mapping[str, Any]) -> Chosen:
+    """Choose parts for a wanted behaviour, each want checked by the full solver.
+
+    ``design({"want": {"threshold": {"is": "20 mN"}}}).values``
+
+    Args:
+        what: a specification, or what one would hold (docs/how-to/choose-parts.md).
+
+    Raises:
+        SceneError: the specification cannot be used as written.
+    """
+    from tactile_lab.studies.parts import choose
+    from tactile_lab.studies.specification import load_specification
+
+    return choose(load_specification(what))
 
 
 def runs(out: str | Path = "runs", *, protocol: str | None = None) -> list[RunSummary]:

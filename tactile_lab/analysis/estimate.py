@@ -33,6 +33,15 @@ class Estimate:
         half = student_95(freedom) * error
         return cls(float(value), float(error), float(value - half), float(value + half))
 
+    @classmethod
+    def share(cls, good: int, size: int) -> Estimate:
+        """The share of `good` among `size` independent draws, by Wilson's interval."""
+        value, z = good / size, Z95 * Z95 / size
+        error = math.sqrt(value * (1 - value) / size)
+        centre = (value + z / 2) / (1 + z)
+        half = Z95 / (1 + z) * math.hypot(error, Z95 / (2 * size))
+        return cls(value, error, max(centre - half, 0.0), min(centre + half, 1.0))
+
     @property
     def half(self) -> float:
         """Half the width of the 95 % interval."""

@@ -131,6 +131,12 @@ def critical_forces(circuit: Circuit, many: Records) -> FloatArray:
     return found
 
 
+def rests(circuit: Circuit, many: Records) -> FloatArray:
+    """V_C1 of each at rest, V."""
+    found: FloatArray = rest_voltages(many, circuit.t1 == "direct")
+    return found
+
+
 _per_newton, _decay = inner(derived.k_F), inner(derived.tau_A)
 _critical_V_C1 = inner(derived.critical_V_C1)
 _critical_force = inner(derived.critical_force)
@@ -148,7 +154,7 @@ def appended(whole: FloatArray, size: int, part: FloatArray, more: int) -> Float
     return whole
 
 
-def _build(stamp: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
     @entry
     def run(
         many: Any,
@@ -209,7 +215,18 @@ def _build(stamp: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
             found[i] = _critical_force(c, _critical_V_C1(c, direct), _per_newton(c))
         return found
 
-    return run, forces
+    @entry
+    def rest_voltages(many: Any, direct: bool) -> FloatArray:
+        _ = stamp
+        found = np.empty(many.size)
+        par = np.empty(ALL_PARAMETERS)
+        for i in range(many.size):
+            c = many[i]
+            _fill(c, _decay(c), _critical_V_C1(c, direct), direct, par)
+            found[i] = rest_of_cascade(par)[0]
+        return found
+
+    return run, forces, rest_voltages
 
 
-run, forces = _build(source_stamp())
+run, forces, rest_voltages = _build(source_stamp())

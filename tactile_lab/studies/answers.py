@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.analysis.estimate import Z95, Estimate, student_95
+from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import count, printed, show
@@ -176,15 +176,7 @@ def _yield(found: Gathered) -> tuple[int, Estimate]:
         if limit.most is not None:
             good &= column <= limit.most
     number = int(good.sum())
-    share = number / size
-    error = math.sqrt(share * (1 - share) / size)
-    centre = (share + Z95 * Z95 / (2 * size)) / (1 + Z95 * Z95 / size)
-    half = (
-        Z95 / (1 + Z95 * Z95 / size)
-        * math.hypot(error, Z95 / (2 * size))
-    )  # fmt: skip
-    low, high = max(centre - half, 0.0), min(centre + half, 1.0)
-    return number, Estimate(share, error, low, high)
+    return number, Estimate.share(number, size)
 
 
 def _indices(found: Gathered, values: dict[str, Any]) -> Iterator[Table]:
