@@ -7,6 +7,7 @@ that it starts fast and nothing else can stop it.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -28,13 +29,16 @@ PATIENCE = 60.0
 TERMINAL = 2.0
 """Time for which it speaks on the owner's terminal, s; a pipe is then let go of."""
 
-RETRY = 0.005
+RETRY = 0.001
 """Pause between two attempts to open the port, s."""
 
 MOST_LINES = 12
 """Lines to read for an answer; echoes and late answers may come before it."""
 
 UNKNOWN = "OUTPUT STATE UNKNOWN: switch the coil source off at the instrument"
+
+FIRST = -15
+"""Niceness it asks for: a busy computer then runs it first, if it is allowed that."""
 
 LOOK = 0.02
 """Shortest wait between two looks at what the owner said, s."""
@@ -204,6 +208,9 @@ def main() -> int:
     for name in ("SIGINT", "SIGHUP", "SIGTERM"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        with contextlib.suppress(OSError):
+            os.nice(FIRST)
     told = json.loads(_first_line())
     log = GuardLog(told["log"])
     port = prepared(told)
