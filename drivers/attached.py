@@ -15,6 +15,7 @@ from drivers.coil.source import CoilSource
 from drivers.serial_line.link import SerialLink
 from drivers.teslameter import Teslameter
 from drivers.usb_presence import present
+from drivers.voltage_source import SourceMeter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, NoReplyError, NotFoundError
@@ -23,8 +24,10 @@ from tactile_lab.instruments.dialects import (
     dialect_ids,
     load_dialect,
     meter_dialect,
+    voltage_dialect,
 )
 from tactile_lab.instruments.serial_dialect import SerialDialect, SerialSettings
+from tactile_lab.voltage_source import VoltageLimits
 
 DIALOUT = (
     "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
@@ -90,10 +93,15 @@ def try_out(
         UnsafeError: a source's output could not be verified off.
     """
     clock = RealClock()
-    device: CoilSource | Teslameter
-    if load_dialect(dialect).role == "coil":
+    device: CoilSource | Teslameter | SourceMeter
+    role = load_dialect(dialect).role
+    if role == "coil":
         row = coil_dialect(dialect)
         device = CoilSource(row, address, CoilLimits(), clock, baud=baud, guarded=False)
+    elif role == "voltage source":
+        speaks = voltage_dialect(dialect)
+        most = VoltageLimits(highest=speaks.ranges[0].full)
+        device = SourceMeter("voltage", speaks, address, most, clock, baud=baud)
     else:
         device = Teslameter(meter_dialect(dialect), address, clock, baud=baud)
     if transcript is not None:

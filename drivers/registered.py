@@ -11,18 +11,35 @@ from typing import TYPE_CHECKING
 from tactile_lab.bench import CoilCapability, ScopeCapability
 from tactile_lab.errors import SceneError
 from tactile_lab.generator import AnalogueInput
-from tactile_lab.instruments.dialects import coil_dialect, meter_dialect, scope_dialect
-from tactile_lab.instruments.registry import CoilDriver, FieldMeterDriver, ScopeDriver
+from tactile_lab.instruments.dialects import (
+    coil_dialect,
+    meter_dialect,
+    scope_dialect,
+    voltage_dialect,
+)
+from tactile_lab.instruments.registry import (
+    CoilDriver,
+    FieldMeterDriver,
+    ScopeDriver,
+    VoltageSourceDriver,
+)
 
 if TYPE_CHECKING:
     from drivers.coil.source import CoilSource
     from drivers.picoscope.scope import PicoScope
     from drivers.teslameter import Teslameter
     from drivers.usbtmc.scope import UsbtmcScope
+    from drivers.voltage_source import SourceMeter
     from tactile_lab.clock import Clock
     from tactile_lab.instruments.scope_dialect import ScopeDialect
     from tactile_lab.instruments.serial_dialect import CoilDialect
-    from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
+    from tactile_lab.scene.bench_file import (
+        CoilSpec,
+        FieldMeterSpec,
+        ScopeSpec,
+        VoltageSourceSpec,
+    )
+    from tactile_lab.voltage_source import VoltageSourceCapability
 
 DEFAULT_SCOPE = "rigol-ds1000z"
 """Dialect of a USBTMC scope where the bench file names none."""
@@ -126,9 +143,25 @@ def _teslameter(table: FieldMeterSpec, clock: Clock) -> Teslameter:
     return Teslameter(meter_dialect(table.dialect), table.port, clock, baud=table.baud)
 
 
+def _source_meter(table: VoltageSourceSpec, clock: Clock) -> SourceMeter:
+    from drivers.voltage_source import SourceMeter
+
+    row = voltage_dialect(table.dialect)
+    return SourceMeter(
+        table.name, row, table.port, table.limits, clock, baud=table.baud
+    )
+
+
+def _source_meter_capability(table: VoltageSourceSpec) -> VoltageSourceCapability:
+    return voltage_dialect(table.dialect).capability(table.limits)
+
+
 SERIAL_SOURCE = CoilDriver(make=_source, capability=_source_capability)
 PS3000A = ScopeDriver(
     make=_picoscope, capability=_picoscope_capability, check_rate=_check_picoscope_rate
 )
 USBTMC = ScopeDriver(make=_usbtmc_scope, capability=_usbtmc_capability)
 SERIAL_METER = FieldMeterDriver(make=_teslameter)
+SERIAL_VOLTAGE_SOURCE = VoltageSourceDriver(
+    make=_source_meter, capability=_source_meter_capability
+)

@@ -16,6 +16,7 @@ from tactile_lab.instruments.registry import far_end
 from tactile_lab.model.specimen import specimen
 from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.scene import Scene
+from tactile_lab.voltage_source import SOURCED
 
 NO_FOLLOWERS = Followers(input_bias=0.0, bandwidth=0.0)
 """Probes that lie at the nodes themselves."""
@@ -26,7 +27,14 @@ def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
     simulated = scene.simulated
     part = specimen(scene.sensor.circuit, simulated.specimen)
     true = simulated.deviation.circuit(part)
-    return Plant(true, scene.bench.magnet, world or options(scene), simulated.seed)
+    believed = scene.sensor.circuit
+    return Plant(
+        true,
+        scene.bench.magnet,
+        world or options(scene),
+        simulated.seed,
+        beyond={n: getattr(true, n) - getattr(believed, n) for n in SOURCED},
+    )
 
 
 def options(scene: Scene) -> PlantOptions:
@@ -77,6 +85,7 @@ def open_bench(
     scope_faults: Sequence[Any] = (),
     coil_faults: Sequence[Any] = (),
     meter_faults: Sequence[Any] = (),
+    voltage_faults: Sequence[Any] = (),
     world: PlantOptions | None = None,
     make: Any = None,
 ) -> Bench:
@@ -89,6 +98,7 @@ def open_bench(
         scope_faults: what goes wrong with the scope, and when, as its far end takes it.
         coil_faults: the same for the current source.
         meter_faults: the same for the teslameter.
+        voltage_faults: the same for each source of a voltage.
         world: physics with its wiring faults, instead of the scene's.
         make: what scope there is, and how it is connected, as its far end takes it.
 
@@ -112,6 +122,7 @@ def open_bench(
             "coil": coil_faults,
             "scope": scope_faults,
             "field_meter": meter_faults,
+            "voltage_source": voltage_faults,
         },
         make=make,
     )

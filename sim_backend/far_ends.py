@@ -10,15 +10,25 @@ from typing import TYPE_CHECKING
 
 from drivers.registered import usbtmc_dialect
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+from tactile_lab.instruments.dialects import (
+    coil_dialect,
+    meter_dialect,
+    voltage_dialect,
+)
 
 if TYPE_CHECKING:
     from drivers.coil.source import CoilSource
     from drivers.picoscope.scope import PicoScope
     from drivers.teslameter import Teslameter
     from drivers.usbtmc.scope import UsbtmcScope
+    from drivers.voltage_source import SourceMeter
     from sim_backend.world import WiredInputs, World
-    from tactile_lab.scene.bench_file import CoilSpec, FieldMeterSpec, ScopeSpec
+    from tactile_lab.scene.bench_file import (
+        CoilSpec,
+        FieldMeterSpec,
+        ScopeSpec,
+        VoltageSourceSpec,
+    )
 
 SIMULATED_POLL = 0.05
 """Time between polls where nobody watches, s: fewer, larger blocks cost less."""
@@ -119,6 +129,25 @@ def serial_meter(table: FieldMeterSpec, world: World) -> Teslameter:
     faults = world.faults.get("field_meter", ())
     far_end = plug_in(probe, row.serial, world.clock, "field-meter", faults)
     return Teslameter(row, far_end.url, world.clock)
+
+
+def serial_voltage_source(table: VoltageSourceSpec, world: World) -> SourceMeter:
+    """A serial source meter on one voltage of the plant's circuit."""
+    from drivers.voltage_source import SourceMeter
+    from sim_backend.serial_line.wires import plug_in
+    from sim_backend.voltage_source import LoadFault, voltage_far_end
+
+    row, clock = voltage_dialect(table.dialect), world.clock
+    given = world.faults.get("voltage_source", ())
+    source = voltage_far_end(
+        world.plant, table.name, row, clock, seed=world.simulated.seed
+    )
+    for one in given:
+        if isinstance(one, LoadFault):
+            source.fault = one
+    faults = [one for one in given if not isinstance(one, LoadFault)]
+    far_end = plug_in(source, row.serial, clock, table.name, faults)
+    return SourceMeter(table.name, row, far_end.url, table.limits, clock)
 
 
 def _wired(world: World) -> WiredInputs:

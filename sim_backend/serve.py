@@ -15,9 +15,14 @@ from sim_backend.plant.options import PlantOptions
 from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
 from sim_backend.serial_line.wires import FarEnd, LineInstrument
 from sim_backend.teslameter import meter_far_end
+from sim_backend.voltage_source import voltage_far_end
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
-from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+from tactile_lab.instruments.dialects import (
+    coil_dialect,
+    meter_dialect,
+    voltage_dialect,
+)
 from tactile_lab.instruments.serial_dialect import SerialSettings
 from tactile_lab.magnetics import Magnet
 
@@ -48,19 +53,35 @@ class CoilOnly(DrivenCoil):
             self._electromagnet.forget(BACKLOG // 2)
 
 
+class Gate:
+    """A gate in the air: what a source gives, and nothing that feels it."""
+
+    def __init__(self) -> None:
+        self.volts: dict[str, float] = {}
+
+    def set_voltage(self, name: str, time: float, volts: float) -> None:
+        """Let the voltage called `name` be `volts` from `time` s on."""
+        self.volts[name] = volts
+
+
 class ServedBench:
     """Simulated instruments at addresses other programs can open.
 
     Args:
         coil: `pty`, `tcp:PORT` (0 for any free port) or None for no source.
         teslameter: the same for the teslameter.
-        coil_row, meter_row: ids of the dialect rows they speak, or files with one.
+        voltage_source: the same for a source meter that holds V_GS.
+        coil_row, meter_row, voltage_row: ids of the dialect rows they speak, or files
+            with one.
         baud: of the source instead of its row's.
         paced: let bytes take the time the baud rate gives them, and the instruments
             the time they take to act.
         log: JSON line per thing the source was told, with the time since boot.
         magnet: field per current; the built-in bench's unless given.
-        seed: of the teslameter's noise.
+        seed: of the noise of the readings.
+
+    Attributes:
+        gate: what the source meter is connected to.
 
     Raises:
         SceneError: an address or row that cannot be served.
@@ -72,8 +93,10 @@ class ServedBench:
         *,
         coil: str | None = "pty",
         teslameter: str | None = None,
+        voltage_source: str | None = None,
         coil_row: str = "kepco-bop",
         meter_row: str = "lakeshore-425",
+        voltage_row: str = "keithley-2400-voltage",
         baud: int | None = None,
         paced: bool = False,
         log: Path | None = None,
@@ -84,6 +107,7 @@ class ServedBench:
         self._log: TextIO | None = None
         self._servers: dict[str, SerialServer] = {}
         plant = CoilOnly(magnet or Magnet(r=6e-3))
+        self.gate = Gate()
         try:
             if coil is not None:
                 row = coil_dialect(coil_row)
@@ -97,6 +121,12 @@ class ServedBench:
                 known = meter_dialect(meter_row)
                 meter = meter_far_end(plant, known, clock, noise=2e-6, seed=seed)
                 self._add("teslameter", teslameter, meter, known.serial, clock, paced)
+            if voltage_source is not None:
+                speaks = voltage_dialect(voltage_row)
+                held = voltage_far_end(self.gate, "V_GS", speaks, clock, seed=seed)
+                self._add(
+                    "voltage_source", voltage_source, held, speaks.serial, clock, paced
+                )
         except BaseException:
             self.close()
             raise

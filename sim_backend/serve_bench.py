@@ -15,6 +15,11 @@ from tactile_lab.commands.terminal import print_json, refusing, say
 @click.option("--coil", metavar="pty|tcp:PORT", help="Serve a current source there.")
 @click.option("--teslameter", metavar="pty|tcp:PORT", help="Serve a teslameter there.")
 @click.option(
+    "--voltage-source",
+    metavar="pty|tcp:PORT",
+    help="Serve a source meter that holds V_GS there.",
+)
+@click.option(
     "--coil-dialect",
     default="kepco-bop",
     show_default=True,
@@ -27,6 +32,13 @@ from tactile_lab.commands.terminal import print_json, refusing, say
     show_default=True,
     metavar="ROW|FILE",
     help="What the teslameter speaks.",
+)
+@click.option(
+    "--voltage-dialect",
+    default="keithley-2400-voltage",
+    show_default=True,
+    metavar="ROW|FILE",
+    help="What the source meter speaks.",
 )
 @click.option("--baud", type=click.IntRange(50, 4_000_000), help="Of the source.")
 @click.option(
@@ -41,29 +53,33 @@ from tactile_lab.commands.terminal import print_json, refusing, say
 def command(
     coil: str | None,
     teslameter: str | None,
+    voltage_source: str | None,
     coil_dialect: str,
     teslameter_dialect: str,
+    voltage_dialect: str,
     baud: int | None,
     paced: bool,
     log: Path | None,
     as_json: bool,
 ) -> None:
-    """Serve the simulated coil source and teslameter until Ctrl-C.
+    """Serve simulated serial instruments until Ctrl-C.
 
-    One coil is behind both. Without --coil and --teslameter both are served on
-    pseudo-terminals. The addresses printed are ports for a bench file, and for any
-    program that uses pyserial.
+    One coil is behind source and teslameter. Without an option that names one, these
+    two are served on pseudo-terminals. The addresses printed are ports for a bench
+    file, and for any program that uses pyserial.
     """
     from sim_backend.serve import ServedBench
 
-    if coil is None and teslameter is None:
+    if coil is None and teslameter is None and voltage_source is None:
         coil = teslameter = "pty"
     with refusing():
         served = ServedBench(
             coil=coil,
             teslameter=teslameter,
+            voltage_source=voltage_source,
             coil_row=coil_dialect,
             meter_row=teslameter_dialect,
+            voltage_row=voltage_dialect,
             baud=baud,
             paced=paced,
             log=log,
@@ -73,7 +89,7 @@ def command(
         print_json(served.addresses)
     else:
         for name, address in served.addresses.items():
-            say(f"{name:12}{address}")
+            say(f"{name:16}{address}")
         say("Ctrl-C ends.", sys.stderr)
     try:
         wait_for_end()

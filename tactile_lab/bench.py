@@ -6,8 +6,8 @@ thread only, the one that opened it. All values are SI.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
@@ -18,6 +18,7 @@ from tactile_lab.current_list import CurrentList, ListCapability
 from tactile_lab.generator import AnalogueInput, Generator, GeneratorCapability
 from tactile_lab.quantity import Unit
 from tactile_lab.table import SceneTable
+from tactile_lab.voltage_source import VoltageSource
 
 COPPER = 0.00393
 """Temperature coefficient of copper's resistance at 20 C, 1/K."""
@@ -456,6 +457,7 @@ class Bench:
         simulated: whether physics is computed.
         clock: the time all of it lives in.
         generator: the scope's, where it is wired to the source's analogue input.
+        voltage_sources: by the circuit's voltage that each holds.
         place_probes: puts the probes of the circuit's voltages on "ground", "supply"
             or back on the "circuit"; None where a person must.
         accuracy: says, after a run, how accurate the computed physics was.
@@ -468,5 +470,6 @@ class Bench:
     scope: Scope | None = None
     field_meter: FieldMeter | None = None
     generator: Generator | None = None
+    voltage_sources: Mapping[str, VoltageSource] = field(default_factory=dict)
     place_probes: Callable[[str], None] | None = None
     accuracy: Callable[[], str] | None = None

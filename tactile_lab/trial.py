@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -38,6 +38,8 @@ class Trial:
         hold: (start s, end s) of the part that adaptation is judged on, or None.
         current: drive the coil by this current (A against s) instead of `force`, for
             calibrations that know no force yet.
+        voltages: of the circuit, by name, V: what a source meter of the bench is to
+            hold from just before this trial on; those not named stay.
         probes: where a person puts the probes of V_C1, V_C2 and V_K before the trial;
             a simulated bench does it itself.
     """
@@ -49,6 +51,7 @@ class Trial:
     pause: bool = False
     hold: tuple[float, float] | None = None
     current: Waveform | None = None
+    voltages: Mapping[str, float] = field(default_factory=dict)
     probes: Probes = "circuit"
 
     @property
@@ -119,6 +122,9 @@ class Protocol(BaseModel):
     moves_probes: ClassVar[bool] = False
     """The probes of the circuit's voltages are put on 0 V and V_S, too: their ranges
     are widened to see both, and the model is not compared with them."""
+    sets: ClassVar[tuple[str, ...]] = ()
+    """Voltages of the circuit that its trials set (`Trial.voltages`): a source meter of
+    the bench must hold them, and the model is not compared with a run of it."""
     accuracy: ClassVar[float] = 1.0
     """Largest error of the force, as a part of its range, that its answer bears: by
     which way the coil plays it (`[coil] way`)."""

@@ -6,12 +6,11 @@ The way out, `switch_off`, tries every step and raises nothing.
 from __future__ import annotations
 
 import math
-import re
 import statistics
 
-from drivers.serial_line.conversation import Conversation
+from drivers.serial_line.source_wire import RECONNECT, VERIFICATIONS, SourceWire
 from tactile_lab.bench import OffReport
-from tactile_lab.errors import BadReplyError, RefusedError, TactileLabError
+from tactile_lab.errors import BadReplyError, TactileLabError
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
 
@@ -27,14 +26,8 @@ LONGEST_RAMP = 0.5
 SHORTEST_REST, LONGEST_REST = 0.005, 0.2
 """Time from an answer to the next step of a ramp, s; the guard wants a heartbeat."""
 
-VERIFICATIONS = 3
-"""Times the safe state is commanded and read back before giving up."""
-
 SETTLE = 0.02
 """Time the current has to die away before it is read back, s."""
-
-RECONNECT = 1.0
-"""How long to try to open a lost port again before each attempt, s."""
 
 UNKNOWN = "OUTPUT STATE UNKNOWN: switch the coil source off at the instrument. "
 
@@ -44,8 +37,8 @@ DOUBT = (
 )
 
 
-class CoilWire(Conversation[CoilDialect]):
-    """A conversation with a current source; see `Conversation`."""
+class CoilWire(SourceWire[CoilDialect]):
+    """A conversation with a current source."""
 
     def set_current(self, current: float) -> None:
         """Command the set-point, A, and check that it was taken."""
@@ -58,7 +51,7 @@ class CoilWire(Conversation[CoilDialect]):
             RefusedError: another value is read back.
         """
         self.command(self.dialect.limit_line(voltage))
-        self._confirm(
+        self.confirm(
             "compliance", self.dialect.limit_query, voltage, 0.01 * voltage + 0.01
         )
 
@@ -69,55 +62,9 @@ class CoilWire(Conversation[CoilDialect]):
             RefusedError: another value is read back.
         """
         self.set_current(0.0)
-        self._confirm(
+        self.confirm(
             "current", self.dialect.set_query, 0.0, 2 * 10.0**-self.dialect.digits
         )
-
-    def switch_on(self) -> None:
-        """Output on, checked by read-back.
-
-        Raises:
-            RefusedError: it stays off.
-        """
-        for line in self.dialect.on:
-            self.command(line)
-        if not self.output_is_on():
-            raise RefusedError("The source did not switch its output on.")
-
-    def output_is_on(self) -> bool:
-        """Whether the output is on, read back.
-
-        Raises:
-            BadReplyError: the answer says neither on nor off, twice.
-        """
-        answer = ""
-        for _ in range(2):
-            answer = self.query(self.dialect.on_query)
-            if re.search(self.dialect.on_match, answer):
-                return True
-            if re.search(self.dialect.off_match, answer):
-                return False
-            self.link.resynchronise()
-        raise BadReplyError(
-            f"The answer {answer!r} to {self.dialect.on_query!r} says neither on nor "
-            "off."
-        )
-
-    def setpoint(self) -> float:
-        """Set-point read back, A."""
-        return self.number(self.dialect.set_query)
-
-    def compliance(self) -> float:
-        """Compliance read back, V."""
-        return self.number(self.dialect.limit_query)
-
-    def current(self) -> float:
-        """Measured current, A."""
-        return self.number(self.dialect.measure_current, self.dialect.current_match)
-
-    def voltage(self) -> float:
-        """Measured voltage, V."""
-        return self.number(self.dialect.measure_voltage, self.dialect.voltage_match)
 
     def current_when_off(self) -> float:
         """Current with the output off, A: measured where the model then measures.
@@ -238,11 +185,3 @@ class CoilWire(Conversation[CoilDialect]):
                 exchange = answered - sent
         except TactileLabError as reason:
             trouble.append(f"ramp: {reason}")
-
-    def _confirm(self, what: str, query: str, wanted: float, within: float) -> None:
-        found = self.number(query)
-        if abs(found - wanted) > within:
-            raise RefusedError(
-                f"The source reports a {what} of {found:g} after being set to "
-                f"{wanted:g}; the output stays off. Check its own limits."
-            )

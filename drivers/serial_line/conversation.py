@@ -77,9 +77,9 @@ class Conversation(Generic[D]):
             RefusedError: the instrument reports an error.
         """
         self._send_settings()
-        if self._not_taken():  # a line may have been lost on the way
+        if self.not_taken():  # a line may have been lost on the way
             self._send_settings()
-            if wrong := self._not_taken():
+            if wrong := self.not_taken():
                 raise BadReplyError(
                     f"The {self.dialect.role} does not take its settings: "
                     f"{', '.join(wrong)} after {', '.join(self.dialect.init)}, so "
@@ -196,7 +196,7 @@ class Conversation(Generic[D]):
         for line in self.dialect.init:
             self.command(line)
 
-    def _not_taken(self) -> list[str]:
+    def not_taken(self) -> list[str]:
         """Questions whose answer is not what the row wants, and that answer."""
         asked = {line: self.query(line) for line in self.dialect.confirm}
         return [

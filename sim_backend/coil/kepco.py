@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import re
 
-from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric, one_of
-from sim_backend.serial_line.scpi import Handler, ScpiError, boolean, number
+from sim_backend.coil.panel import CoilPanel, SourceModel
+from sim_backend.serial_line.scpi import (
+    Handler,
+    ScpiError,
+    bare,
+    boolean,
+    number,
+    numeric,
+    one_of,
+)
 
 
 def _digits(line: bytes) -> bytes:

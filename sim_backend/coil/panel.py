@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from sim_backend.coil.list_mode import ListPlayer
 from sim_backend.plant.driven_coil import DrivenCoil
-from sim_backend.serial_line.scpi import Handler, ScpiError, no_argument, number
+from sim_backend.serial_line.scpi import Handler
 from tactile_lab.clock import Clock
 
 
@@ -148,32 +148,3 @@ class SourceModel:
     rewrite: Callable[[bytes], bytes] = bytes
     standard: bool = True
     analogue: tuple[float, float] | None = None
-
-
-def bare(action: Callable[[], None]) -> Handler:
-    """A handler for a header without argument."""
-
-    def run(argument: str) -> None:
-        no_argument(argument)
-        action()
-
-    return run
-
-
-def numeric(action: Callable[[float], None], low: float, high: float) -> Handler:
-    """A handler for a number from `low` to `high`."""
-    return lambda argument: action(number(argument, low, high))
-
-
-def one_of(action: Callable[[str], None], *choices: str) -> Handler:
-    """A handler for one of some words, short or long form; given the short one."""
-
-    def run(argument: str) -> None:
-        for choice in choices:
-            short = "".join(c for c in choice if not c.islower())
-            if argument.upper() in (short, choice.upper()):
-                action(short)
-                return
-        raise ScpiError(-224, "Illegal parameter value")
-
-    return run

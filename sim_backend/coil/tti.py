@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sim_backend.coil.panel import CoilPanel, SourceModel, bare, numeric
-from sim_backend.serial_line.scpi import Handler, boolean
+from sim_backend.coil.panel import CoilPanel, SourceModel
+from sim_backend.serial_line.scpi import Handler, bare, boolean, numeric
 
 
 def _commands(source: CoilPanel) -> dict[str, Handler]:

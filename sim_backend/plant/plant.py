@@ -6,7 +6,7 @@ the scope's inputs see it through the measurement chain.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +32,8 @@ MEMORY = 0.2
 """How long the plant remembers what has been rendered, s."""
 BACKLOG = 4096
 """Commands that may wait to be solved while nobody looks."""
+UNPOWERED = 0.1
+"""Least supply and threshold the circuit is computed with, V."""
 Coupled = tuple[ScopeInput, Capacitor | None]
 SIGNALS = (*NEEDS, "coil_current", "field", *PLACED)
 """What may lie at a scope input."""
@@ -70,6 +72,7 @@ class Plant(DrivenCoil):
         magnet: field and force per current.
         options: which parts of the world there are.
         seed: of all noise; the same seed and commands give the same codes.
+        beyond: by how much the circuit's voltages exceed what a source gives, V.
     """
 
     def __init__(
@@ -78,7 +81,10 @@ class Plant(DrivenCoil):
         magnet: Magnet,
         options: PlantOptions | None = None,
         seed: int = 1,
+        beyond: Mapping[str, float] | None = None,
     ) -> None:
+        self._beyond = beyond or {}
+        self._sourced = 0.0
         self.options = options = options or PlantOptions()
         self.circuit = replace(circuit, I_bias=circuit.I_bias + options.bias)
         self.magnet = magnet
@@ -112,6 +118,18 @@ class Plant(DrivenCoil):
             self._reach(time)
             drive = float(self.magnet.force(self._effective(time)))
             return drive * self.options.force + self.options.attraction
+
+    def set_voltage(self, name: str, time: float, volts: float) -> None:
+        """Let a source give `volts`, V, as V_GS, V_S or V_th from `time` s on."""
+        volts += self._beyond.get(name, 0.0)
+        if name != "V_GS":
+            volts = max(volts, UNPOWERED)
+        with self._lock:
+            if getattr(self._sensor.latest, name) == volts:
+                return
+            # what has been rendered stays, as with the coil's commands
+            self._sourced = max(time, self._rendered, self._sourced)
+            self._sensor.become(self._sourced, self._sensor.latest.at({name: volts}))
 
     def accuracy(self) -> str:
         """How far the computed circuit is from its equations' exact solution."""

@@ -8,6 +8,7 @@ the model goes on from there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -99,6 +100,7 @@ class SimulatedSensor:
         V_fire: Callable[[int, float, float], float] | None = None,
     ) -> None:
         self.circuit = circuit
+        self._circuits = [(-math.inf, circuit)]
         self._drive = drive
         self._V_fire, self._fired = V_fire, 0
         self.error_spike_time = 0.0
@@ -106,6 +108,16 @@ class SimulatedSensor:
         self._keep: tuple[str, ...] = ()
         self._chunks: list[_Chunk] = []
         self._frontier = rest(circuit, force=float(drive.force(0.0, 0.0).value[0]))
+
+    @property
+    def latest(self) -> Circuit:
+        """The circuit after all changes that were told."""
+        return self._circuits[-1][1]
+
+    def become(self, time: float, circuit: Circuit) -> None:
+        """Let the circuit be another from `time` s on, not before any other change."""
+        self._circuits.append((time, circuit))
+        self.commanded(time)
 
     def need(self, signals: Iterable[str], time: float) -> None:
         """Solve what `signals` (V_C1, V_C2, V_K, I_DS) depend on, from `time` s on."""
@@ -120,9 +132,10 @@ class SimulatedSensor:
                 break
         state = self._frontier
         if state.left_out:
-            V_C2 = rest_V_C2(self.circuit, state.V_C1)
-            if V_C2 >= self.circuit.fire_voltage:
-                V_C2 = self.circuit.reset_voltage
+            circuit = self._changed(state.time)[1]
+            V_C2 = rest_V_C2(circuit, state.V_C1)
+            if V_C2 >= circuit.fire_voltage:
+                V_C2 = circuit.reset_voltage
             self._frontier = replace(state, V_C2=V_C2, resume=None, left_out=())
 
     def commanded(self, time: float) -> None:
@@ -175,6 +188,8 @@ class SimulatedSensor:
         while keep < len(self._chunks) and self._chunks[keep].end <= before:
             keep += 1
         del self._chunks[:keep]
+        while len(self._circuits) > 1 and self._circuits[1][0] <= before:
+            del self._circuits[0]
         for chunk in self._chunks[:1]:
             old = int((before - chunk.start) / WINDOW)
             for key in [key for key in chunk.pieces if key[1] < old]:
@@ -191,16 +206,19 @@ class SimulatedSensor:
 
     def _grow(self) -> None:
         state = self._frontier
-        calm = state.time - self._drive.latest_command(state.time)
+        latest = self._drive.latest_command(state.time)
+        calm = state.time - max(latest, self._changed(state.time)[0])
         end = state.time + min(max(calm, SHORTEST), LONGEST)
-        circuit = self._next_circuit()
+        circuit = self._next_circuit(state.time)
+        if not state.left_out and state.V_C2 >= circuit.fire_voltage:
+            state = replace(state, V_C2=circuit.reset_voltage, resume=None)
         if self._V_fire is not None:
             end = min(end, state.time + LONGEST_NOISY)
         after, outputs = self._advance(circuit, state, end)
         spacing = FINE if calm < LIVELY else COARSE
         chunk = _Chunk(state, end, spacing, outputs, circuit, self._fired)
         self._chunks.append(chunk)
-        cut = self._drive.next_command(state.time)
+        cut = min(self._drive.next_command(state.time), self._next_change(state.time))
         spikes = outputs.spike_times
         if self._V_fire is not None and spikes is not None and spikes.size:
             one = float(spikes[0]) + JUST
@@ -211,13 +229,22 @@ class SimulatedSensor:
             after = self._advance(circuit, state, cut)[0]
         self._frontier = after
 
-    def _next_circuit(self) -> Circuit:
-        """The circuit with the V_fire of the next spike."""
+    def _changed(self, time: float) -> tuple[float, Circuit]:
+        """The circuit at `time` s, and since when it has been that."""
+        return next(one for one in reversed(self._circuits) if one[0] <= time)
+
+    def _next_change(self, time: float) -> float:
+        """When the circuit changes first after `time`, s; infinite if never."""
+        return next((at for at, _ in self._circuits if at > time), math.inf)
+
+    def _next_circuit(self, time: float) -> Circuit:
+        """The circuit from `time` s on, with the V_fire of the next spike."""
+        circuit = self._changed(time)[1]
         if self._V_fire is None:
-            return self.circuit
-        fire, reset = self.circuit.fire_voltage, self.circuit.reset_voltage
+            return circuit
+        fire, reset = circuit.fire_voltage, circuit.reset_voltage
         volts = self._V_fire(self._fired, fire, reset)
-        return replace(self.circuit, V_fire=volts, V_reset=reset)
+        return replace(circuit, V_fire=volts, V_reset=reset)
 
     def _advance(
         self, circuit: Circuit, state: State, until: float

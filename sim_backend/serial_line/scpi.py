@@ -166,3 +166,32 @@ def no_argument(argument: str) -> None:
     """
     if argument:
         raise ScpiError(-108, "Parameter not allowed")
+
+
+def bare(action: Callable[[], None]) -> Handler:
+    """A handler for a header without argument."""
+
+    def run(argument: str) -> None:
+        no_argument(argument)
+        action()
+
+    return run
+
+
+def numeric(action: Callable[[float], None], low: float, high: float) -> Handler:
+    """A handler for a number from `low` to `high`."""
+    return lambda argument: action(number(argument, low, high))
+
+
+def one_of(action: Callable[[str], None], *choices: str) -> Handler:
+    """A handler for one of some words, short or long form; given the short one."""
+
+    def run(argument: str) -> None:
+        for choice in choices:
+            short = "".join(c for c in choice if not c.islower())
+            if argument.upper() in (short, choice.upper()):
+                action(short)
+                return
+        raise ScpiError(-224, "Illegal parameter value")
+
+    return run

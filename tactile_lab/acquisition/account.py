@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from tactile_lab.quantity import show
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome, Trial
+from tactile_lab.voltage_source import HeldVoltage
 
 MOST_UNLIKE = 0.25
 """Part of the sampled current's variance that a list may leave open."""
@@ -174,6 +176,9 @@ class Account:
         if meter is not None:
             for reading in meter.take_readings():
                 self.field(self.axis(reading.time), reading.value)
+        for thread in instruments.voltages:
+            for held in thread.take_readings():
+                self._held(thread.voltage, replace(held, time=self.axis(held.time)))
 
     def write_current(self, later: float | None = None) -> None:
         """Write down what was applied; points of a list came `later`, s, than thought.
@@ -197,6 +202,14 @@ class Account:
         if self.journal is not None:
             self.journal.field(time, tesla)
         self.emit(events.FieldRead(time, tesla))
+
+    def _held(self, name: str, held: HeldVoltage) -> None:
+        """A source was read back; what was before the run began is not kept."""
+        if held.time < 0:
+            return
+        if self.journal is not None:
+            self.journal.voltage(name, held)
+        self.emit(events.VoltageRead(name, held))
 
     def note_edges(self, shunt: Trace) -> None:
         """Find the newest set-points' edges in the binned coil current."""

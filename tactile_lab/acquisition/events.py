@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from tactile_lab.trial import Outcome, Trial
+from tactile_lab.voltage_source import HeldVoltage
 
 
 class RunState(StrEnum):
@@ -93,6 +94,14 @@ class FieldRead:
 
 
 @dataclass(frozen=True)
+class VoltageRead:
+    """The source of the circuit's voltage `name` was read back, on the run's axis."""
+
+    name: str
+    held: HeldVoltage
+
+
+@dataclass(frozen=True)
 class SpikesSeen:
     """Newly detected spikes.
 
@@ -129,6 +138,7 @@ Event = (
     | Progress
     | CoilCurrent
     | FieldRead
+    | VoltageRead
     | SpikesSeen
     | Message
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tactile_lab.acquisition.coil_thread import CoilThread
@@ -11,12 +11,14 @@ from tactile_lab.acquisition.instrument_thread import InstrumentThread
 from tactile_lab.acquisition.meter_thread import MeterThread
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.acquisition.voltage_thread import VoltageThread
 from tactile_lab.bench import Bench, OffReport
+from tactile_lab.voltage_source import RestReport
 
 CLOSING = 10.0
 """Seconds an instrument thread gets to close before it is given up."""
 
-MOVED = frozenset({"output", "setpoint_A", "range"})
+MOVED = frozenset({"output", "setpoint_A", "setpoint_V", "range"})
 """Settings that a run itself moves: the recorded current tells of the coil's, and a
 teslameter picks its range as the field needs it."""
 
@@ -30,6 +32,7 @@ class Instruments:
     coil: CoilThread | None
     scope: ScopeThread | None
     meter: MeterThread | None
+    voltages: tuple[VoltageThread, ...] = ()
 
     @classmethod
     def of(cls, bench: Bench, stop: StopRequest, lease: Lease) -> Instruments:
@@ -44,13 +47,27 @@ class Instruments:
             coil=coil,
             scope=scope,
             meter=MeterThread(bench.field_meter, clock) if bench.field_meter else None,
+            voltages=tuple(
+                VoltageThread(name, source, clock)
+                for name, source in bench.voltage_sources.items()
+            ),
         )
 
     @property
     def threads(self) -> list[InstrumentThread]:
         """Those that exist, the coil first: it is the one that must be made safe."""
-        every = (self.coil, self.scope, self.meter)
+        every = (self.coil, self.scope, self.meter, *self.voltages)
         return [thread for thread in every if thread is not None]
+
+    def hold(self, voltages: Mapping[str, float]) -> list[VoltageThread]:
+        """Have sources go to voltages, by name, V; those that must move, started."""
+        moved = []
+        for thread in self.voltages:
+            wanted = voltages.get(thread.voltage)
+            if wanted is not None and wanted != thread.wanted:
+                thread.hold(wanted)
+                moved.append(thread)
+        return moved
 
     def open(self, until: Wait) -> None:
         """Open all side by side; `until(done)` waits and raises what goes wrong."""
@@ -86,6 +103,11 @@ class Instruments:
             for name, value in thread.settings_after.items()
             if (was := thread.settings.get(name, value)) != value and name not in MOVED
         ]
+
+    @property
+    def voltages_left(self) -> dict[str, RestReport]:
+        """How the source of each voltage was left, once it is."""
+        return {t.voltage: t.left for t in self.voltages if t.left is not None}
 
     @property
     def failed(self) -> bool:

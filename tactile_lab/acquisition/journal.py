@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.bench import Block, Stream
 from tactile_lab.trial import Outcome, Trial
+from tactile_lab.voltage_source import HeldVoltage
 
 
 class Journal(Protocol):
@@ -49,6 +50,10 @@ class Journal(Protocol):
     def field(self, time: float, field: float) -> None:
         """A teslameter reading, T."""
         ...
+
+    def voltage(self, name: str, held: HeldVoltage) -> None:
+        """What the source of the circuit's voltage `name` was read back to hold."""
+        return
 
     def align(self, *, offset: float, drift: float, uncertainty: float) -> None:
         """Correct the running segment's times by `offset` s and `drift` s/s."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from tactile_lab.acquisition.asked_field import AskedField
 from tactile_lab.acquisition.drift import Drift
@@ -13,6 +13,9 @@ from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Channel
 from tactile_lab.drive import Drive
 from tactile_lab.trial import Trial, Trials
+
+SETTLED = 10.0
+"""Time constants of the integrator after which a changed voltage has settled."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class Program:
         expected: run time expected, s; None if it depends on outcomes.
         doubts: told the opened instruments' settings, says what a person should know
             before the coil is switched on, or raises to prevent it.
+        voltages: of the circuit, by name, V, that source meters hold from the begin.
+        settling: time the circuit takes to settle after one was changed, s.
         coil_lag: by which the current follows the source, s.
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
         drive_check: compares current, shunt and field at each hold; None where no
@@ -46,6 +51,8 @@ class Program:
     drive_for: Callable[[Trial, float, float], Drive]
     expected: float | None
     doubts: Callable[[Mapping[str, Mapping[str, str]]], tuple[str, ...]]
+    voltages: Mapping[str, float] = field(default_factory=dict)
+    settling: float = 0.0
     coil_lag: float = 0.0
     drift: Drift | None = None
     drive_check: DriveCheck | None = None

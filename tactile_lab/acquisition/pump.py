@@ -173,6 +173,7 @@ class Pump:
         failures = [one.failure for one in threads if one.failure is not None]
         try:
             self._tell_changes()
+            self._tell_left()
             self._take_blocks()
             self._account.readings(self._instruments)
             self._account.write_current()
@@ -231,6 +232,13 @@ class Pump:
         with suppress(RecordingError):
             self._account.note("error", text)
         self._emit(events.Message("error", text))
+
+    def _tell_left(self) -> None:
+        """Say how the sources of voltages were left."""
+        for left in self._instruments.voltages_left.values():
+            self._account.note("voltage" if left.verified else "error", left.text)
+            if not left.verified:
+                self._emit(events.Message("error", left.text))
 
     def _tell_changes(self) -> None:
         """Say which settings are not as they were when the run began."""

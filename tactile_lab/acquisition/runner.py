@@ -8,7 +8,7 @@ state of the coil.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 import numpy as np
@@ -138,6 +138,7 @@ class Runner:
             self._pump.until(lambda: generator.quiet)
         for text in self._program.doubts(self.instruments.settings):
             self._account.warn(text)
+        self._hold(self._program.voltages)
         self._pump.start_stream()
         if coil is not None:
             coil.energise()
@@ -165,6 +166,7 @@ class Runner:
         """Play one trial while everything streams."""
         if trial.probes != self._probes:
             self._move_probes(trial.probes)
+        self._hold(trial.voltages)
         rest = self._live.levels(self.intake.reached - BASELINE, self.intake.reached)
         drift = self._drifted(rest)
         drive = self._prepared(trial)
@@ -303,6 +305,14 @@ class Runner:
         self._pump.start_stream()
         # the newest samples lag by a poll: none from before the move count as rest
         self._rest(2 * BASELINE)
+
+    def _hold(self, voltages: Mapping[str, float]) -> None:
+        """Have sources hold voltages, by name, V, and the circuit settle with them."""
+        moved = self.instruments.hold(voltages)
+        if not moved:
+            return
+        self._pump.until(lambda: all(thread.stands for thread in moved))
+        self._pump.rest_until(self._clock.now() + self._program.settling)
 
     def _rest(self, length: float) -> None:
         """Record the sensor at rest for `length` s, and for one record at least."""

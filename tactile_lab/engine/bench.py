@@ -13,6 +13,7 @@ from tactile_lab.instruments.registry import (
     Driver,
     FieldMeterDriver,
     ScopeDriver,
+    VoltageSourceDriver,
     find_driver,
 )
 from tactile_lab.planning.needs import Needs
@@ -95,5 +96,9 @@ def equipped(
         scope=scope,
         generator=getattr(scope, "generator", None) if wired else None,
         field_meter=instrument(FieldMeterDriver, needed.field_meter),
+        voltage_sources={
+            name: make(VoltageSourceDriver, spec.voltage_sources[name])
+            for name in needed.voltages
+        },
         **also,
     )

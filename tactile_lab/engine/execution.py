@@ -21,7 +21,7 @@ from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.drive_check import DriveCheck
 from tactile_lab.acquisition.ending import CoilState, Ending, Executed
 from tactile_lab.acquisition.person import Ask
-from tactile_lab.acquisition.program import Program
+from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, Stream
@@ -181,6 +181,9 @@ class Execution(Task[Executed]):
             "instruments_after": instruments.settings_after,
             "instruments_changed": instruments.changes,
             "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
+            "voltages_left": {
+                name: left.text for name, left in instruments.voltages_left.items()
+            },
             "overrange": sorted(runner.intake.overrange),
             "samples_missing": runner.missing,
         }
@@ -209,6 +212,8 @@ class Execution(Task[Executed]):
             drive_for=self._drive_for,
             expected=self.plan.estimate.duration,
             doubts=self._doubts,
+            voltages=needed.voltages,
+            settling=SETTLED * scene.circuit.tau_L,
             coil_lag=scene.bench.magnet.coil_lag,
             drift=self._drift(),
             drive_check=self._drive_check(),
@@ -233,8 +238,8 @@ class Execution(Task[Executed]):
 
     def _drift(self) -> Drift | None:
         scene = self.scene
-        if not isinstance(scene.protocol, ForceProtocol):
-            return None
+        if not isinstance(scene.protocol, ForceProtocol) or scene.protocol.sets:
+            return None  # the rest moves with what is set
         force_for = partial(scene.bench.magnet.force_for, beyond="hold")
         return Drift(scene.circuit, force_for, scene.protocol.drift_limit)
 

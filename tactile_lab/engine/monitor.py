@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
-from tactile_lab.acquisition.program import Program
+from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
@@ -96,6 +96,8 @@ class Monitor(Task[Ending]):
                 drive_for=_no_drive,
                 expected=None,
                 doubts=lambda _: (),
+                voltages=needed.voltages,
+                settling=SETTLED * scene.circuit.tau_L,
             ),
             self.bench,
             lambda stream: self._ring,

@@ -16,6 +16,7 @@ from tactile_lab.complaint import validated
 from tactile_lab.errors import SceneError, choices
 from tactile_lab.instruments.scope_dialect import ScopeDialect
 from tactile_lab.instruments.serial_dialect import CoilDialect, Dialect, MeterDialect
+from tactile_lab.instruments.voltage_dialect import VoltageDialect
 
 D = TypeVar("D", bound=Dialect)
 
@@ -23,6 +24,7 @@ ROLES: dict[str, type[Dialect]] = {
     "coil": CoilDialect,
     "field meter": MeterDialect,
     "scope": ScopeDialect,
+    "voltage source": VoltageDialect,
 }
 """What a dialect may be for, and the keys it then has."""
 
@@ -47,6 +49,11 @@ def meter_dialect(name: str) -> MeterDialect:
 def scope_dialect(name: str) -> ScopeDialect:
     """The dialect `name`, which must be an oscilloscope's; see `load_dialect`."""
     return _for_role(load_dialect(name), name, ScopeDialect)
+
+
+def voltage_dialect(name: str) -> VoltageDialect:
+    """The dialect `name`, which must be a voltage source's; see `load_dialect`."""
+    return _for_role(load_dialect(name), name, VoltageDialect)
 
 
 def load_dialect(name: str) -> Dialect:

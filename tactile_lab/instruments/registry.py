@@ -1,6 +1,7 @@
 """The registry of drivers: what each can do, and how it is made, without importing it.
 
-A driver is one `CoilDriver`, `ScopeDriver` or `FieldMeterDriver`. Those of installed
+A driver is one `CoilDriver`, `ScopeDriver`, `FieldMeterDriver` or
+`VoltageSourceDriver`. Those of installed
 distributions are entry points of the group `tactile_lab.drivers`, named by their kind
 and name (`scope.ps3000a`); one of the user's own stands in a Python file that the bench
 file names (`driver = "my_scope.py"`).
@@ -36,6 +37,7 @@ from tactile_lab.errors import (
 )
 from tactile_lab.instruments.channels import check_channels
 from tactile_lab.plugins import module_from_file, plugged_in, registered
+from tactile_lab.voltage_source import VoltageSource, VoltageSourceCapability
 
 DRIVERS, FAR_ENDS = "tactile_lab.drivers", "tactile_lab.far_ends"
 """Groups of entry points."""
@@ -51,7 +53,7 @@ D = TypeVar("D", bound="Driver[Any]")
 
 
 class InstrumentTable(Interface):
-    """An instrument's table of a bench file: `[coil]`, `[scope]` or `[field_meter]`."""
+    """An instrument's table of a bench file, such as `[coil]`."""
 
     @property
     def driver(self) -> str:
@@ -126,6 +128,20 @@ class FieldMeterDriver(Driver[FieldMeter]):
     interface: ClassVar[type] = FieldMeter
 
 
+@dataclass(frozen=True, kw_only=True)
+class VoltageSourceDriver(Driver[VoltageSource]):
+    """A driver of source meters that hold a voltage.
+
+    Attributes:
+        capability: what the source that a table describes can do; refuses by
+            SceneError limits that it cannot.
+    """
+
+    kind: ClassVar[str] = "voltage_source"
+    interface: ClassVar[type] = VoltageSource
+    capability: Callable[[Any], VoltageSourceCapability]
+
+
 def driver_names(kind: type[Driver[Any]]) -> tuple[str, ...]:
     """Names of the registered drivers of a kind, sorted; imports none of them."""
     parts = (name.partition(".") for name in registered(DRIVERS))
@@ -195,6 +211,15 @@ def scope_capability(table: InstrumentTable) -> ScopeCapability:
     return find_driver(ScopeDriver, table).capability(table)
 
 
+def voltage_capability(table: InstrumentTable) -> VoltageSourceCapability:
+    """What a voltage source can do within its limits.
+
+    Raises:
+        SceneError: no such driver or dialect, or limits beyond the source.
+    """
+    return find_driver(VoltageSourceDriver, table).capability(table)
+
+
 def check_scope(
     table: InstrumentTable, channels: Sequence[Channel], rate: float
 ) -> float:
@@ -237,6 +262,9 @@ CoilDriverName = Annotated[str, AfterValidator(partial(_check_name, CoilDriver, 
 ScopeDriverName = Annotated[str, AfterValidator(partial(_check_name, ScopeDriver, ()))]
 MeterDriverName = Annotated[
     str, AfterValidator(partial(_check_name, FieldMeterDriver, (BY_PERSON,)))
+]
+VoltageDriverName = Annotated[
+    str, AfterValidator(partial(_check_name, VoltageSourceDriver, ()))
 ]
 """Names in bench files: of a registered driver, or the path of a Python file."""
 

@@ -7,6 +7,7 @@ it from a TOML file.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
@@ -194,31 +195,22 @@ class SerialDialect(Dialect):
         return (line,) if self.error is None else (line, self.error)
 
 
-class CoilDialect(SerialDialect):
-    """How a current source speaks. Templates use `{i}` A and `{v}` V, fixed-point.
+class SourceDialect(SerialDialect):
+    """What the dialect of every source has, of a current or of a voltage.
+
+    Templates use `{i}` A and `{v}` V, fixed-point.
 
     Attributes:
-        polarity: "both", or "positive" for a source that cannot reverse.
-        current: largest magnitude the model gives, A.
-        voltage: largest compliance the model takes, V.
-        digits: decimals of the current on the wire.
+        digits: decimals of the set-point on the wire.
         limit, limit_query: set and read the compliance.
         set, set_query: set and read the set-point.
         on, off, on_query: the output.
         on_match, off_match: its answer when on and when off; any other is no answer.
         measure_current, measure_voltage: measured values.
         current_match, voltage_match: where they stand in the answers, if not alone.
-        measures_when_off: the model measures with its output off; else verifying off
-            relies on output state and set-point.
         join: text that joins a line and the error query into one; "": two lines.
-        list: list mode, None where the model has none worth using.
-        analogue: analogue input, None where the model has none.
     """
 
-    role: Literal["coil"]
-    polarity: Literal["both", "positive"]
-    current: Current
-    voltage: Voltage
     digits: int = Field(default=5, ge=2, le=8)
     limit: str
     limit_query: str
@@ -233,8 +225,46 @@ class CoilDialect(SerialDialect):
     measure_voltage: str
     current_match: Pattern | None = None
     voltage_match: Pattern | None = None
-    measures_when_off: bool = True
     join: str = ";:"
+
+    def verified(self, line: str) -> tuple[str, ...]:
+        """`line` with the error query behind it, as one line or two."""
+        if self.error is None or not self.join:
+            return super().verified(line)
+        return (line + self.join + self.error,)
+
+    def fixed(self, value: float) -> float:
+        """A set-point as the wire carries it; never a negative zero."""
+        return round(value, self.digits) + 0.0
+
+    def _try_lines(self, lines: Iterable[str], where: str) -> None:
+        """Refuse lines that are longer than a line may be."""
+        for line in (part for one in lines for part in self.verified(one)):
+            if len(line) + len(self.serial.send_end) > self.serial.max_line:
+                raise SceneError(
+                    f"Dialect {where}: {line!r} with its terminator is longer "
+                    f"than max_line = {self.serial.max_line}."
+                )
+
+
+class CoilDialect(SourceDialect):
+    """How a current source speaks.
+
+    Attributes:
+        polarity: "both", or "positive" for a source that cannot reverse.
+        current: largest magnitude the model gives, A.
+        voltage: largest compliance the model takes, V.
+        measures_when_off: the model measures with its output off; else verifying off
+            relies on output state and set-point.
+        list: list mode, None where the model has none worth using.
+        analogue: analogue input, None where the model has none.
+    """
+
+    role: Literal["coil"]
+    polarity: Literal["both", "positive"]
+    current: Current
+    voltage: Voltage
+    measures_when_off: bool = True
     list: ListMode | None = None
     analogue: AnalogueMode | None = None
 
@@ -245,13 +275,8 @@ class CoilDialect(SerialDialect):
             SceneError: a placeholder that is not known, or a line that is too long.
         """
         try:
-            for value in (-self.current, 0.0, self.current):
-                for line in self.verified(self.set_line(value)):
-                    if len(line) + len(self.serial.send_end) > self.serial.max_line:
-                        raise SceneError(
-                            f"Dialect {where}: {line!r} with its terminator is longer "
-                            f"than max_line = {self.serial.max_line}."
-                        )
+            extremes = (-self.current, 0.0, self.current)
+            self._try_lines(map(self.set_line, extremes), where)
             self.limit_line(self.voltage)
             if self.list is not None:
                 self.list.count.format(n=1)
@@ -298,7 +323,7 @@ class CoilDialect(SerialDialect):
 
     def set_line(self, current: float) -> str:
         """Line that sets `current` (A); never an exponent, never a negative zero."""
-        return self.set.format(i=round(current, self.digits) + 0.0)
+        return self.set.format(i=self.fixed(current))
 
     @property
     def stop_lines(self) -> tuple[str, ...]:
@@ -308,12 +333,6 @@ class CoilDialect(SerialDialect):
     def limit_line(self, voltage: float) -> str:
         """Line that sets the compliance `voltage` (V)."""
         return self.limit.format(v=voltage)
-
-    def verified(self, line: str) -> tuple[str, ...]:
-        """`line` with the error query behind it, as one line or two."""
-        if self.error is None or not self.join:
-            return super().verified(line)
-        return (line + self.join + self.error,)
 
     def promised_interval(self, baud: int | None = None) -> float:
         """Update interval to plan with, s: wire time, gap and latency with margin."""

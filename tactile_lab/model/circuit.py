@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
@@ -172,6 +173,15 @@ class Circuit(SceneTable):
             raise ParameterError(
                 f"saturation = {self.saturation!r} must be true or false."
             )
+
+    def at(self, voltages: Mapping[str, float]) -> Circuit:
+        """The same with other V_GS, V_S or V_th, V, those that `voltages` names."""
+        return replace(
+            self,
+            V_GS=voltages.get("V_GS", self.V_GS),
+            V_S=voltages.get("V_S", self.V_S),
+            V_th=voltages.get("V_th", self.V_th),
+        )
 
     @property
     def k_F(self) -> float:

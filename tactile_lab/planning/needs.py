@@ -10,12 +10,18 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 
 from tactile_lab.bench import Channel
-from tactile_lab.errors import SceneError
-from tactile_lab.instruments.registry import BY_PERSON, check_scope, scope_capability
+from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.instruments.registry import (
+    BY_PERSON,
+    check_scope,
+    scope_capability,
+    voltage_capability,
+)
 from tactile_lab.planning.ranges import Extremes, expected, fitted, widened
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import SIGNALS
+from tactile_lab.voltage_source import why_not
 
 SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
 """Signals that exist as samples of a scope channel and in no other way."""
@@ -32,6 +38,7 @@ class Needs:
         coil: whether the current source is opened: not where no trial asks for force.
         field_meter: whether the teslameter is opened.
         asked_field: whether a person is asked for the field at each hold.
+        voltages: of the circuit, by name, V, that source meters hold as it begins.
         channels: scope channels to enable, in the bench's order; none: no scope.
         stored: signals of those that are stored sample by sample.
         detect_on: signal spikes are detected on ("V_K", or "V_C2" by its resets where
@@ -48,6 +55,7 @@ class Needs:
     coil: bool
     field_meter: bool
     asked_field: bool
+    voltages: Mapping[str, float]
     channels: tuple[Channel, ...]
     stored: tuple[str, ...]
     detect_on: str | None
@@ -93,6 +101,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
         coil=drive.drives,
         field_meter=metered and not by_hand,
         asked_field=metered and by_hand,
+        voltages=_voltages(scene, drive),
         channels=channels,
         stored=tuple(
             name
@@ -110,6 +119,36 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
         gapless=gapless,
         expected=seen,
     )
+
+
+def _voltages(scene: Scene, drive: Timeline) -> Mapping[str, float]:
+    """What source meters hold as the run begins, V.
+
+    Raises:
+        SceneError: the bench has no source for one of them.
+        LimitError: the scene or a trial asks for more than its limits allow.
+    """
+    held, sources = scene.sourced, scene.bench.voltage_sources
+    for name in held:
+        if name not in sources:
+            raise SceneError(
+                f"{scene.name} has a source meter hold {name}, but bench "
+                f"{scene.bench.name} has no [voltage_source.{name}]. Add it, or leave "
+                f"{name} out of [sensor] sourced and set it by hand."
+            )
+        voltage_capability(sources[name])
+    if drive.steps:
+        held = {**held, **drive.steps[0].trial.voltages}
+    for wanted in (held, *(step.trial.voltages for step in drive.steps)):
+        for name, volts in wanted.items():
+            if name not in scene.sourced:
+                raise SceneError(
+                    f"protocol {scene.protocol.name} sets {name}, but declares "
+                    f"sets = {scene.protocol.sets!r}; add it there."
+                )
+            if why := why_not(sources[name].limits, volts, name):
+                raise LimitError(why)
+    return held
 
 
 def _detected_on(asked: Set[str], wired: Mapping[str, Channel]) -> str | None:

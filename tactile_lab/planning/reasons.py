@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tactile_lab.instruments.registry import voltage_capability
 from tactile_lab.planning.needs import AVERAGED, Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.warn import threshold_of
@@ -9,6 +10,7 @@ from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
 from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
+from tactile_lab.voltage_source import VoltageLimits
 
 NOT_RECORDED = "field is not recorded, so it is not compared with the current"
 
@@ -40,6 +42,18 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
         found.append(("teslameter", f"{bench.field_meter.dialect} reads the field"))
     if needed.asked_field:
         found.append(("a person", "reads the teslameter at each hold"))
+    for name, volts in needed.voltages.items():
+        spec = bench.voltage_sources[name]
+        can = voltage_capability(spec)
+        does = "sets" if name in scene.protocol.sets else "holds"
+        found.append(
+            (
+                f"source of {name}",
+                f"{spec.dialect} {does} it, {show(volts, 'V', 6)} to begin with, in "
+                f"steps of {show(can.resolution, 'V')}; reads it back within "
+                f"{show(can.uncertainty(volts), 'V', 2)}; then {_rest(spec.limits)}",
+            )
+        )
     for name in scene.record.signals:
         if name in needed.model:
             found.append(
@@ -74,6 +88,11 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
     elif not needed.field_meter:
         why = "a scope channel has the field" if AVERAGED in enabled else NOT_RECORDED
         found.append(("teslameter", why))
+    found += [
+        (f"source of {name}", "neither [sensor] sourced nor the protocol names it")
+        for name in bench.voltage_sources
+        if name not in needed.voltages
+    ]
     for channel in bench.scope.channels if bench.scope is not None else ():
         if channel.signal not in enabled:
             found.append(
@@ -101,6 +120,11 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
         found.append(("simulated instruments", "the bench is real"))
     found.append(("window", "Qt is loaded by `tactile-lab gui` alone"))
     return tuple(found)
+
+
+def _rest(limits: VoltageLimits) -> str:
+    """Where a source is left."""
+    return f"rests at {show(limits.rest, 'V')}" if limits.rest else "goes to 0 V, off"
 
 
 def _threshold(scene: Scene, name: str) -> str:

@@ -6,9 +6,9 @@ simulated bench of this room is used.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import AfterValidator, Field, ValidationInfo
 from typing_extensions import TypedDict
@@ -20,10 +20,12 @@ from tactile_lab.instruments.registry import (
     CoilDriverName,
     MeterDriverName,
     ScopeDriverName,
+    VoltageDriverName,
 )
 from tactile_lab.magnetics import Magnet
 from tactile_lab.quantity import Unit, Voltage
-from tactile_lab.table import SceneTable
+from tactile_lab.table import INTERNAL, SceneTable
+from tactile_lab.voltage_source import SOURCED, VoltageLimits
 
 WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field")
 """Signals a scope channel can carry."""
@@ -158,6 +160,37 @@ class FieldMeterSpec(SceneTable):
     options: dict[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, kw_only=True)
+class VoltageSourceSpec(SceneTable):
+    """``[voltage_source.V_GS]``: a source meter that holds that voltage.
+
+    Attributes:
+        name: of the voltage.
+        driver: "serial", or path of a Python file with a `VoltageSourceDriver`.
+        dialect: id of one that ships, or path of a TOML file with one.
+        port: serial port or pyserial URL.
+        baud: symbols a second; the row's own unless given.
+        options: keys of the driver's own.
+        limits: what may be asked of it.
+    """
+
+    name: str = field(default="", metadata=INTERNAL)
+    driver: Annotated[VoltageDriverName, Located] = "serial"
+    dialect: Annotated[str, Located] = "keithley-2400-voltage"
+    port: str = "sim://voltage_source"
+    baud: Baud | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+    limits: VoltageLimits
+
+
+class VoltageSources(TypedDict, total=False):
+    """``[voltage_source]``: source meters by the circuit's voltage that each holds."""
+
+    V_GS: VoltageSourceSpec
+    V_S: VoltageSourceSpec
+    V_th: VoltageSourceSpec
+
+
 class HandSet(TypedDict, total=False):
     """``[hand_set]``: circuit voltages set by hand, V, which decide the threshold."""
 
@@ -176,6 +209,7 @@ class BenchSpec(SceneTable):
         simulated: compute the physics instead of opening instruments.
         notes: kept with each run.
         coil, scope, field_meter: None where the bench has none.
+        voltage_source: source meters, by the circuit's voltage that each holds.
         magnet: force per current.
         followers: between circuit and scope; None: no follower loads the circuit.
         hand_set: circuit voltages set by hand, by name, V.
@@ -191,32 +225,47 @@ class BenchSpec(SceneTable):
     coil: CoilSpec | None = None
     scope: ScopeSpec | None = None
     field_meter: FieldMeterSpec | None = None
+    voltage_source: VoltageSources = field(default_factory=VoltageSources)
     magnet: Magnet
     followers: Followers | None = None
     hand_set: HandSet = field(default_factory=HandSet)
 
     def __post_init__(self) -> None:
-        coil, meter = self.coil, self.field_meter
-        for name, spec in (("coil", coil), ("field_meter", meter)):
-            if spec is None or spec.driver != "serial":
-                continue
-            if not self.simulated and spec.port.startswith("sim:"):
+        ports: dict[tuple[str, str], str] = {}
+        for name, spec in self._wired_by_port.items():
+            inside = spec.port.startswith("sim:")
+            if spec.driver == "serial" and inside and not self.simulated:
                 raise ValueError(
                     f"[{name}] port is missing: real instruments need one, such as "
                     '"/dev/ttyUSB0" or "COM3"; simulated = true needs none'
                 )
-        if meter is not None and "field" in self.signals:
+            other = ports.setdefault((spec.driver, spec.port), name)
+            if other != name and not inside:
+                raise ValueError(
+                    f'[{other}] and [{name}] both have port = "{spec.port}"; a port '
+                    "has one instrument, so correct one of them"
+                )
+        if self.field_meter is not None and "field" in self.signals:
             raise ValueError(
                 "the field is measured twice, by [field_meter] and on a scope channel; "
                 "leave one of them out"
             )
-        if coil is None or meter is None or coil.driver != meter.driver:
-            return
-        if coil.port == meter.port:
-            raise ValueError(
-                f'[coil] and [field_meter] both have port = "{coil.port}"; a port has '
-                "one instrument, so correct one of them"
-            )
+
+    @property
+    def voltage_sources(self) -> dict[str, VoltageSourceSpec]:
+        """Source meters by the voltage that each holds."""
+        given = cast("dict[str, VoltageSourceSpec]", self.voltage_source)
+        return {n: replace(given[n], name=n) for n in SOURCED if n in given}
+
+    @property
+    def _wired_by_port(
+        self,
+    ) -> dict[str, CoilSpec | FieldMeterSpec | VoltageSourceSpec]:
+        """Instruments that may stand behind a serial port, by their tables' names."""
+        every = {"coil": self.coil, "field_meter": self.field_meter} | {
+            f"voltage_source.{name}": one for name, one in self.voltage_sources.items()
+        }
+        return {name: one for name, one in every.items() if one is not None}
 
     @property
     def path(self) -> Path | None:

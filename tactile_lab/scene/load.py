@@ -361,6 +361,9 @@ def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:
     for table, values in inline.items():
         if not isinstance(values, dict):
             continue
+        if table == "voltage_source":  # a table of tables
+            placed[table] = _placed(values, folder)
+            continue
         files = {
             key: str((folder / name).resolve())
             for key, name in values.items()

@@ -17,6 +17,7 @@ from tactile_lab.scene.sensor import Sensor
 from tactile_lab.scene.tables import CoilUse, Conditions, Detect, Record, Simulated
 from tactile_lab.table import dumped
 from tactile_lab.trial import Protocol
+from tactile_lab.voltage_source import SOURCED
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,6 +76,12 @@ class Scene:
         return frozenset((*self.record.signals, *self.protocol.needs, *wished))
 
     @property
+    def sourced(self) -> dict[str, float]:
+        """Voltages of the circuit that source meters hold as a run begins, V."""
+        named = {*self.sensor.sourced, *self.protocol.sets}
+        return {name: getattr(self.circuit, name) for name in SOURCED if name in named}
+
+    @property
     def force_accuracy(self) -> float:
         """Largest error of the force that is accurate enough, a part of its range."""
         return self.coil.accuracy or self.protocol.accuracy
@@ -82,7 +89,7 @@ class Scene:
     @property
     def compared(self) -> bool:
         """Whether the model is computed beside a run, and compared with it."""
-        if not self.record.compare or self.protocol.moves_probes:
+        if not self.record.compare or self.protocol.moves_probes or self.protocol.sets:
             return False
         return bool(self.asked & {"V_C1", "V_C2", "spikes", "rate", "I_DS"})
 
@@ -92,7 +99,13 @@ class Scene:
         named = [self.bench.path, self.protocol_source]
         if self.bench.magnet.calibration is not None:
             named.append(self.bench.magnet.calibration.path)
-        for spec in (self.bench.coil, self.bench.scope, self.bench.field_meter):
+        of_voltages = self.bench.voltage_sources.values()
+        for spec in (
+            self.bench.coil,
+            self.bench.scope,
+            self.bench.field_meter,
+            *of_voltages,
+        ):
             if spec is not None:
                 own = (spec.dialect, spec.driver)
                 named += [Path(str(name)) for name in own if is_file(name)]

@@ -48,6 +48,8 @@ class Sensor(Circuit):
             are as given.
         temperature_uncertainty: half of the 95 % band of the temperature, K; None:
             not stated.
+        sourced: of V_GS, V_S and V_th, those that a source meter of the bench sets
+            and holds during a run; the others are set by hand.
 
     Raises:
         ParameterError: as `Circuit`, or a voltage at which it cannot start.
@@ -61,6 +63,7 @@ class Sensor(Circuit):
     ] = "equilibrium"
     temperature: Temperature | None = None
     temperature_uncertainty: Annotated[float, Unit("K", least=0.0)] | None = None
+    sourced: tuple[Literal["V_GS", "V_S", "V_th"], ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -7,6 +7,7 @@
     /gaps /overrange    samples that never came; blocks in which an input left its range
     /spikes             found on line
     /current /field     applied current, teslameter readings
+    /voltages           what source meters hold, read back
     /trials /pauses /events
 
 SWMR allows no new datasets, attributes or variable-length types once writing has
@@ -46,6 +47,7 @@ TABLES = {
     "current": "time f8 s, setpoint f8 A, measured f8 A, resistance_ratio f8 1, "
     "listed u1",
     "field": "time f8 s, field f8 T",
+    "voltages": "time f8 s, name S8, setpoint f8 V, measured f8 V, current f8 A",
     "trials": "index u4, start f8 s, end f8 s, level f8 N, hold_start f8 s, "
     "hold_end f8 s, spikes u4, skipped u4, pause u1, label S48, rest_V_C1 f8 V, "
     "drift_V_C1 f8 V, complete u1",
@@ -59,6 +61,9 @@ RECORDS = {
     for table, columns in TABLES.items()
 }
 """Type of each table's rows."""
+
+NEWER = ("voltages",)
+"""Tables that runs of former versions lack."""
 
 PYRAMID_CHUNK = 8192
 """Entries in one chunk of the pyramid: few reads for a view of a whole run."""

@@ -21,6 +21,7 @@ from tactile_lab.store.layout import RECORDS, Layout
 from tactile_lab.store.sample_counter import SampleCounter
 from tactile_lab.store.write_queue import QUEUE_BYTES, WhenFull, Write, WriteQueue
 from tactile_lab.trial import Outcome, Trial
+from tactile_lab.voltage_source import HeldVoltage
 
 CADENCE = 0.5
 """Longest time anything stays in memory only, s of real time."""
@@ -143,6 +144,11 @@ class Recorder:
     def field(self, time: float, field: float) -> None:
         """Store a teslameter reading, T."""
         self._add("field", time, field)
+
+    def voltage(self, name: str, held: HeldVoltage) -> None:
+        """Store what the source of the circuit's voltage `name` holds."""
+        row = held.time, _fixed(name, 8), held.setpoint, held.voltage, held.current
+        self._add("voltages", *row)
 
     def event(self, time: float, kind: str, text: str) -> None:
         """Store that something happened; the whole text goes to the log."""

@@ -113,7 +113,7 @@ class Run(StoredRun):
 
         Args:
             what: "signals", or a table of records: spikes, trials, current, field,
-                events, rate, gaps, segments, pauses or overrange.
+                voltages, events, rate, gaps, segments, pauses or overrange.
             start: of the signals, s on the run's axis.
             end: the same; None for the last sample.
             signals: as for `to_xarray`.

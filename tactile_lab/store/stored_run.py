@@ -24,6 +24,7 @@ from tactile_lab.store.applied import (
 )
 from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import DATA, SCENE, is_live, read_info
+from tactile_lab.store.layout import NEWER, RECORDS
 from tactile_lab.store.signal import Axis, StoredSignal
 from tactile_lab.waveform import Waveform
 
@@ -185,7 +186,12 @@ class StoredRun:
         return max(ends)
 
     def records(self, name: str) -> Records:
-        """A table of fixed records by name; see `layout.RECORDS` for its fields."""
+        """A table of fixed records by name; see `layout.RECORDS` for its fields.
+
+        Empty where the run is older than the table.
+        """
+        if name in NEWER and name not in self._file:
+            return np.empty(0, RECORDS[name])
         rows: Records = self._file[name][()]
         return rows
 
@@ -358,6 +364,11 @@ class StoredRun:
     def field(self) -> Records:
         """Teslameter readings: time (s), field (T)."""
         return self.records("field")
+
+    @property
+    def voltages(self) -> Records:
+        """Held by source meters: time, s, name, setpoint, measured, V, current, A."""
+        return self.records("voltages")
 
     @property
     def events(self) -> Records:

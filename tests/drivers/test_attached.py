@@ -39,7 +39,8 @@ def test_silence_is_told(served):
 
 def test_a_stranger_gets_the_plain_row_only():
     assert fitting("ACME,THING,1,1") == ("scpi-generic",)
-    assert fitting("KEITHLEY INSTRUMENTS INC.,MODEL 2400,1,C30") == ("keithley-2400",)
+    fits = fitting("KEITHLEY INSTRUMENTS INC.,MODEL 2400,1,C30")
+    assert fits == ("keithley-2400", "keithley-2400-voltage")
 
 
 def test_trying_out_sets_nothing_and_writes_every_byte(served, tmp_path):

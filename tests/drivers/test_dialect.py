@@ -149,7 +149,8 @@ def test_limits_beyond_the_rating_are_refused():
 def test_dialects_are_listed_by_role():
     coils, meters = dialect_ids("coil"), dialect_ids("field meter")
     assert "kepco-bop" in coils and "lakeshore-425" in meters
-    assert sorted((*coils, *meters, *dialect_ids("scope"))) == list(dialect_ids())
+    others = (*dialect_ids("scope"), *dialect_ids("voltage source"))
+    assert sorted((*coils, *meters, *others)) == list(dialect_ids())
 
 
 @pytest.mark.parametrize("name", dialect_ids())

@@ -34,7 +34,7 @@ def rehearse(which: str, port: str, state: Path) -> str:
 
 
 def test_the_checklists_pass_on_served_instruments(tmp_path: Path) -> None:
-    bench = ServedBench(coil="pty", teslameter="tcp:0")
+    bench = ServedBench(coil="pty", teslameter="tcp:0", voltage_source="pty")
     bench.start()
     try:
         told = rehearse("coil_source", bench.addresses["coil"], tmp_path)
@@ -42,5 +42,7 @@ def test_the_checklists_pass_on_served_instruments(tmp_path: Path) -> None:
         assert "1 skipped" in told  # the one that needs a person
         told = rehearse("teslameter", bench.addresses["teslameter"], tmp_path)
         assert "FACT their standard deviation, T" in told
+        told = rehearse("voltage_source", bench.addresses["voltage_source"], tmp_path)
+        assert "FACT left: V_GS at" in told
     finally:
         bench.close()

@@ -48,3 +48,30 @@ shunt = "0.1 Ohm"
 r = "6 mm"
 """
 """A simulated bench whose oscilloscope polls: one record, then blind until the next."""
+
+WITH_A_SOURCE_METER = """
+name = "with a source meter"
+simulated = true
+[coil]
+baud = 19200
+[scope]
+driver = "ps3000a"
+[[scope.channels]]
+signal = "V_C1"
+input = "A"
+range = "2 V"
+offset = "-2.5 V"
+auto_range = true
+[[scope.channels]]
+signal = "V_K"
+input = "C"
+range = "5 V"
+[magnet]
+r = "6 mm"
+[voltage_source.V_GS.limits]
+lowest = "1 V"
+highest = "2 V"
+[voltage_source.V_th.limits]
+highest = "5 V"
+"""
+"""A simulated bench with source meters on V_GS and V_th."""

@@ -23,6 +23,13 @@ UNITS = {
     "spikes": {"time": "s", "amplitude": "V", "width": "s"},
     "current": {"time": "s", "setpoint": "A", "measured": "A"},
     "field": {"time": "s", "field": "T"},
+    "voltages": {
+        "time": "s",
+        "name": "",
+        "setpoint": "V",
+        "measured": "V",
+        "current": "A",
+    },
     "events": {"time": "s", "kind": "", "text": ""},
 }
 """Exported columns of each table and their SI units."""

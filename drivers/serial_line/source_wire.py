@@ -1,0 +1,92 @@
+"""A conversation with a source: its output, set-point, compliance, measurements."""
+
+from __future__ import annotations
+
+import re
+from typing import TypeVar
+
+from drivers.serial_line.conversation import Conversation
+from tactile_lab.errors import BadReplyError, RefusedError
+from tactile_lab.instruments.serial_dialect import SourceDialect
+
+S = TypeVar("S", bound=SourceDialect)
+
+RECONNECT = 1.0
+"""How long to try to open a lost port again before each attempt to leave safely, s."""
+
+VERIFICATIONS = 3
+"""Times the state to leave it in is commanded and read back before giving up."""
+
+
+class SourceWire(Conversation[S]):
+    """What is said to every source, of a current or of a voltage."""
+
+    def switch_on(self) -> None:
+        """Output on, checked by read-back.
+
+        Raises:
+            RefusedError: it stays off.
+        """
+        for line in self.dialect.on:
+            self.command(line)
+        if not self.output_is_on():
+            raise RefusedError("The source did not switch its output on.")
+
+    def output_is_on(self) -> bool:
+        """Whether the output is on, read back.
+
+        Raises:
+            BadReplyError: the answer says neither on nor off, twice.
+        """
+        answer = ""
+        for _ in range(2):
+            answer = self.query(self.dialect.on_query)
+            if re.search(self.dialect.on_match, answer):
+                return True
+            if re.search(self.dialect.off_match, answer):
+                return False
+            self.link.resynchronise()
+        raise BadReplyError(
+            f"The answer {answer!r} to {self.dialect.on_query!r} says neither on nor "
+            "off."
+        )
+
+    def setpoint(self) -> float:
+        """Set-point read back, A."""
+        return self.number(self.dialect.set_query)
+
+    def compliance(self) -> float:
+        """Compliance read back, V."""
+        return self.number(self.dialect.limit_query)
+
+    def current(self) -> float:
+        """Measured current, A."""
+        return self.number(self.dialect.measure_current, self.dialect.current_match)
+
+    def voltage(self) -> float:
+        """Measured voltage, V."""
+        return self.number(self.dialect.measure_voltage, self.dialect.voltage_match)
+
+    def measured(self) -> tuple[float, float]:
+        """Measured voltage, V, and current, A; asked once where one answer has both."""
+        row = self.dialect
+        if row.measure_voltage == row.measure_current:
+            answer = self.query(row.measure_voltage)
+            voltage = self.parsed(answer, row.voltage_match)
+            current = self.parsed(answer, row.current_match)
+            if voltage is not None and current is not None:
+                return voltage, current
+        return self.voltage(), self.current()
+
+    def confirm(self, what: str, query: str, wanted: float, within: float) -> None:
+        """Read back that a setting was taken.
+
+        Raises:
+            RefusedError: another value is read back.
+        """
+        found = self.number(query)
+        if abs(found - wanted) > within:
+            raise RefusedError(
+                f"The source reports a {what} of {found:g} after being set to "
+                f"{wanted:g}; the output stays off. Check its own limits."
+            )

@@ -1,0 +1,108 @@
+"""How one model of source meter speaks where it holds a voltage."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from tactile_lab.errors import SceneError
+from tactile_lab.instruments.serial_dialect import SourceDialect, Strict, frozen
+from tactile_lab.quantity import Current, Voltage, show
+from tactile_lab.voltage_source import VoltageLimits, VoltageSourceCapability
+
+
+class VoltageRange(Strict):
+    """One range of a source meter.
+
+    Attributes:
+        full: largest magnitude it sets, V.
+        resolution: smallest step of the set-point, V.
+        error, error_part: bound on the error of its reading: a constant part, V, and
+            a part of the reading.
+    """
+
+    full: Voltage
+    resolution: Voltage
+    error: Voltage
+    error_part: float = Field(default=0.0, ge=0.0)
+
+
+class VoltageDialect(SourceDialect):
+    """How a source meter speaks; `set` and `range` take `{v}` V, `limit` `{i}` A.
+
+    Attributes:
+        current: largest compliance the model takes, A.
+        ranges: its ranges, ascending.
+        range: line that chooses one by the largest voltage wanted; None: by itself.
+    """
+
+    role: Literal["voltage source"]
+    current: Current
+    ranges: Annotated[tuple[VoltageRange, ...], BeforeValidator(frozen)] = Field(
+        min_length=1
+    )
+    range: str | None = None
+
+    def try_templates(self, where: str) -> None:
+        """Fill in every template with extremes.
+
+        Raises:
+            SceneError: a placeholder that is not known, or a line that is too long.
+        """
+        most = self.ranges[-1].full
+        try:
+            lines = [self.set_line(-most), self.limit_line(self.current)]
+            self._try_lines([*lines, *self.range_lines(most)], where)
+        except (KeyError, IndexError, ValueError) as reason:
+            if isinstance(reason, SceneError):
+                raise
+            raise SceneError(
+                f"Dialect {where}: a template cannot be filled in ({reason!r}); set "
+                "and range take {v} for the voltage, limit takes {i} for the current."
+            ) from reason
+
+    def set_line(self, volts: float) -> str:
+        """Line that sets `volts`, V; never an exponent, never a negative zero."""
+        return self.set.format(v=self.fixed(volts))
+
+    def limit_line(self, current: float) -> str:
+        """Line that sets the compliance `current`, A."""
+        return self.limit.format(i=current)
+
+    def range_lines(self, volts: float) -> tuple[str, ...]:
+        """Lines that choose the range for `volts`, V."""
+        return () if self.range is None else (self.range.format(v=volts),)
+
+    def range_for(self, limits: VoltageLimits) -> VoltageRange:
+        """The finest range that reaches all that `limits` allow.
+
+        Raises:
+            SceneError: the model does not reach it, or cannot limit the current so.
+        """
+        fits = [one for one in self.ranges if one.full >= limits.largest]
+        if not fits:
+            raise SceneError(
+                f"[voltage_source] limits of {limits.span} are beyond the "
+                f"{show(self.ranges[-1].full, 'V')} of {self.title}."
+            )
+        if limits.compliance > self.current:
+            raise SceneError(
+                f"[voltage_source] compliance = {show(limits.compliance, 'A')} is "
+                f"beyond the {show(self.current, 'A')} of {self.title}."
+            )
+        return fits[0]
+
+    def capability(self, limits: VoltageLimits) -> VoltageSourceCapability:
+        """What the model can do within `limits`.
+
+        Raises:
+            SceneError: they are beyond the model.
+        """
+        used = self.range_for(limits)
+        return VoltageSourceCapability(
+            title=self.title,
+            resolution=max(used.resolution, 10.0**-self.digits),
+            error=used.error,
+            error_part=used.error_part,
+        )

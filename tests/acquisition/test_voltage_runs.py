@@ -1,0 +1,208 @@
+"""Runs on a bench whose V_GS a source meter holds."""
+
+import csv
+import json
+
+import pytest
+from benches import WITH_A_SOURCE_METER
+
+from sim_backend.bench import open_bench
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.voltage_source import LoadFault
+from tactile_lab.acquisition.events import RunState, StateChanged, VoltageRead
+from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.model.equations import rest_V_C1
+from tactile_lab.planning.needs import needs
+from tactile_lab.planning.plan import plan
+from tactile_lab.scene.load import load
+from tactile_lab.store.export import csv as to_csv
+from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+
+SHORT = (
+    'protocol.levels=["120 mN"]',
+    "protocol.ramp=0.1 s",
+    "protocol.hold=0.5 s",
+    "protocol.rest=0.2 s",
+    'record.signals=["force", "V_C1", "V_K", "spikes"]',
+    "record.sample_rate=50 kS/s",
+)
+HELD = (*SHORT, 'sensor.sourced=["V_GS"]')
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene on that bench, with overrides."""
+    file = tmp_path / "bench.toml"
+    file.write_text(WITH_A_SOURCE_METER)
+    return lambda *overrides: load("demo", overrides, file)
+
+
+@pytest.fixture
+def execute(tmp_path):
+    """Run a scene to its end, with faults of the source meter."""
+
+    def run(scene, *faults, emit=lambda event: None):
+        bench = open_bench(scene, needs(scene), voltage_faults=faults)
+        return Execution(scene, tmp_path / "runs", bench=bench, emit=emit).run()
+
+    return run
+
+
+def test_V_GS_is_set_held_logged_and_left_at_rest(scene, execute):
+    seen = []
+    held = scene(*HELD, "sensor.V_GS=1.405 V")
+    done = execute(held, emit=seen.append)
+    assert done.state is RunState.COMPLETE and done.off.verified
+    with Run.load(done.folder) as run:
+        rows = run.voltages
+        assert len(rows) >= 5 and set(rows["name"]) == {b"V_GS"}
+        assert rows["setpoint"] == pytest.approx(1.405)
+        assert rows["measured"] == pytest.approx(1.405, abs=1e-4)
+        assert rows["time"].min() >= 0 and rows["time"].max() <= run.duration + 1
+        # the sensor feels it: V_C1 rests where the model has it at 1.405 V
+        before = run.signal("V_C1")[:4000].mean()
+        assert before == pytest.approx(rest_V_C1(held.circuit), abs=5e-3)
+        assert "output off" in run.info["voltages_left"]["V_GS"]
+        settings = run.info["instruments"]["source of V_GS"]
+        assert settings["compliance_A"] == "0.0001"
+        assert run.info["instruments_changed"] == []
+        assert len(run.to_pandas("voltages")) == len(rows)
+    read = [one for one in seen if isinstance(one, VoltageRead)]
+    assert len(read) == len(rows)
+
+
+def test_the_source_decides_whether_the_sensor_fires(scene, execute):
+    counts = []
+    for volts in (1.3, 1.46, 1.5):
+        done = execute(scene(*HELD, f"sensor.V_GS={volts} V"))
+        counts.append(done.spikes)
+    assert counts[0] == 0 < counts[1] < counts[2]
+
+
+def test_a_run_that_does_not_name_it_does_not_open_it(scene, execute):
+    quiet = scene(*SHORT)
+    assert needs(quiet).voltages == {}
+    told = dict(plan(quiet).leaves_out)
+    assert "sourced" in told["source of V_GS"]
+    done = execute(quiet)
+    with Run.load(done.folder) as run:
+        assert len(run.voltages) == 0 and "voltages_left" in run.info
+
+
+def test_the_plan_says_what_it_holds_how_finely_and_where_it_is_left(scene):
+    told = dict(plan(scene(*HELD)).uses)["source of V_GS"]
+    assert "holds it, 1.4 V" in told and "steps of 50 µV" in told
+    assert "goes to 0 V, off" in told
+
+
+def test_what_cannot_be_held_is_refused_before_anything_is_opened(scene):
+    with pytest.raises(LimitError, match=r"V_GS = 2.5 V lies beyond the 1 V to 2 V"):
+        needs(scene(*HELD, "sensor.V_GS=2.5 V"))
+    with pytest.raises(SceneError, match=r"has no \[voltage_source.V_S\]"):
+        needs(scene(*SHORT, 'sensor.sourced=["V_S"]'))
+    with pytest.raises(SceneError, match="sourced"):
+        scene(*SHORT, 'sensor.sourced=["V_C1"]')
+    with pytest.raises(SceneError, match="beyond the 21 V"):
+        needs(scene(*HELD, "bench.voltage_source.V_GS.limits.highest=30 V"))
+
+
+def test_two_voltages_are_held_side_by_side(scene, execute):
+    done = execute(scene(*SHORT, 'sensor.sourced=["V_GS", "V_th"]'))
+    assert done.state is RunState.COMPLETE
+    with Run.load(done.folder) as run:
+        assert set(run.voltages["name"]) == {b"V_GS", b"V_th"}
+        assert set(run.info["voltages_left"]) == {"V_GS", "V_th"}
+        of_threshold = run.voltages[run.voltages["name"] == b"V_th"]
+        assert of_threshold["measured"] == pytest.approx(3.213, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        (LoadFault(resistance=0.0, after=6.0), "A load or a short holds it down"),
+        (LoadFault(resistance=5e3, after=6.0), "A load or a short holds it down"),
+        (SerialFault(kind="unplug", after=6.0, times=None), "was lost"),
+        (SerialFault(kind="missing", after=6.0, times=None), "answered nothing"),
+        (SerialFault(kind="garbled", after=6.0, times=None), "source of V_GS"),
+    ],
+    ids=["short", "compliance", "unplugged", "silent", "garbled"],
+)
+def test_a_fault_of_the_source_ends_the_run_with_the_coil_off(
+    scene, execute, fault, reason
+):
+    done = execute(scene(*HELD, "protocol.hold=4 s"), fault)
+    assert done.state is RunState.FAULTED and done.exit_code == 3
+    assert done.off.verified
+    assert reason in done.reason
+    with Run.load(done.folder) as run:  # and what was measured is kept
+        assert len(run.voltages) >= 1 and len(run.signal("V_K")) > 0
+        left = run.info["voltages_left"]["V_GS"]
+    if isinstance(fault, SerialFault):
+        assert "unknown" in left
+        assert "unknown" in (done.folder / "log.jsonl").read_text()
+
+
+def test_one_lost_answer_does_not_cost_the_run(scene, execute):
+    fault = SerialFault(kind="missing", line="READ", skip=2)
+    done = execute(scene(*HELD), fault)
+    assert done.state is RunState.COMPLETE, done.reason
+
+
+def test_a_stop_while_it_ramps_takes_it_to_rest(scene, tmp_path):
+    slow = scene(*HELD, "bench.voltage_source.V_GS.limits.slew=0.05 V/s")
+    bench = open_bench(slow, needs(slow))
+
+    def emit(event):
+        connecting = isinstance(event, StateChanged) and event.state == "connecting"
+        if connecting:
+            bench.clock.notify()
+
+    execution = Execution(slow, tmp_path / "runs", bench=bench, emit=emit)
+    source = bench.voltage_sources["V_GS"]
+    step = source.step_to
+
+    def stopping(volts):
+        there = step(volts)
+        if source.read().setpoint > 0.3:
+            execution.stop("test")
+        return there
+
+    source.step_to = stopping
+    done = execution.run()
+    assert done.state is RunState.ABORTED and done.off.verified
+    told = json.loads((done.folder / "run.json").read_text())["voltages_left"]
+    assert "output off" in told["V_GS"]
+
+
+def test_a_run_of_before_has_no_table_of_voltages(scene, execute):
+    done = execute(scene(*SHORT))
+    with Run.load(done.folder) as run:
+        run._file = _Without(run._file)
+        assert run.voltages.size == 0
+        assert run.voltages.dtype.names[0] == "time"
+
+
+class _Without:
+    """A data file as versions before this one wrote it."""
+
+    def __init__(self, file):
+        self._file = file
+
+    def __contains__(self, name):
+        return name != "voltages" and name in self._file
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+def test_readings_are_exported(scene, execute, tmp_path):
+    done = execute(scene(*HELD))
+    with Run.load(done.folder) as run:
+        to_csv.export(run, tmp_path / "csv", Selection())
+        told = (tmp_path / "csv" / "voltages.csv").read_text(encoding="utf-8")
+        rows = list(csv.DictReader(told.splitlines()))
+        measured = [float(row["measured_V"]) for row in rows]
+        assert measured == pytest.approx(list(run.voltages["measured"]))
+        assert {row["name"] for row in rows} == {"V_GS"}

@@ -1,0 +1,90 @@
+"""Facts about a lab's own source meter that no document settled.
+
+Run ``TACTILE_LAB_HARDWARE=voltage_source TACTILE_LAB_PORT=/dev/ttyUSB0 pytest -s
+tests/hardware/test_voltage_source.py``, with TACTILE_LAB_DIALECT naming the row
+(default keithley-2400-voltage) and its lead off the gate.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from drivers.voltage_source import STEP_EVERY, SourceMeter
+from tactile_lab.clock import RealClock
+from tactile_lab.instruments.dialects import voltage_dialect
+from tactile_lab.voltage_source import VoltageLimits
+
+pytestmark = [
+    pytest.mark.hardware,
+    pytest.mark.timeout(0),
+    pytest.mark.skipif(
+        os.environ.get("TACTILE_LAB_HARDWARE") != "voltage_source",
+        reason="needs a source meter; set TACTILE_LAB_HARDWARE=voltage_source",
+    ),
+]
+
+
+def fact(name: str, value: object) -> None:
+    print(f"\nFACT {name}: {value}")
+
+
+@pytest.fixture
+def source() -> Iterator[SourceMeter]:
+    row = voltage_dialect(
+        os.environ.get("TACTILE_LAB_DIALECT", "keithley-2400-voltage")
+    )
+    # how busy this computer is, is not asked here
+    wire = row.serial.model_copy(update={"timeout": 2.0})
+    row = row.model_copy(update={"serial": wire})
+    port = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
+    limits = VoltageLimits(highest=2.0, slew=5.0)
+    one = SourceMeter("V_GS", row, port, limits, RealClock())
+    one.open()
+    yield one
+    left = one.go_to_rest()
+    fact("left", left.text)
+    one.close()
+    assert left.verified
+
+
+def go(source: SourceMeter, volts: float) -> None:
+    while not source.step_to(volts):
+        time.sleep(STEP_EVERY)
+    time.sleep(0.3)
+
+
+def test_ramp_and_read_back(source: SourceMeter) -> None:
+    fact("identity", source.identity)
+    go(source, 1.0)
+    held = source.read()
+    fact("set to 1 V, read V and A", (held.voltage, held.current))
+    fact("settings", source.settings())
+    assert abs(held.voltage - 1.0) < 2e-3
+
+
+def test_latency(source: SourceMeter) -> None:
+    go(source, 0.1)
+    times = []
+    for _ in range(20):
+        begun = time.monotonic()
+        source.read()
+        times.append(time.monotonic() - begun)
+    fact("one reading takes, ms", f"{1e3 * statistics.median(times):.1f}")
+    assert max(times) < source.dialect.serial.timeout
+
+
+@pytest.mark.skipif(
+    os.environ.get("TACTILE_LAB_OPERATOR") != "1",
+    reason="someone must read a multimeter; set TACTILE_LAB_OPERATOR=1",
+)
+def test_steps_against_a_multimeter(source: SourceMeter) -> None:
+    step = source.capability.resolution
+    for volts in (1.4, 1.4 + step, 1.4 + 2 * step):
+        go(source, volts)
+        told = input(f"\nSet to {volts:.5f} V. Multimeter, V? ")
+        fact(f"set {volts:.5f} V", f"read {source.read().voltage}, multimeter {told}")
