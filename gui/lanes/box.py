@@ -318,6 +318,8 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             paint.trace(painter, frame, measured, paint.pen(colour))
         if lane.valued and not force:
             self._dots(on, measured, colour)
+        if lane.key == "rate":
+            self._laws(on)
 
     def _dots(self, on: Drawing, measured: Trace, colour: str) -> None:
         """Mark rates, and samples where they lie apart: between them nobody looked."""
@@ -328,6 +330,21 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         samples = bool(np.all((measured.low == measured.high)[inside]))
         if rates or (samples and x.size > 1 and np.diff(x).min() >= APART):
             paint.dots(on.painter, x, y, colour)
+
+    def _laws(self, on: Drawing) -> None:
+        """The fitted rates, dashed, and what they are."""
+        painter, frame, ink = on.painter, on.frame, on.tokens.text
+        line = QPen(QColor(ink), 1, Qt.PenStyle.DashLine)
+        laws = [
+            one
+            for one in self._stage.laws
+            if one.time[-1] > frame.start and one.time[0] < frame.end
+        ]
+        for one in laws:
+            paint.polyline(painter, frame.x(one.time), frame.y(one.mean), line)
+        if laws:
+            at = QPointF(frame.right - 5, 9)
+            paint.write(painter, at, "dashed: fitted α exp(βt) + γ", ink, align=1.0)
 
     def _plan(self, on: Drawing) -> None:
         frame, source = on.frame, on.source

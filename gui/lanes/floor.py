@@ -18,6 +18,7 @@ from gui.lanes.view import TimeView
 from gui.look.tokens import LIGHT, Tokens
 from gui.plots.axis import guarded
 from gui.plots.numbers import numbers
+from tactile_lab.trace import Trace
 
 AXIS = 52
 """Width of the value axis, px; the same in every lane so that time lines up."""
@@ -46,6 +47,7 @@ class Stage:
         width, height: of all lanes together, px.
         lanes: (top, bottom) of each visible lane, px; the last has the time axis.
         twin: draw what the model expects, too.
+        laws: of the rate, as they were fitted.
         zoom_box: drag a box to zoom to, instead of the view.
     """
 
@@ -56,6 +58,7 @@ class Stage:
     height: float = 0.0
     lanes: list[tuple[float, float]] = field(default_factory=list)
     twin: bool = True
+    laws: Sequence[Trace] = ()
     zoom_box: bool = False
 
     @property

@@ -21,6 +21,7 @@ from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.parts import column, lines, row
+from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
     from tactile_lab.store.statistics import Statistics
@@ -184,6 +185,11 @@ class LaneStack(QFrame):
     def is_hidden(self, key: str) -> bool:
         """Whether the user folded this lane away."""
         return key in self.arrangement.hidden
+
+    def show_laws(self, laws: Sequence[Trace]) -> None:
+        """Draw these laws of the rate over it."""
+        self.stage.laws = laws
+        self.refresh()
 
     def show_statistics(self, found: Mapping[str, Statistics]) -> None:
         """Show what the samples between the cursors come to, by signal."""

@@ -6,8 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gui.session.fit import FittedRate
+from tactile_lab.analysis.spike_train import within
 from tactile_lab.measurement import FloatArray, MeasuredTrial
 from tactile_lab.plot import Mark, Panel, Plot, Series
+
+COLOURS = ("rate", "force", "V_C1", "V_C2", "V_K")
+"""Of the steps whose rates lie over each other, the newest first."""
 
 
 def rate_plot(
@@ -42,6 +47,54 @@ def rate_plot(
         x_label="force",
         x_unit="N",
         x_prefix="m",
+        panels=(
+            Panel(
+                label="rate",
+                unit="Hz",
+                prefix="",
+                series=tuple(series),
+                limits=(0.0, None),
+            ),
+        ),
+    )
+
+
+def train_plot(
+    trials: Sequence[MeasuredTrial], laws: Sequence[FittedRate] = ()
+) -> Plot | None:
+    """The rate in the newest holds against the time since each began; None without.
+
+    Args:
+        trials: the steps so far.
+        laws: as they were fitted; dashed.
+    """
+    series: list[Series] = []
+    fitted = {one.step: one.law for one in laws}
+    fired = [t for t in trials if t.hold and within(t.spike_times, t.hold).size > 1]
+    for colour, trial in zip(COLOURS, fired[: -len(COLOURS) - 1 : -1], strict=False):
+        begin = trial.hold[0] if trial.hold else 0.0
+        times = within(trial.spike_times, trial.hold or (0.0, np.inf))
+        series.append(
+            Series(
+                x=times[1:] - begin,
+                y=1 / np.diff(times),
+                name=trial.label,
+                mark="dots",
+                colour=colour,
+            )
+        )
+        if (law := fitted.get(trial.start)) is not None:
+            since = law.time - trial.start - begin
+            series.append(Series(x=since, y=law.mean, mark="dashed", colour=colour))
+    if not series:
+        return None
+    return Plot(
+        name="trains",
+        caption="1/ISI in the newest holds against the time since the force stood "
+        "still. Dashed: the fitted law α exp(βt) + γ, where it can be told.",
+        x_label="time in the hold",
+        x_unit="s",
+        x_prefix="",
         panels=(
             Panel(
                 label="rate",

@@ -35,9 +35,9 @@ from gui.parts import (
 )
 from gui.plots.small_plot import SmallPlot
 from gui.review.fit_view import FitCards, TwinBars
-from gui.review.live_plots import loop_plot, rate_plot
+from gui.review.live_plots import loop_plot, rate_plot, train_plot
 from gui.review.wording import unbroken
-from gui.session.fit import Fit
+from gui.session.fit import Fit, FittedRate
 from gui.session.steps import cells
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
@@ -69,12 +69,15 @@ class ResultsView(QWidget):
         self.mark.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._theme = theme
         self.plot = SmallPlot(theme)
+        self.trains = SmallPlot(theme)
+        self.trains.hide()
         self.loop = SmallPlot(theme)
         self.loop.hide()
         self.answers: list[SmallPlot] = []
         """Of the report: the protocol's own plots."""
         self._steps: Sequence[MeasuredTrial] = ()
         self._model: tuple[tuple[float, float], ...] = ()
+        self._laws: tuple[FittedRate, ...] = ()
         self._show_rates()
         self.cards = FitCards()
         self.bars = TwinBars(theme)
@@ -96,7 +99,8 @@ class ResultsView(QWidget):
         head = row(self._title, STRETCH, self.mark)
         inner = QWidget()
         self._drawn = lines()
-        plots = (self.plot, 2), (self.loop, 2), (self._drawn, 2), (self.table, 3)
+        rates = (self.plot, 2), (self.trains, 2), (self.loop, 2)
+        plots = (*rates, (self._drawn, 2), (self.table, 3))
         said = (self.statements, self.tables, STRETCH)
         parts = (self.cards, *plots, *said, self.bars, self._facts, self.report)
         page = with_gutter(scrolling(inner), column(inner, *parts, spacing=9))
@@ -107,7 +111,7 @@ class ResultsView(QWidget):
         self, steps: Sequence[MeasuredTrial], *, total: int, running: bool, whole: bool
     ) -> None:
         """Show what the steps so far gave; `whole` is whether the run was completed."""
-        self._steps, self._model = tuple(steps), ()
+        self._steps, self._model, self._laws = tuple(steps), (), ()
         self._show_rates()
         self._fill(steps)
         self._arrange()
@@ -126,6 +130,7 @@ class ResultsView(QWidget):
         self.cards.show_cards(found.cards if found and rates else ())
         self.bars.show_bars(() if found is None else found.bars)
         self._model = () if found is None else found.model
+        self._laws = () if found is None else found.rates
         self._show_rates()
 
     def show_kind(self, *, fires: bool) -> None:
@@ -164,6 +169,7 @@ class ResultsView(QWidget):
             "are told here, step by step, as a run goes on."
         )
         self.plot.show_plot(rate_plot(self._steps, self._model))
+        self.trains.show_plot(train_plot(self._steps, self._laws))
 
     @property
     def _levelled(self) -> bool:
@@ -174,6 +180,7 @@ class ResultsView(QWidget):
         rates = self._fires and not self._loops
         self.loop.setVisible(self._loops and not self.answers)
         self.plot.setVisible(rates and not self.answers)
+        self.trains.setVisible(rates and self.trains.plot is not None)
         self.table.setVisible(rates and self._levelled)
         if not rates:
             self.cards.hide()

@@ -40,6 +40,9 @@ class RunResults(QObject):
     agreed = Signal(object)
     """How well the model follows now: an `Agreement`, or None if nobody knows."""
 
+    fitted = Signal(object)
+    """The laws of the rate that were fitted: traces in Hz."""
+
     def __init__(self, view: ResultsView, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self.steps: list[MeasuredTrial] = []
@@ -119,9 +122,11 @@ class RunResults(QObject):
         self._asked += 1
         self._next = None
         self.agreed.emit(None)
+        self.fitted.emit([])
 
     def _show_fit(self, found: Fit | None) -> None:
         self._view.show_fit(found)
+        self.fitted.emit([one.law for one in found.rates] if found else [])
         self.agreed.emit(None if found is None else found.agreement)
 
     def _fit(self, source: Source | None) -> None:

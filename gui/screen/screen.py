@@ -57,6 +57,7 @@ class Screen(QObject):
         self.ending = ""
         self.results = RunResults(panels.review.results, panels.session, self)
         self.results.agreed.connect(self._agreed)
+        self.results.fitted.connect(panels.centre.stack.show_laws)
         self._modelled: Source | None = None
         self._ended: Path | None = None
         self._records = records = Records(panels.session, self)

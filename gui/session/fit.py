@@ -6,7 +6,7 @@ away from the window's thread.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 COLUMNS = 2000
 """Columns in which measured and modelled voltages are compared."""
+
+RATES = 12
+"""Newest steps whose law is drawn."""
 
 FULL = 0.1
 """Relative error at which a bar is full."""
@@ -93,6 +96,19 @@ class Bar:
 
 
 @dataclass(frozen=True, eq=False)
+class FittedRate:
+    """The exponential law alpha exp(beta t) + gamma as it was fitted to one hold.
+
+    Attributes:
+        step: start of its step, s on the run's axis.
+        law: Hz, on the run's axis, up to the last spike of the hold.
+    """
+
+    step: float
+    law: Trace
+
+
+@dataclass(frozen=True, eq=False)
 class FitInput:
     """Measured and modelled signals of the run so far, taken at one instant."""
 
@@ -110,12 +126,14 @@ class Fit:
         bars: one per signal.
         model: the model's steps as (force N, peak rate Hz).
         agreement: of V_C1; None where it was not measured or not modelled.
+        rates: the law of the rate in each of the newest holds that let it be told.
     """
 
     cards: tuple[Card, ...]
     bars: tuple[Bar, ...]
     model: tuple[tuple[float, float], ...]
     agreement: Agreement | None
+    rates: tuple[FittedRate, ...] = ()
 
 
 def fit_input(source: Source) -> FitInput:
@@ -162,7 +180,20 @@ def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
         Bar(signal, signal, min(found.error / FULL, 1.0), found.text)
         for signal, found in apart.items()
     ]
-    return Fit(cards, (*bars, *_spikes(seen)), points, apart.get("V_C1"))
+    rates = tuple(_rates(steps))
+    return Fit(cards, (*bars, *_spikes(seen)), points, apart.get("V_C1"), rates)
+
+
+def _rates(steps: Sequence[MeasuredTrial]) -> Iterator[FittedRate]:
+    for step in steps[-RATES:]:
+        if step.hold is None:
+            continue
+        try:
+            law = fit_adaptation(step.spike_times, step.hold)
+        except NotIdentifiableError:
+            continue  # the card says why of the newest
+        time, rate = law.drawn
+        yield FittedRate(step.start, Trace.line(step.start + time, rate))
 
 
 def _has_model(seen: FitInput) -> bool:

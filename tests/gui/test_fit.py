@@ -1,6 +1,7 @@
 """Fits of the steps so far beside the model: numbers from trains made to order."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from PySide6.QtWidgets import QLabel
 
 from gui.lanes.readings import interval_text
 from gui.review.fit_view import FitCards, TwinBars
+from gui.review.live_plots import train_plot
 from gui.review.wording import unbroken
 from gui.session.fit import FitInput, fit
 from gui.session.steps import facts_of
@@ -124,3 +126,26 @@ def test_a_stored_run_that_ended_early_says_why():
     source = SimpleNamespace(path=Path("runs/one"), simulated=False, info=info)
     assert "<br>OSError: &lt;usb&gt; gone<br>Output off" in facts_of(source)
     assert "None" not in facts_of(SimpleNamespace(**{**vars(source), "info": {}}))
+
+
+def adapting(number: int) -> MeasuredTrial:
+    """12 s of 20 exp(-t/3) + 5 Hz, from 0.5 s on."""
+    time = np.linspace(0, 12, 200_000)
+    passed = 60 * (1 - np.exp(-time / 3)) + 5 * time
+    times = 0.5 + np.interp(np.arange(0.5, passed[-1]), passed, time)
+    return replace(step(0.2, 0, number), spike_times=times, hold=(0.5, 12.5))
+
+
+def test_the_fitted_rate_is_drawn_in_the_lane_and_over_the_steps() -> None:
+    trial = adapting(2)
+    found = fit([trial], seen())
+    (law,) = (one.law for one in found.rates)
+    since = law.time - trial.start - 0.5
+    assert np.allclose(law.mean, 20 * np.exp(-since / 3) + 5, rtol=0.01)
+    plot = train_plot([STEPS[1], trial], found.rates)
+    dots = [s for s in plot.panels[0].series if s.mark == "dots"]
+    assert [s.name for s in dots] == ["200 mN", "120 mN"], "the newest first"
+    (dashed,) = (s for s in plot.panels[0].series if s.mark == "dashed")
+    assert np.allclose(dashed.x, since)
+    assert np.allclose(np.interp(dots[0].x, dashed.x, dashed.y), dots[0].y, rtol=0.05)
+    assert train_plot([STEPS[0]]) is None, "none has fired"
