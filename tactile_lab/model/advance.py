@@ -6,6 +6,7 @@ import math
 import time as wall
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit, FloatArray
@@ -50,6 +51,7 @@ class Outputs:
         return self.solution.sample(signal, times)
 
 
+@lru_cache(maxsize=256)
 def rest(circuit: Circuit, *, time: float = 0.0, force: float = 0.0) -> State:
     """The equilibrium under a constant `force` N, reached long ago, at `time` s.
 
@@ -88,10 +90,8 @@ def advance(
         )
     need = Need.of(keep, circuit.saturation)
     started = wall.perf_counter()
-    after, solution = solve(
-        circuit, state, force, until, need, checked_tolerance(tolerance)
-    )
-    return after, Outputs(
+    solution = solve(circuit, state, force, until, need, checked_tolerance(tolerance))
+    return solution.after, Outputs(
         start=state.time,
         end=until,
         spike_times=solution.spike_times if "spikes" in need.signals else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import numpy as np
@@ -183,7 +183,16 @@ class Circuit(SceneTable):
             V_th=voltages.get("V_th", self.V_th),
         )
 
-    @property
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        """Of the numbers alone, the same in every process; asked for in each call."""
+        values = (getattr(self, name) for name in PARAMETERS)
+        return hash(tuple(value for value in values if isinstance(value, float)))
+
+    @cached_property
     def k_F(self) -> float:
         """Piezoelectric voltage per force, Eqs. (3)-(6), V/N."""
         return derived.k_F(self)

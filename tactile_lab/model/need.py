@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from tactile_lab.errors import ParameterError
 
@@ -69,24 +69,24 @@ class Need:
         """
         return _need((keep,) if isinstance(keep, str) else tuple(keep), coupled)
 
-    @property
+    @cached_property
     def dense(self) -> bool:
         """Whether steps of V_P or V_C1 are stored to be sampled."""
         return bool(self.sampled & {"V_P", "V_C1", "V_C2"})
 
-    @property
+    @cached_property
     def dense_V_C2(self) -> bool:
         """Whether V_C2 is stored too."""
         from_both = self.coupled and "I_C" in self.sampled
         return self.dense and ("V_C2" in self.sampled or from_both)
 
-    @property
+    @cached_property
     def integrator(self) -> bool:
         """Whether V_C2 and its spikes must be solved."""
         asked = bool(self.signals & {"V_C2", "spikes", "statistics"})
         return asked or (self.coupled and self.node_a)
 
-    @property
+    @cached_property
     def node_a(self) -> bool:
         """Whether V_C1 must be solved."""
         return "V_C1" in self.signals

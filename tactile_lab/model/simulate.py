@@ -42,14 +42,17 @@ class Result:
         spike_times: shape (n,), s; None if not kept.
         run_time: wall time spent, s.
         solution: the solved slice, with dense evaluators.
-        end: the state at `duration`.
     """
 
     duration: float
     spike_times: FloatArray | None
     run_time: float
     solution: Solution
-    end: State
+
+    @property
+    def end(self) -> State:
+        """The state at `duration`."""
+        return self.solution.after
 
     @property
     def error(self) -> ErrorEstimate:
@@ -132,13 +135,12 @@ def simulate(
     first = rest(circuit, force=float(force.value[0]))
     if start is not None:
         first = _started(circuit, start, first.force)
-    end, solution = solve(circuit, first, force, duration, need, tolerance)
+    solution = solve(circuit, first, force, duration, need, tolerance)
     return Result(
         duration=duration,
         spike_times=solution.spike_times if "spikes" in need.signals else None,
         run_time=wall.perf_counter() - began,
         solution=solution,
-        end=end,
     )
 
 

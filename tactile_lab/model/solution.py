@@ -14,6 +14,7 @@ from tactile_lab.model import kernel, sampling, spiking
 from tactile_lab.model.circuit import SUBTHRESHOLD_LIMIT, Circuit, FloatArray
 from tactile_lab.model.equations import I_C, I_DS, T1_currents, fires_at_rest
 from tactile_lab.model.need import STAGES, Need
+from tactile_lab.model.state import State
 from tactile_lab.model.tableau import ORDER
 from tactile_lab.spikes.rate import rate
 from tactile_lab.waveform import Waveform
@@ -45,28 +46,63 @@ class Statistics:
         return (self.count - 1) / (self.last - self.first)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Solution:
-    """A solved slice [start, end] with dense evaluators, absolute time, s."""
+    """A solved slice from `before` to `end`, with dense evaluators, absolute time, s.
+
+    Nothing changes it; it is not frozen because making it is part of every call.
+    """
 
     circuit: Circuit
     need: Need
     force: Waveform
-    start: float
+    before: State
     end: float
     spike_times: FloatArray
-    before: tuple[float, ...]
-    """Up to two spike times before the slice."""
     parameters: FloatArray
     segments: FloatArray
     steps: FloatArray
     pieces: FloatArray
-    last: tuple[float, float, float]
-    """V_P, V_C1, V_C2 at the end, after a jump or reset there."""
     counts: NDArray[np.int64]
     node: FloatArray
     memory: FloatArray
     """What the kernel counted and knows at the end; see `kernel` and `spiking`."""
+    errors_together: float
+
+    @cached_property
+    def after(self) -> State:
+        """The state at the end, after any jump or reset there."""
+        S, node, before = self.memory, self.node, self.before
+        resume = None
+        V_C2 = float(S[spiking.VOLTAGE])
+        if not self.need.integrator:
+            V_C2, resume = before.V_C2, before.resume
+        elif S[spiking.RESUME] >= 0:
+            V_C2 = self.circuit.fire_voltage
+            resume = self.end + float(S[spiking.RESUME])
+        last, previous = float(S[spiking.LAST]), float(S[spiking.PREVIOUS])
+        left_out = tuple(
+            name
+            for name, solved in (
+                ("V_C1", self.need.node_a), ("V_C2", self.need.integrator)
+            )
+            if not solved
+        )  # fmt: skip
+        return State(
+            time=self.end,
+            force=float(node[kernel.FORCE]),
+            V_P=float(node[kernel.V_P]),
+            V_C1=float(node[kernel.Y]),
+            V_C2=V_C2,
+            resume=resume,
+            last_spike=last if last > -math.inf else None,
+            previous_spike=previous if previous > -math.inf else None,
+            spikes=before.spikes + int(S[spiking.COUNT]),
+            error_V_C1=float(node[kernel.Y_ERROR]),
+            error_V_C2=float(S[spiking.ERROR]),
+            errors_together=self.errors_together,
+            left_out=left_out,
+        )
 
     @cached_property
     def stages(self) -> dict[str, int]:
@@ -152,9 +188,10 @@ class Solution:
                 f"{', '.join(sorted(self.need.sampled)) or 'nothing'}."
             )
         t = np.asarray(times, dtype=np.float64)
-        if t.size and not (np.min(t) >= self.start and np.max(t) <= self.end):
+        if t.size and not (np.min(t) >= self.before.time and np.max(t) <= self.end):
             raise ParameterError(
-                f"Sample times must lie within {self.start:g} s to {self.end:g} s."
+                f"Sample times must lie within {self.before.time:g} s to "
+                f"{self.end:g} s."
             )
         return self._values(signal, np.ascontiguousarray(t).ravel()).reshape(t.shape)
 
@@ -171,19 +208,22 @@ class Solution:
                 return T1_currents(self.circuit, V_C1, self._values("V_C2", t))[0]
             return I_C(self.circuit, V_C1)
         kind = ("V_P", "V_C1", "V_C2").index(signal)
+        last = getattr(self.after, signal)
         rows = (self.segments, self.steps, self.pieces)[kind]
         if rows.shape[0] == 0:
-            return np.full(t.size, self.last[kind])
+            return np.full(t.size, last)
         starts = np.ascontiguousarray(
             rows[:, 0] if kind == 0 else rows[:, 0] + rows[:, 1]
         )
         out = np.empty(t.size)
         sampling.sample(kind, t, starts, rows, self.spike_times, self.parameters, out)
-        out[t == self.end] = self.last[kind]
+        out[t == self.end] = last
         return out
 
     def _after_spikes(self, signal: str, t: FloatArray) -> FloatArray:
-        spikes = np.concatenate([np.array(self.before), self.spike_times])
+        earlier = (self.before.previous_spike, self.before.last_spike)
+        before = np.array([one for one in earlier if one is not None])
+        spikes = np.concatenate([before, self.spike_times])
         if signal == "rate":
             return rate(spikes, t)
         last = np.searchsorted(spikes, t, side="right") - 1

@@ -32,9 +32,9 @@ def solve(
     until: float,
     need: Need,
     tolerance: float,
-) -> tuple[State, Solution]:
-    """Advance `state` to `until` and keep what `need` asks for."""
-    stale = set(state.left_out)
+) -> Solution:
+    """From `state` to `until`; what `need` asks for is kept."""
+    stale = state.left_out
     if (need.node_a and "V_C1" in stale) or (need.integrator and "V_C2" in stale):
         raise ParameterError(
             "The state was advanced without what is asked for now; keep the same "
@@ -45,6 +45,7 @@ def solve(
     S = _memory(state)
     counts = np.zeros(kernel.COUNTS, dtype=np.int64)
     slice_ = (state.time, state.force, until)
+    together = 0.0
     keep_spikes = "spikes" in need.signals
     if circuit.saturation and need.node_a:
         from tactile_lab.model import coupled, ellipse
@@ -59,7 +60,7 @@ def solve(
         S[spiking.ERROR] = math.sqrt(E[ellipse.E_22])
         together = float(E[ellipse.E_12])
     else:
-        most, together = MOST_SPIKES, 0.0
+        most = MOST_SPIKES
         status, segments, steps, pieces, spikes = kernel.run(
             force.time, force.value, *slice_, circuit.k_F, par, node, S, counts,
             tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
@@ -67,26 +68,12 @@ def solve(
         )  # fmt: skip
     if status != kernel.DONE:
         raise _refusal(status, circuit, force, float(S[spiking.COUNT]), most)
-    after = _after(state, until, node, S, need, together)
-    return after, Solution(
-        circuit=circuit,
-        need=need,
-        force=force,
-        start=state.time,
-        end=until,
-        spike_times=spikes[: int(S[spiking.COUNT]) if keep_spikes else 0],
-        before=tuple(
-            t for t in (state.previous_spike, state.last_spike) if t is not None
-        ),
-        parameters=par,
-        segments=segments[: counts[kernel.ROWS_0]],
-        steps=steps[: counts[kernel.ROWS_1]],
-        pieces=pieces[: counts[kernel.ROWS_2]],
-        last=(after.V_P, after.V_C1, after.V_C2),
-        counts=counts,
-        node=node,
-        memory=S,
-    )
+    count = int(S[spiking.COUNT]) if keep_spikes else 0
+    return Solution(
+        circuit, need, force, state, until, spikes[:count], par,
+        segments[: counts[kernel.ROWS_0]], steps[: counts[kernel.ROWS_1]],
+        pieces[: counts[kernel.ROWS_2]], counts, node, S, together,
+    )  # fmt: skip
 
 
 def _memory(state: State) -> FloatArray:
@@ -130,41 +117,4 @@ def _refusal(
         )
     return SolverError(
         "The solution left the range of finite numbers; parameters are too extreme."
-    )
-
-
-def _after(
-    state: State,
-    until: float,
-    node: FloatArray,
-    S: FloatArray,
-    need: Need,
-    together: float,
-) -> State:
-    resume = None
-    V_C2 = float(S[spiking.VOLTAGE])
-    if not need.integrator:
-        V_C2, resume = state.V_C2, state.resume
-    elif S[spiking.RESUME] >= 0:
-        resume = until + float(S[spiking.RESUME])
-    last, previous = float(S[spiking.LAST]), float(S[spiking.PREVIOUS])
-    left_out = tuple(
-        name
-        for name, solved in (("V_C1", need.node_a), ("V_C2", need.integrator))
-        if not solved
-    )
-    return State(
-        time=until,
-        force=float(node[kernel.FORCE]),
-        V_P=float(node[kernel.V_P]),
-        V_C1=float(node[kernel.Y]),
-        V_C2=V_C2,
-        resume=resume,
-        last_spike=last if last > -math.inf else None,
-        previous_spike=previous if previous > -math.inf else None,
-        spikes=state.spikes + int(S[spiking.COUNT]),
-        error_V_C1=float(node[kernel.Y_ERROR]),
-        error_V_C2=float(S[spiking.ERROR]),
-        errors_together=together,
-        left_out=left_out,
     )

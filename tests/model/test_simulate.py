@@ -1,5 +1,9 @@
 """The paper's circuit does what the equations say, and refuses nonsense."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -74,3 +78,23 @@ def test_impossible_parameters_are_named(wrong):
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError):
         simulate(Circuit(), SANITY, **options)
+
+
+def test_a_circuit_hashes_alike_in_every_process():
+    """Its hash is kept and pickled with it; that of a text differs from run to run."""
+    code = "from tactile_lab.model.circuit import Circuit; print(hash(Circuit()))"
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        env=os.environ | {"PYTHONHASHSEED": "7"},
+    ).stdout  # fmt: skip
+    assert int(told) == hash(Circuit())
+    assert hash(Circuit()) != hash(Circuit(tau=1.0))
+
+
+def test_v_c2_is_held_at_v_fire_where_a_simulation_ends_within_a_reset():
+    held = Circuit(t_eps=0.01)
+    wave = Waveform.through([(0, 0), (0.01, 0.2)])
+    at = simulate(held, wave, until=0.2).spike_times[0]
+    found = simulate(held, wave, until=at + 0.005, keep=("spikes", "V_C2"))
+    end = np.array([at + 0.005])
+    assert found.sample("V_C2", end) == found.end.V_C2 == held.fire_voltage
