@@ -182,7 +182,7 @@ class Screen(QObject):
         self.results.forget()
         if self._records.leave():
             self._panels.centre.compare_bar.show_comparison(None)
-            self._panels.session.run.name = ""
+            self._panels.session.opened = ""
         self._panels.centre.say("")
 
     def forget(self, folder: Path) -> None:
@@ -298,7 +298,7 @@ class Screen(QObject):
         if not self._may_show(source, "old runs open"):
             return
         panels = self._panels
-        panels.session.run.name = f"Looking at {source.path.name}"
+        panels.session.opened = f"Looking at {source.path.name}"
         panels.centre.view.clear_cursors()
         panels.centre.show_source(source, self._lanes())
         status = str(source.info.get("status")).capitalize()
@@ -331,7 +331,7 @@ class Screen(QObject):
     def _show_comparison(self, comparison: Comparison) -> None:
         if not self._may_show(comparison, "runs are compared"):
             return
-        self._panels.session.run.name = f"Comparing {len(comparison.members)} runs"
+        self._panels.session.opened = f"Comparing {len(comparison.members)} runs"
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
         self.changed.emit()

@@ -49,6 +49,7 @@ class Session(QObject):
         plan: of what the form asks for.
         queue: of runs.
         run, monitor, manual: what uses the bench, one at a time.
+        opened: what was opened from disk and is on screen, "" while nothing is.
         source: what is seen live: the run in progress or the last one, or the monitor.
     """
 
@@ -79,6 +80,7 @@ class Session(QObject):
             lambda item: self.start(item.request, item.title, item.expectation),
         )
         self._chips = Chips(self.status, self.bench, self.run, self.monitor)
+        self.opened = ""
         self.source: LiveSource | None = None
         self._after_monitor: tuple[Request, str, Expectation | None] | None = None
         self.status.faulted.connect(self.queue.hold)
@@ -222,6 +224,11 @@ class Session(QObject):
         return self.status.state
 
     @property
+    def name(self) -> str:
+        """Of what is on screen: opened from disk, else the last run; "" before any."""
+        return self.opened or self.run.name
+
+    @property
     def busy(self) -> bool:
         """Whether closing needs a question first."""
         return self.run.alive or self.state.in_run or self.manual.alive
@@ -241,8 +248,8 @@ class Session(QObject):
         """Everything the header, banner and buttons are rendered from."""
         coil, spec = self.coil_view(), self.bench.spec
         name = "No bench connected" if spec is None else spec.name
-        if self.run.name and self.state is not WindowState.DISCONNECTED:
-            name = self.run.name
+        if self.name and self.state is not WindowState.DISCONNECTED:
+            name = self.name
         return Snapshot(
             state=self.state,
             bench="" if spec is None else spec.name,

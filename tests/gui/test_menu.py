@@ -112,6 +112,15 @@ def test_the_title_names_run_and_bench(lab) -> None:
     assert "simulated bench" in title and title.endswith("Tactile Lab")
 
 
+def test_a_run_that_begins_beside_a_record_is_named(lab) -> None:
+    lab.runs(1)
+    lab.window.screen_.open_run(lab.complete[0])
+    lab.until(lambda: lab.window.screen_.run is not None)
+    lab.run()
+    lab.app.processEvents()
+    assert lab.session.run.folder.name in lab.window.windowTitle()
+
+
 def test_a_list_opens_with_all_its_rows(lab) -> None:
     boxes = [lab.window.setup.picker]
     boxes += [b for b in lab.window.setup.form.findChildren(Combo) if b.count() > 1]
