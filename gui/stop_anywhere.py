@@ -41,7 +41,8 @@ class StopAnywhere(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Act, and keep the event from what is open; whether that was done."""
-        if event.type() == QEvent.Type.Polish and isinstance(watched, QDialog):
+        # classes first: this sees every event there is, and a type costs more to ask
+        if isinstance(watched, QDialog) and event.type() == QEvent.Type.Polish:
             watched.setWindowModality(Qt.WindowModality.NonModal)
             return False
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:

@@ -25,10 +25,10 @@ class ToolTips(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Show a long plain text in lines of its own; whether that was done."""
-        if event.type() != QEvent.Type.ToolTip or not isinstance(watched, QWidget):
-            return False
+        if not isinstance(event, QHelpEvent) or not isinstance(watched, QWidget):
+            return False  # classes first: this sees every event there is
         text = watched.toolTip()
-        if not isinstance(event, QHelpEvent) or "<" in text:
+        if event.type() != QEvent.Type.ToolTip or "<" in text:
             return False
         if all(len(line) <= LONGEST for line in text.splitlines()):
             return False

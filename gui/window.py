@@ -60,6 +60,7 @@ class Window(QMainWindow):
         self.setMinimumSize(1180, 720)
         self.setAcceptDrops(True)
         self.session, self.theme, self._settings = session, theme, settings
+        theme.dress(self)
         self.preferences = Preferences(settings)
         self.page = QWidget()
         self.header = Header(theme)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from gui.look.style import sheet
 from gui.look.tokens import DARK, LIGHT, Tokens
@@ -32,13 +32,23 @@ class Theme(QObject):
         self.apply()
 
     def apply(self) -> None:
-        """Put the theme on the application; widgets that paint listen to `changed`."""
+        """Put the palette on the application; who paints listens to `changed`."""
         self.tokens = self._wanted()
-        app = QApplication.instance()
-        assert isinstance(app, QApplication)
-        app.setPalette(palette(self.tokens))
-        app.setStyleSheet(sheet(self.tokens))
+        QApplication.setPalette(palette(self.tokens))
         self.changed.emit()
+
+    def dress(self, window: QWidget) -> None:
+        """Give a window and all in it the style sheet, now and in each theme.
+
+        A style sheet of the application is worked out for a widget as often as it has
+        parents: that took a second and more with every change of the theme.
+        """
+
+        def wear() -> None:
+            window.setStyleSheet(sheet(self.tokens))
+
+        self.changed.connect(wear)
+        wear()
 
     def _wanted(self) -> Tokens:
         if self.choice != "system":

@@ -97,6 +97,7 @@ def test_a_number_is_never_parted_from_its_unit() -> None:
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_small_lines_of_cards_fit_two_lines_in_the_narrowest_panel(lab, count) -> None:
     cards = FitCards()
+    lab.window.theme.dress(cards)
     cards.setFixedWidth(336 - 28)
     cards.show_cards(fit(STEPS[:count], seen()).cards)
     cards.show()

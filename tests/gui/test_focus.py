@@ -42,11 +42,9 @@ def luminance(colours: np.ndarray) -> np.ndarray:
 
 def ring(lab, widget: QWidget) -> tuple[int, float]:
     """How many pixels focus changes, and the contrast that most of them gain."""
-    lab.window.page.setFocus()
-    lab.app.processEvents()
+    lab.window.page.setFocus()  # acts at once; nothing else need be painted
     before = pixels(widget)
     widget.setFocus(Qt.FocusReason.TabFocusReason)
-    lab.app.processEvents()
     after = pixels(widget)
     changed = np.any(before != after, axis=2)
     if not changed.any():

@@ -63,6 +63,7 @@ def theme(app: QApplication) -> Theme:
 
 def card(lane: Lane, theme: Theme, height: int) -> LaneCard:
     made = LaneCard(lane, theme)
+    theme.dress(made)
     made.resize(made.width(), height)
     return made
 
