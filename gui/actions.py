@@ -159,8 +159,8 @@ class Actions(QObject):
             Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
             Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),
             Shortcut(("Ctrl+4",), "Spikes", lambda: self._tab(3)),
-            Shortcut(("Ctrl+Z",), "Undo in the form", form.undo_edit),
-            Shortcut(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.redo_edit),
+            Shortcut(("Ctrl+Z",), "Undo in the form", form.edits.undo),
+            Shortcut(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.edits.redo),
             Shortcut(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
             Shortcut(
                 ("F8",), "Fold the right panel", lambda: self._fold(panels.review)

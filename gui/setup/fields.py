@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 
 from gui.ask_file import ask_file
 from gui.parts import STRETCH, Combo, column, filled, label, row, say
-from gui.setup.parameter import FieldError, FormField, Kind, entry_of, text_of
+from gui.setup.parameter import FieldText, FormField, Kind, text_of
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import exact, parse
 
@@ -186,89 +186,62 @@ def editor(parameter: FormField) -> QuantityEdit | Switch | Choice:
 
 
 class Field(QFrame):
-    """Label, mark, editor and the reason why a value cannot be used.
+    """Label, mark, editor and the reason why a text cannot be used.
 
     Args:
-        parameter: what is edited.
-        value: SI, shown at first.
-        usual: what it is unless somebody says otherwise; the parameter's own default
-            where None.
+        value: the text it shows and changes.
     """
 
     changed = Signal()
 
-    def __init__(
-        self, parameter: FormField, value: object, usual: object = None
-    ) -> None:
+    def __init__(self, value: FieldText) -> None:
         super().__init__()
-        self.parameter = parameter
-        self.default = text_of(parameter, parameter.default if usual is None else usual)
-        self.problem = ""
+        self.value, self.parameter = value, value.parameter
         self._mark = QFrame()
         self._mark.setFixedSize(3, 22)
         self._reason = label("", "error", wrap=True)
         self._reason.hide()
-        name = label(parameter.title, wrap=True)
-        name.setToolTip(parameter.help)
+        name = label(self.parameter.title, wrap=True)
+        name.setToolTip(self.parameter.help)
         name.setFixedWidth(NAME)
         across = row(self._mark, name, spacing=6)
-        self._editor = editor(parameter)
+        self._editor = editor(self.parameter)
+        self._editor.put(value.text)
         self._editor.edited.connect(self._edited)
         name.setBuddy(self._editor)
         self.setFocusProxy(self._editor)
-        self._editor.setAccessibleName(parameter.title)
-        self._editor.setAccessibleDescription(parameter.help)
-        self._editor.setToolTip(parameter.help)
+        self._editor.setAccessibleName(self.parameter.title)
+        self._editor.setAccessibleDescription(self.parameter.help)
+        self._editor.setToolTip(self.parameter.help)
         if isinstance(self._editor, Switch):
             filled(across, (self._editor, STRETCH))
         else:
             across.addWidget(self._editor, 1)
-        if parameter.kind is Kind.FILE:
+        if self.parameter.kind is Kind.FILE:
             across.addWidget(self._browse())
         column(self, across, self._reason, spacing=2)
-        self.set_text(text_of(parameter, value))
+        self._judge()
 
     @property
     def text(self) -> str:
         """What stands in the field."""
-        return self._editor.text()
+        return self.value.text
 
-    def set_text(self, text: str) -> None:
+    def put(self, text: str) -> None:
         """Put text into the field."""
+        self.value.put(text)
         self._editor.put(text)
-        self.check()
+        self._judge()
 
-    @property
-    def is_changed(self) -> bool:
-        """Whether the value differs from what it is unless somebody says otherwise."""
-        return self.text.strip() != self.default
-
-    def entry(self) -> str | None:
-        """What a scene file would hold; None to leave the key out.
-
-        Raises:
-            FieldError: it cannot be used.
-        """
-        return entry_of(self.parameter, self.text)
-
-    def check(self) -> None:
+    def _judge(self) -> None:
         """Mark the field as changed or invalid."""
-        try:
-            self.entry()
-            self.problem = ""
-        except FieldError as error:
-            self.problem = str(error)
-        self.show_problem(self.problem)
-        colour = "palette(highlight)" if self.is_changed else "transparent"
+        colour = "palette(highlight)" if self.value.is_changed else "transparent"
         self._mark.setStyleSheet(f"background: {colour}; border-radius: 1px;")
-        self._mark.setToolTip(f"Default: {self.default or 'none'}")
+        self._mark.setToolTip(f"Default: {self.value.default or 'none'}")
         if isinstance(self._editor, QuantityEdit):
             self._editor.setToolTip(f"{self.text}\n{self.parameter.help}".strip())
-
-    def show_problem(self, problem: str) -> None:
-        """Show why the value cannot be used, "" if it can."""
-        say(self._reason, problem)
-        invalid = str(bool(problem)).lower()
+        say(self._reason, self.value.problem)
+        invalid = str(bool(self.value.problem)).lower()
         if self._editor.property("invalid") != invalid:
             self._editor.setProperty("invalid", invalid)
             self._editor.style().unpolish(self._editor)
@@ -290,9 +263,10 @@ class Field(QFrame):
         ask_file(self, self.parameter.title, self._take_file)
 
     def _take_file(self, path: Path) -> None:
-        self.set_text(str(path))
+        self.put(str(path))
         self.changed.emit()
 
     def _edited(self) -> None:
-        self.check()
+        self.value.put(self._editor.text())
+        self._judge()
         self.changed.emit()

@@ -3,28 +3,88 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from pydantic.fields import FieldInfo
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QWidget
 
 from gui.parts import column, empty
 from gui.setup.fields import Field
-from gui.setup.parameter import parameter
+from gui.setup.parameter import FieldText, parameter
 from tactile_lab.table import described
 from tactile_lab.trial import Protocol
 
 
+@dataclass
+class _Edit:
+    """One change of a form; `stay` is the keyboard's in a field, None without one."""
+
+    form: Form
+    before: dict[str, str]
+    after: dict[str, str]
+    stay: object
+
+
+class Edits:
+    """What was changed in one form or several, to be taken back in turn.
+
+    Qt's own stack of commands ended the process where Python collected a form with it.
+    """
+
+    def __init__(self) -> None:
+        self._done: list[_Edit] = []
+        self._undone: list[_Edit] = []
+
+    def __len__(self) -> int:
+        return len(self._done)
+
+    def add(self, edit: _Edit) -> None:
+        """Keep a change; what is typed during one stay in a field is one."""
+        self._undone.clear()
+        last = self._done[-1] if self._done else None
+        if last is not None and edit.stay is not None and last.stay is edit.stay:
+            last.after = edit.after
+        else:
+            self._done.append(edit)
+
+    def undo(self) -> None:
+        """Take the last change back, if there is one."""
+        if self._done:
+            edit = self._done.pop()
+            self._undone.append(edit)
+            edit.form.set_texts(edit.before)
+
+    def redo(self) -> None:
+        """Make the change again that was taken back last."""
+        if self._undone:
+            edit = self._undone.pop()
+            self._done.append(edit)
+            edit.form.set_texts(edit.after)
+
+    def clear(self) -> None:
+        """Forget all changes."""
+        self._done.clear()
+        self._undone.clear()
+
+
 class Form(QWidget):
-    """Fields of one protocol; undo and redo reach back to the last protocol chosen."""
+    """Fields of one protocol; undo and redo reach back to the last protocol chosen.
+
+    Attributes:
+        values: what stands in the fields, in their order.
+        fields: where one sees it; none while the form is folded.
+    """
 
     changed = Signal()
 
-    def __init__(self, undo: QUndoStack | None = None) -> None:
+    def __init__(self, edits: Edits | None = None, *, folded: bool = False) -> None:
         super().__init__()
+        self.values: list[FieldText] = []
         self.fields: list[Field] = []
-        self.undo = undo or QUndoStack(self)
+        self._folded = folded
+        self.setVisible(not folded)
+        self.edits = Edits() if edits is None else edits
         self.protocol: type[Protocol] | None = None
         self._shown: dict[str, str] = {}
         self._table = "protocol"
@@ -55,59 +115,71 @@ class Form(QWidget):
         said = {} if about is None else described(about)
         empty(self._rows)
         self._table = name
-        self.fields = []
+        self.fields, self.values = [], []
         for key, info in keys.items():
             wanted = parameter(key, info, said.get(key, ""))
             plain = None if usual is None else usual.get(key)
-            field = Field(wanted, values.get(key, wanted.default), plain)
-            field.changed.connect(self._edited)
-            self.fields.append(field)
-            self._rows.addWidget(field)
-        self.undo.clear()
+            value = FieldText(wanted, values.get(key, wanted.default), plain)
+            self.values.append(value)
+        if not self._folded:
+            self._make_fields()
+        self.edits.clear()
         self._shown = self.texts()
         self.changed.emit()
 
+    def fold(self, folded: bool) -> None:
+        """Show the fields, or hide them; they are made when they are first shown."""
+        self._folded = folded
+        if not folded and not self.fields:
+            self._make_fields()
+        self.setVisible(not folded)
+
+    def _make_fields(self) -> None:
+        for value in self.values:
+            field = Field(value)
+            field.changed.connect(self._edited)
+            self.fields.append(field)
+            self._rows.addWidget(field)
+
     def field(self, key: str) -> Field:
-        """The field of a parameter."""
+        """The field of a parameter, of a form that is not folded."""
         return next(field for field in self.fields if field.parameter.key == key)
+
+    def value(self, key: str) -> FieldText:
+        """What stands in the field of a parameter."""
+        return next(value for value in self.values if value.parameter.key == key)
 
     def texts(self) -> dict[str, str]:
         """What stands in the fields."""
-        return {field.parameter.key: field.text for field in self.fields}
+        return {value.parameter.key: value.text for value in self.values}
 
     def set_texts(self, texts: dict[str, str]) -> None:
         """Put texts into fields, without a trace in undo."""
-        for field in self.fields:
-            if field.parameter.key in texts:
-                field.set_text(texts[field.parameter.key])
+        self._put(texts)
         self._shown = self.texts()
         self.changed.emit()
 
     def propose(self, texts: dict[str, str]) -> None:
         """Put texts into fields; can be undone."""
-        for field in self.fields:
-            if field.parameter.key in texts:
-                field.set_text(texts[field.parameter.key])
+        self._put(texts)
         self._edited()
+
+    def _put(self, texts: dict[str, str]) -> None:
+        for where in self.fields or self.values:
+            text = texts.get(where.parameter.key)
+            if text is not None:
+                where.put(text)
 
     def reset(self) -> None:
         """Put every parameter back to its default; can be undone."""
-        self.propose({field.parameter.key: field.default for field in self.fields})
-
-    def undo_edit(self) -> None:
-        """Take the last edit back."""
-        self.undo.undo()
-
-    def redo_edit(self) -> None:
-        """Make the edit again that was taken back."""
-        self.undo.redo()
+        self.propose({value.parameter.key: value.default for value in self.values})
 
     @property
     def problem(self) -> str:
         """Why the form cannot be used, "" if it can."""
-        for field in self.fields:
-            if field.problem:
-                return f"{field.parameter.title}: {field.problem}"
+        for value in self.values:
+            if value.problem:
+                return f"{value.parameter.title}: {value.problem}"
         return ""
 
     def overrides(self) -> list[str]:
@@ -117,30 +189,30 @@ class Form(QWidget):
             FieldError: a field cannot be used.
         """
         made = []
-        for field in self.fields:
-            entry = field.entry()
+        for value in self.values:
+            entry = value.entry()
             if entry is not None:
-                made.append(f"{self._table}.{field.parameter.key}={entry}")
+                made.append(f"{self._table}.{value.parameter.key}={entry}")
         return made
 
     def changes(self) -> list[str]:
         """As `overrides`, of what differs from what is usual."""
         made = []
-        for field in self.fields:
-            if field.is_changed and not field.problem:
-                entry = field.entry()
+        for value in self.values:
+            if value.is_changed and not value.problem:
+                entry = value.entry()
                 if entry is not None:
-                    made.append(f"{self._table}.{field.parameter.key}={entry}")
+                    made.append(f"{self._table}.{value.parameter.key}={entry}")
         return made
 
     def changed_texts(self) -> dict[str, str]:
         """What stands in the fields that differ from what is usual."""
-        return {f.parameter.key: f.text for f in self.fields if f.is_changed}
+        return {v.parameter.key: v.text for v in self.values if v.is_changed}
 
     def _edited(self) -> None:
         now = self.texts()
         if now != self._shown:
-            self.undo.push(_Edit(self, self._shown, now, self._typed_in()))
+            self.edits.add(_Edit(self, self._shown, now, self._typed_in()))
             self._shown = now
         self.changed.emit()
 
@@ -150,38 +222,3 @@ class Form(QWidget):
             if (stay := field.stay) is not None:
                 return stay
         return None
-
-
-class _Edit(QUndoCommand):
-    """One change of the form."""
-
-    def __init__(
-        self, form: Form, before: dict[str, str], after: dict[str, str], stay: object
-    ) -> None:
-        super().__init__("edit")
-        self.stay = stay
-        self._form, self._before, self.after = form, before, after
-        self._done = True
-
-    def id(self) -> int:
-        """Of all edits, so that Qt offers each to the one before it."""
-        return 1
-
-    def mergeWith(self, later: QUndoCommand) -> bool:
-        """Take in what was typed during the same stay in a field."""
-        assert isinstance(later, _Edit)
-        if self.stay is None or later.stay is not self.stay:
-            return False
-        self.after = later.after
-        return True
-
-    def undo(self) -> None:
-        """Put the former texts back."""
-        self._done = False
-        self._form.set_texts(self._before)
-
-    def redo(self) -> None:
-        """Put the later texts back; the first time they stand there already."""
-        if not self._done:
-            self._form.set_texts(self.after)
-        self._done = True

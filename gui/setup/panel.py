@@ -77,7 +77,7 @@ class SetupPanel(QFrame):
         self.about = label("", "muted", wrap=True)
         self.preview = WaveformPreview(theme)
         self.form = Form()
-        self.tables = Sections(theme, self.form.undo)
+        self.tables = Sections(theme, self.form.edits)
         self.warnings = label("", "warning", wrap=True)
         self.warnings.hide()
         self.subject = Subject(session, self.form, self.tables)
@@ -204,7 +204,7 @@ class SetupPanel(QFrame):
         kind = self.form.protocol
         if kind is None:
             return "Run"
-        own = [field.text for field in self.form.fields if field.is_changed]
+        own = [value.text for value in self.form.values if value.is_changed]
         return " · ".join((kind.title, *own[:NAMED]))
 
     def render_snapshot(self, snapshot: Snapshot) -> None:

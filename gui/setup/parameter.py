@@ -107,6 +107,52 @@ class FormField:
             return TypeAdapter(kind)
 
 
+class FieldText:
+    """What stands in a field, whether or not anybody sees the field.
+
+    Args:
+        parameter: what it is a value of.
+        value: SI; one that a scene holds or a default, so that it needs no check.
+        usual: SI, what it is unless somebody says otherwise; the parameter's own
+            default where None.
+
+    Attributes:
+        text: as a person reads and writes it.
+        default: text of what is usual.
+        problem: why the text cannot be used, "" if it can.
+    """
+
+    def __init__(self, parameter: FormField, value: Any, usual: Any = None) -> None:
+        self.parameter = parameter
+        self.text = text_of(parameter, value)
+        self.default = text_of(parameter, parameter.default if usual is None else usual)
+        self.problem = ""
+        if not self.text:  # what must be given may be missing
+            self.put("")
+
+    def put(self, text: str) -> None:
+        """Replace the text, and find out whether it can be used."""
+        self.text = text
+        try:
+            self.entry()
+            self.problem = ""
+        except FieldError as error:
+            self.problem = str(error)
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether it differs from what it is unless somebody says otherwise."""
+        return self.text.strip() != self.default
+
+    def entry(self) -> str | None:
+        """What a scene file would hold; None to leave the key out.
+
+        Raises:
+            FieldError: the text cannot be used.
+        """
+        return entry_of(self.parameter, self.text)
+
+
 def parameter(key: str, info: FieldInfo, about: str = "") -> FormField:
     """The parameter that a field of a table describes; `about` says what it is."""
     inner, optional, units = _taken_apart(info.annotation)

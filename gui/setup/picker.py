@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QStyle,
@@ -15,6 +15,9 @@ from PySide6.QtWidgets import (
 from gui.parts import Combo
 from tactile_lab.plugins import protocol_class, protocol_names, scene_path
 from tactile_lab.trial import Protocol
+
+TURN = 20
+"""Milliseconds between two titles that are looked up."""
 
 
 class Picker(Combo):
@@ -27,6 +30,9 @@ class Picker(Combo):
         super().__init__()
         self.setAccessibleName("Protocol")
         self.setMaxVisibleItems(20)
+        self._untitled: list[str] = []
+        self._idle = QTimer(self)
+        self._idle.timeout.connect(self._title_next)
         self.activated.connect(
             lambda number: self.picked.emit(scene_of(str(self.itemData(number))))
         )
@@ -39,10 +45,27 @@ class Picker(Combo):
         if [self.itemData(i) for i in range(self.count())] != names:
             self.clear()
             for name in names:
-                kind = shown if name == shown.name else protocol_class(name)
-                self.addItem(kind.title, name)
-        self.setCurrentIndex(names.index(shown.name))
+                self.addItem(name, name)
+            self._untitled = [name for name in names if name != shown.name]
+            self._idle.start(TURN)
+        at = names.index(shown.name)
+        self.setItemText(at, shown.title)
+        self.setCurrentIndex(at)
         self.setToolTip(f"{shown.title}\n{about(shown)}")
+
+    def showPopup(self) -> None:
+        """Open the list, with all titles."""
+        while self._untitled:
+            self._title_next()
+        super().showPopup()
+
+    def _title_next(self) -> None:
+        """Import one more protocol for its title: all at once would delay the start."""
+        if not self._untitled:
+            self._idle.stop()
+            return
+        name = self._untitled.pop(0)
+        self.setItemText(self.findData(name), protocol_class(name).title)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the name, shortened to the room it has."""

@@ -122,7 +122,7 @@ class PresetButton(IconButton):
             self._read[file] = (changed, parameters(file))
         values = self._read[file][1]
         return {
-            field.parameter.key: text_of(field.parameter, values[field.parameter.key])
-            for field in self._form.fields
-            if field.parameter.key in values
+            asked.key: text_of(asked, values[asked.key])
+            for asked in (value.parameter for value in self._form.values)
+            if asked.key in values
         }

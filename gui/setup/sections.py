@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from gui.look.icons import icon
 from gui.look.theme import Theme
 from gui.parts import column
-from gui.setup.form import Form
+from gui.setup.form import Edits, Form
 from tactile_lab.quantity import count
 from tactile_lab.scene.scene import Scene
 from tactile_lab.table import fields_of
@@ -45,10 +44,10 @@ def tables_of(scene: Scene) -> dict[str, Any]:
 class Section(QWidget):
     """One table under its title; the title tells how much of it was changed."""
 
-    def __init__(self, theme: Theme, name: str, undo: QUndoStack) -> None:
+    def __init__(self, theme: Theme, name: str, edits: Edits) -> None:
         super().__init__()
         self._theme = theme
-        self.form = Form(undo)
+        self.form = Form(edits, folded=True)
         self.head = QToolButton()
         self.head.setProperty("role", "section")
         self.head.setCheckable(True)
@@ -60,10 +59,10 @@ class Section(QWidget):
         self.head.toggled.connect(self._unfold)
         self.form.changed.connect(self.tell)
         theme.changed.connect(self.tell)
-        self._unfold(False)
+        self.tell()
 
     def _unfold(self, on: bool) -> None:
-        self.form.setVisible(on)
+        self.form.fold(not on)
         self.tell()
 
     def tell(self) -> None:
@@ -83,10 +82,10 @@ class Sections(QWidget):
 
     changed = Signal()
 
-    def __init__(self, theme: Theme, undo: QUndoStack) -> None:
+    def __init__(self, theme: Theme, edits: Edits) -> None:
         super().__init__()
         rows = column(self, spacing=2)
-        self.sections = {name: Section(theme, name, undo) for name in TITLES}
+        self.sections = {name: Section(theme, name, edits) for name in TITLES}
         for section in self.sections.values():
             section.form.changed.connect(self.changed)
             rows.addWidget(section)

@@ -117,7 +117,7 @@ class Subject(QObject):
         kind = self._form.protocol
         if kind is not None and self.edited is None:
             self._typed.pop(kind.name, None)
-            if self._form.undo.count():
+            if self._form.edits:
                 self._typed[kind.name] = self._form.texts()
 
     def _on_bench(self, path: str | None) -> Scene:

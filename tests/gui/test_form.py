@@ -1,4 +1,6 @@
+import gc
 import inspect
+import weakref
 from functools import reduce
 
 import pytest
@@ -11,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
 from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter
+from gui.setup.picker import Picker
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
@@ -64,14 +67,14 @@ def test_lengths_and_units_are_shown_and_checked(app: QApplication) -> None:
     assert form.field("levels").text == "80, 120, 160, 200 mN"
     assert form.field("hold").text == "2 s"
     hold = form.field("hold")
-    hold.set_text("0 s")
-    assert "above 0 s" in hold.problem
-    hold.set_text("50 mN")
+    hold.put("0 s")
+    assert "above 0 s" in hold.value.problem
+    hold.put("50 mN")
     assert "mN" in form.problem
     with pytest.raises(FieldError):
         form.overrides()
-    hold.set_text("1500 ms")
-    assert not form.problem and hold.is_changed
+    hold.put("1500 ms")
+    assert not form.problem and hold.value.is_changed
 
 
 def test_typing_marks_undoes_and_redoes(app: QApplication) -> None:
@@ -82,11 +85,11 @@ def test_typing_marks_undoes_and_redoes(app: QApplication) -> None:
     assert isinstance(edit, QLineEdit)
     edit.selectAll()
     QTest.keyClicks(edit, "3 s")
-    assert hold.is_changed and hold.text == "3 s"
-    while form.undo.canUndo():
-        form.undo.undo()
-    assert hold.text == "2 s" and not hold.is_changed
-    form.undo.redo()
+    assert hold.value.is_changed and hold.text == "3 s"
+    while form.edits:
+        form.edits.undo()
+    assert hold.text == "2 s" and not hold.value.is_changed
+    form.edits.redo()
     assert hold.text != "2 s"
 
 
@@ -151,8 +154,34 @@ def test_long_list_is_shortened_where_it_is_not_edited(app: QApplication) -> Non
     assert isinstance(edit, QuantityEdit)
     assert edit.shown == edit.text(), "the demo's levels fit the narrowest panel"
     long = ", ".join(str(level) for level in range(10, 210, 10)) + " mN"
-    form.field("levels").set_text(long)
+    form.field("levels").put(long)
     edit.clearFocus()
     assert edit.shown.startswith("10, 20, 30") and edit.shown.endswith("…")
     assert edit.toolTip().startswith(long)
     form.hide()
+
+
+def test_the_list_of_protocols_has_all_titles_when_it_is_opened(app) -> None:
+    picker = Picker()
+    picker.show_protocol(protocol_class("pulses"))
+    assert picker.currentText() == "Pulses"
+    picker.showPopup()
+    titles = [picker.itemText(at) for at in range(picker.count())]
+    picker.hidePopup()
+    assert titles == [protocol_class(name).title for name in protocol_names()]
+
+
+def test_an_edited_form_may_be_forgotten(app: QApplication) -> None:
+    """Python's collector ended the process (signal 11) where Qt's stack held edits."""
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    for number in range(3, 7):
+        form.propose({"hold": f"{number} s"})
+    while form.edits:
+        form.edits.undo()
+    form.edits.redo()
+    form.itself = form  # as the window's parts know each other
+    gone = weakref.ref(form)
+    del form
+    gc.collect()
+    assert gone() is None

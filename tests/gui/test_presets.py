@@ -31,12 +31,12 @@ def test_star_keeps_marks_and_takes_up_parameters(lab) -> None:
     setup.form.propose({"hold": "700 ms"})
     setup.star.save("a bit longer")
     assert setup.star.shown() == "a bit longer"
-    setup.form.undo.undo()
+    setup.form.edits.undo()
     assert setup.form.texts() == before and setup.star.shown() == ""
     (file,) = (lab.folder / "presets" / "pulses").iterdir()
     setup.star.use(file)
     assert setup.form.field("hold").text == "700 ms"
-    setup.form.undo.undo()
+    setup.form.edits.undo()
     assert setup.form.texts() == before, "taking up a preset can be undone"
     menu = setup.star.menu_of_presets()
     assert "a bit longer" in [action.text() for action in menu.actions()]

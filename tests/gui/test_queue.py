@@ -158,7 +158,7 @@ def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
     assert setup.form.texts() == before
     assert [item.request for item in session.queue.items] == asked
     idle(lab)
-    setup.form.undo.undo()
+    setup.form.edits.undo()
 
 
 def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
@@ -302,4 +302,4 @@ def test_one_undo_takes_back_what_was_typed_in_one_stay(lab) -> None:
     lab.until(lambda: edit.text() == before)
     QTest.keyClick(edit, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
     lab.until(lambda: edit.text() == "600 ms")
-    setup.form.undo_edit()
+    setup.form.edits.undo()

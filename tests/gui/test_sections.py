@@ -3,6 +3,8 @@
 import json
 
 import pytest
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
 
 from gui.setup.fields import QuantityEdit
 from tactile_lab.scene.tables import Conditions, Detect
@@ -38,6 +40,19 @@ def test_sample_rate_and_signals_are_set_in_the_window(lab, tables) -> None:
     assert scene.record.signals == ("V_C1", "V_K", "spikes")
     assert lab.session.plan.expectation.estimate.samples_stored < samples / 2
     assert "Record · 2 changes" in tables.sections["record"].head.text()
+
+
+def test_fields_are_made_when_a_table_is_unfolded(lab, tables) -> None:
+    section = tables.sections["record"]
+    put(lab, "record", "sample_rate", "100 kS/s")
+    assert not section.findChildren(QLineEdit), "most stay folded"
+    section.head.click()
+    edit = section.form.field("sample_rate").findChild(QLineEdit)
+    assert edit.isVisibleTo(section) and edit.text() == "100 kS/s"
+    edit.clear()
+    QTest.keyClicks(edit, "50 kS/s")
+    section.head.click()
+    assert loaded(lab).record.sample_rate == 5e4 and not edit.isVisibleTo(section)
 
 
 def test_what_is_not_changed_is_not_said(lab, tables) -> None:
@@ -82,22 +97,22 @@ def test_a_queued_run_keeps_its_tables_when_it_is_edited(lab, tables) -> None:
     put(lab, "record", "sample_rate", "25 kS/s")
     lab.until(lambda: queue.items[0].expectation is not None)
     setup.edit(queue.items[0])
-    assert tables.form("record").field("sample_rate").text == "50 kS/s"
+    assert tables.form("record").value("sample_rate").text == "50 kS/s"
     put(lab, "record", "sample_rate", "80 kS/s")
     setup.save()
     lab.until(lambda: setup.subject.edited is None)
     assert queue.items[0].request.load().record.sample_rate == 8e4
-    assert tables.form("record").field("sample_rate").text == "25 kS/s"
+    assert tables.form("record").value("sample_rate").text == "25 kS/s"
     queue.remove(queue.items[0])
 
 
 def test_one_undo_for_form_and_tables(lab, tables) -> None:
     put(lab, "record", "sample_rate", "50 kS/s")
     lab.window.setup.form.propose({"hold": "700 ms"})
-    lab.window.setup.form.undo_edit()
-    assert tables.form("record").field("sample_rate").text == "50 kS/s"
-    lab.window.setup.form.undo_edit()
-    assert tables.form("record").field("sample_rate").text == "200 kS/s"
+    lab.window.setup.form.edits.undo()
+    assert tables.form("record").value("sample_rate").text == "50 kS/s"
+    lab.window.setup.form.edits.undo()
+    assert tables.form("record").value("sample_rate").text == "200 kS/s"
 
 
 def test_what_was_typed_for_a_protocol_is_there_when_it_is_picked_again(
@@ -112,13 +127,13 @@ def test_what_was_typed_for_a_protocol_is_there_when_it_is_picked_again(
     assert form.texts() != typed
     subject.pick("staircase")
     assert form.texts() == typed
-    form.undo_edit()
+    form.edits.undo()
     assert form.texts() != typed, "which can be undone"
 
 
 def test_an_emptied_field_shows_its_default_and_means_it(lab, tables) -> None:
     field = lab.window.setup.form.field("hold")
-    field.set_text("")
+    field.put("")
     edit = field.findChild(QuantityEdit)
     assert edit.placeholderText() == "2 s"
     assert loaded(lab).protocol.hold == 2.0, "not what the scene's file has"
