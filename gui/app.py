@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 
 from gui.look import fonts
 from gui.look.theme import Theme
+from gui.plots import on_demand as _before_pyqtgraph  # noqa: F401
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips

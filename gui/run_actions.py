@@ -10,8 +10,6 @@ from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.about_run import AboutRun
 from gui.dialogs.confirm import Confirm
-from gui.lanes.compare import Comparison
-from gui.lanes.stored import RunSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.session.log import Severity
@@ -47,20 +45,13 @@ class RunActions(QObject):
         panels.centre.log.noted.connect(self.note)
 
     @property
-    def noted_run(self) -> RunSource | None:
-        """The run on disk that is on screen, if there is exactly one."""
-        run = self._screen.run
-        single = isinstance(run, RunSource) and not isinstance(run, Comparison)
-        return run if single and isinstance(run, RunSource) else None
-
-    @property
     def _folder(self) -> Path | None:
         """Of the run on screen, also while its record is still being opened."""
-        run, session = self.noted_run, self._panels.session
+        run, session = self._screen.run, self._panels.session
         if run is not None:
             return run.path
         ended = session.source is not None and session.source is session.run.source
-        return session.run.folder if ended and self._screen.run is None else None
+        return session.run.folder if ended else None
 
     @property
     def note_goes_to(self) -> str:
@@ -126,10 +117,7 @@ class RunActions(QObject):
 
     def _delete(self, folder: Path) -> None:
         run = self._screen.run
-        if run is not None and any(
-            isinstance(one.source, RunSource) and one.source.path == folder
-            for one in run.members
-        ):
+        if run is not None and any(one.source.path == folder for one in run.members):
             self._screen.leave_run()
             self._screen.forget(folder)
         if is_live(folder):
@@ -158,7 +146,7 @@ class RunActions(QObject):
     def _said(self, folder: Path) -> None:
         """Somebody said something of a run: list and lanes show it."""
         self._screen.list_runs()
-        run = self.noted_run
+        run = self._screen.run
         if run is not None and run.path == folder:
             run.read_notes()
             self._panels.centre.stack.refresh()

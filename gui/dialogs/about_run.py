@@ -35,7 +35,6 @@ from gui.parts import (
     say,
 )
 from gui.setup.parameter import parameter, text_of
-from tactile_lab.commands.show import describe, rows
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import QuantityError, TactileLabError
 from tactile_lab.notebook import facts
@@ -216,6 +215,8 @@ class AboutRun(Overlay):
 
 def facts_of(folder: Path) -> str:
     """What `tactile-lab show` says of a run, and on which versions it was made."""
+    from tactile_lab.commands.show import describe, rows
+
     summary = describe(folder)
     found = [(name, value) for name, value in rows(summary) if value]
     info = read_info(folder)

@@ -97,6 +97,9 @@ class Source:
         """Stretches in which a signal's input left its range, shape (k, 2), s."""
         return NONE.reshape(0, 2)
 
+    def read_notes(self) -> None:
+        """Read anew what people noted; nothing where there is no run on disk."""
+
     @property
     def members(self) -> Sequence[Member]:
         """The runs it shows in each lane: itself, or those it compares."""

@@ -17,7 +17,6 @@ from shiboken6 import isValid
 from gui.look.theme import Theme
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
-from tactile_lab.store.run import Run
 from tactile_lab.trace import FloatArray
 
 POINTS = 72
@@ -46,6 +45,8 @@ def thumbnail_of(folder: Path) -> Thumbnail:
     Raises:
         RunFolderError, OSError: it cannot be read.
     """
+    from tactile_lab.store.run import Run  # heavy: not before there is one
+
     with Run.load(folder) as run:
         length = max(run.duration, 1e-9)
         (when, amperes), spikes = run.read_back.T, run.spikes["time"] / length

@@ -96,6 +96,13 @@ def test_the_ground_is_that_of_the_panel_it_stands_on_in_each_theme(app, height)
         assert corner == QColor(ground), name
 
 
+def test_pyqtgraph_makes_no_class_of_qt_that_nobody_uses() -> None:
+    copy = vars(pg.Qt.QtWidgets)
+    assert "QGraphicsView" in copy and "QWizard" not in copy
+    assert pg.Qt.QtWidgets.QWizard.__name__ == "QWizard", "and has it when asked"
+    del copy["QWizard"]
+
+
 def test_the_first_and_the_last_number_stand_on_an_axis(app):
     axis = RoundAxis("bottom", 60)
     _, values = axis.tickValues(0.0, 10.0, 300)[0]

@@ -169,7 +169,7 @@ def test_queue_can_be_edited_while_running(lab) -> None:
 
 def test_invalid_value_forbids_run_and_says_why(lab) -> None:
     window = lab.window
-    window.setup.form.field("hold").set_text("−1 s")
+    window.setup.form.field("hold").put("−1 s")
     window.setup.form.changed.emit()
     assert not window.setup.run.isEnabled()
     assert "Hold" in window.setup.run.toolTip()
@@ -177,7 +177,7 @@ def test_invalid_value_forbids_run_and_says_why(lab) -> None:
 
 def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
     window, session = lab.window, lab.session
-    window.setup.form.field("levels").set_text("900 mN")
+    window.setup.form.field("levels").put("900 mN")
     window.setup.plan_now()
     lab.until(lambda: session.plan.problem)
     assert "reachable" in session.plan.problem
@@ -232,7 +232,7 @@ def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
     folder = lab.complete_run()
     lab.until(lambda: screen.run is not None)
     assert screen.run.path == folder
-    assert window.session.run.name == folder.name
+    assert window.session.name == folder.name
     assert window.centre.stack.source is screen.run
     assert screen.run.model is not None, "the model does not blink"
     live = window.session.source
@@ -245,7 +245,7 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     window = lab.window
     folder = lab.runs(1)[0]
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.run.name == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
     run, stack, view = window.screen_.run, window.centre.stack, window.centre.view
     begin, _ = run.holds[-1].held
     run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])

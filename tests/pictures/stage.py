@@ -128,7 +128,7 @@ class Stage:
         """Wait for the end of the run in progress, which must be complete."""
         self.until(lambda: not self.session.busy)
         self.live(0.5)
-        if not self.window.screen_.ending.startswith("complete"):
+        if not self.window.screen_.ending.startswith("Complete"):
             raise SystemExit(f"The run was not completed: {self.session.status.fault}")
 
     def close_overlays(self) -> None:

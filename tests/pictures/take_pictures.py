@@ -170,7 +170,7 @@ def _compare(stage: Stage) -> None:
     window = stage.window
     for levels in ("80, 120, 160, 180 mN", "90, 130, 170, 200 mN"):
         window.screen_.close_run()
-        window.setup.form.field("levels").set_text(levels)
+        window.setup.form.field("levels").put(levels)
         stage.run()
     window.setup.form.reset()
     window.screen_.list_runs()
