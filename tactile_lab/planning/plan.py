@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from tactile_lab.planning.calibrated import check_calibration
+from tactile_lab.planning.computing import Computing, Saving, computing, savings
 from tactile_lab.planning.estimate import Cost, estimate
 from tactile_lab.planning.needs import Needs, needs
 from tactile_lab.planning.ranges import beyond
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
-from tactile_lab.planning.warn import assumptions, warnings
+from tactile_lab.planning.warn import assumptions, cheaper, warnings
 from tactile_lab.planning.ways import WayUsed, ways_used
 from tactile_lab.quantity import bytes_text, count, show
 from tactile_lab.scene.scene import Scene
@@ -62,6 +64,37 @@ class Plan:
         magnet = self.scene.bench.magnet
         return ways_used(self.timeline.steps, magnet.lag_uncertainty)
 
+    @cached_property
+    def computing(self) -> Computing:
+        """Processor time and memory the run takes on this computer."""
+        spikes = None if self.preview is None else self.preview.spike_times
+        return computing(
+            self.scene,
+            self.needs,
+            self.timeline,
+            0 if spikes is None else int(spikes.size),
+            self.estimate.update_interval,
+        )
+
+    @property
+    def savings(self) -> tuple[Saving, ...]:
+        """What each thing saves that could be left out."""
+        cost = self.estimate
+        return tuple(
+            savings(
+                self.scene,
+                self.needs,
+                self.computing,
+                cost.samples_per_channel,
+                cost.disk,
+            )
+        )
+
+    @property
+    def suggestions(self) -> tuple[str, ...]:
+        """Cheaper settings that give the same answer, one line each."""
+        return tuple(cheaper(self.scene, self.needs, self.estimate, self.computing))
+
     def __repr__(self) -> str:
         cost = self.estimate
         return (
@@ -97,6 +130,21 @@ class Plan:
                 "stored": cost.samples_stored,
             },
             "disk_bytes": {"raw": cost.disk_raw, "compressed": cost.disk},
+            "computing": {
+                "processor_s": self.computing.seconds,
+                "parts_s": dict(self.computing.time),
+                "memory_bytes": self.computing.memory,
+            },
+            "savings": [
+                {
+                    "without": saving.what,
+                    "how": saving.how,
+                    "disk_bytes": saving.disk,
+                    "processor_s": saving.seconds,
+                }
+                for saving in self.savings
+            ],
+            "suggestions": list(self.suggestions),
             "peak_force_N": cost.peak_force,
             "peak_current_A": cost.peak_current,
             "heat_A2s": {"used": cost.heat, "budget": cost.heat_budget},
@@ -201,6 +249,8 @@ def sections(plan: Plan) -> list[tuple[str, list[tuple[str, str]]]]:
         ("needs", list(plan.uses)),
         ("leaves out", _grouped(plan.leaves_out)),
         ("takes", list(_costs(plan))),
+        ("would save", [(f"no {s.what}", _saved(s)) for s in plan.savings]),
+        ("gives the same for less", [(line, "") for line in plan.suggestions]),
         (
             "resolution, one code",
             [(name, show(value, SIGNALS[name].unit)) for name, value in steps],
@@ -224,12 +274,18 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         f"{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
         f"{show(plan.scene.record.sample_rate, 'S/s')}; {cost.samples_stored:,} stored",
     )
-    disk = f"{bytes_text(cost.disk)} compressed, {bytes_text(cost.disk_raw)} raw"
-    signals = plan.needs.stored
-    if len(signals) > 1 and cost.disk:
-        each = bytes_text(cost.disk / len(signals))
-        disk += f"; {each} less without one of {', '.join(signals)}"
-    yield "disk", disk
+    yield (
+        "disk",
+        f"{bytes_text(cost.disk)} compressed, {bytes_text(cost.disk_raw)} raw",
+    )
+    parts = ", ".join(
+        f"{part} {_rounded(seconds)}" for part, seconds in plan.computing.time.items()
+    )
+    yield (
+        "computing",
+        f"about {_rounded(plan.computing.seconds)} of processor time ({parts}) and "
+        f"{bytes_text(float(f'{plan.computing.memory:.2g}'))} of memory, with report",
+    )
     yield (
         "coil",
         f"peak {show(cost.peak_current, 'A')} for {show(cost.peak_force, 'N')}, heat "
@@ -260,6 +316,16 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         ]
         if known:
             yield "numerics", f"{', '.join(known)}, by the solver's own estimate"
+
+
+def _saved(saving: Saving) -> str:
+    disk = f"{bytes_text(saving.disk)} of disk and " if saving.disk else ""
+    return f"{disk}{_rounded(saving.seconds)} of processor time: {saving.how}"
+
+
+def _rounded(seconds: float) -> str:
+    """A time that is not known better than to two digits."""
+    return show(seconds, "s", 2) if seconds < 100 else f"{seconds / 60:.2g} min"
 
 
 def _grouped(rows: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -7,17 +7,23 @@ from collections.abc import Iterator
 
 from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.magnetics import A2_PRINTED
-from tactile_lab.planning.estimate import resolution
+from tactile_lab.planning.computing import Computing
+from tactile_lab.planning.estimate import Cost, resolution
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.ways import ways_used
-from tactile_lab.quantity import show
+from tactile_lab.quantity import bytes_text, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
 from tactile_lab.spikes.detection import DEVIATIONS
 
 SAMPLES_PER_DECAY = 6
 """Samples per time constant of a spike from which its amplitude can be read."""
+
+SLOW = frozenset({"V_C1", "I_DS", "coil_current", "field"})
+"""Signals that nothing makes faster than node A and the coil."""
+SAMPLES_PER_NODE_A = 50
+"""Samples per time constant of node A from which V_C1 is seen whole."""
 
 FINE = 0.01
 """Largest part of the expected field that one code of its channel should be."""
@@ -163,6 +169,32 @@ def _magnet(scene: Scene) -> Iterator[str]:
         yield (
             "A2 = 2.25e-3 m² is Table 1's value as printed; a 15 mm x 15 mm core has a "
             "tenth of it, and a tenth of the force. Measure a calibration."
+        )
+
+
+def cheaper(
+    scene: Scene, needed: Needs, cost: Cost, computing: Computing
+) -> Iterator[str]:
+    """Settings that cost less and give the same answer."""
+    rate = scene.record.sample_rate
+    enough = _round_up(SAMPLES_PER_NODE_A / scene.circuit.tau_A)
+    streamed = {channel.signal for channel in needed.channels}
+    if streamed and streamed <= SLOW and rate > enough and needed.detect_on is None:
+        left = 1 - enough / rate
+        seconds = left * computing.time.get("storing", 0.0)
+        follows, wanted = show(scene.circuit.tau_A, "s", 2), show(enough, "S/s")
+        yield (
+            f"{', '.join(sorted(streamed))} at {wanted}, not {show(rate, 'S/s')}: node "
+            f"A follows in {follows}; saves {bytes_text(left * cost.disk)} of disk and "
+            f"{show(seconds, 's', 2)} of processor time "
+            f'(record.sample_rate = "{wanted}")'
+        )
+    if needed.detect_on is not None and needed.detect_on in needed.stored:
+        part = 1 / len(needed.stored)
+        yield (
+            f"spikes are found as {needed.detect_on} streams: its samples need not be "
+            f"stored to have them; saves {bytes_text(part * cost.disk)} of disk "
+            f"(then they cannot be looked for again)"
         )
 
 

@@ -266,3 +266,28 @@ def test_a_source_that_cannot_reverse_is_asked_for_one_sign_only(
         plan(scene(refused), preview=False)
     assert reach in str(why.value) and "one sign only" in str(why.value)
     assert "−498" in str(why.value)  # mA
+
+
+def test_what_a_run_computes_is_the_sum_of_its_parts_and_each_can_be_left_out():
+    whole = plan(load(None))
+    cost, saved = whole.computing, {s.what: s for s in whole.savings}
+    assert cost.seconds == pytest.approx(sum(cost.time.values()))
+    less = plan(load(None, ["record.compare=false"]))
+    assert "model beside the run" not in less.computing.time
+    left = cost.seconds - less.computing.seconds
+    assert saved["model beside the run"].seconds == pytest.approx(left)
+    signals = [s for s in whole.scene.record.signals if s != "V_C2"]
+    without = plan(load(None, [f"record.signals={json.dumps(signals)}"]))
+    assert saved["V_C2"].disk == whole.estimate.disk - without.estimate.disk
+    left = cost.seconds - without.computing.seconds
+    assert saved["V_C2"].seconds == pytest.approx(left)
+    assert without.computing.memory < cost.memory
+
+
+def test_a_rate_that_node_a_does_not_need_is_told():
+    """The same V_C1 at a hundredth of the disk; nothing is said where that is so."""
+    (told,) = plan(load("v_c1_only", ["record.sample_rate=1 MS/s"])).suggestions
+    assert "V_C1 at 10 kS/s, not 1 MS/s" in told
+    assert 'record.sample_rate = "10 kS/s"' in told
+    assert plan(load("v_c1_only")).suggestions == ()
+    assert not any("kS/s" in line for line in plan(load(None)).suggestions)

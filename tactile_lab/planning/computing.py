@@ -1,0 +1,161 @@
+"""What a run costs this computer: processor time and memory, by part.
+
+Each part is so many seconds per million samples, set-points or trials, as measured on
+one computer (docs/plan-figures.md shows how near that comes over all scenes that ship),
+times how much slower this one is. That is told by a few milliseconds of work.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from tactile_lab.planning.needs import Needs
+from tactile_lab.planning.timeline import Timeline
+from tactile_lab.scene.scene import Scene
+
+REFERENCE = 1.05e-3
+"""What one round of the work takes where the seconds below were measured, s."""
+ROUNDS = 12
+
+START = 3.4
+"""Imports, opening of all instruments, figures and report, s."""
+PER_TRIAL = 0.11
+"""Played, judged and drawn, s."""
+PER_STREAMED_SECOND = 0.019
+"""Of blocks that are handed on, at any rate, s."""
+STORED, DETECTED = 0.008, 0.008
+"""Per million samples of one channel: rendered, compressed, read again and drawn; and
+of the one on which spikes are looked for, s."""
+COMPARED_POINT, COMPARED_SPIKE = 1.84e-3, 4.2e-3
+"""Of the model beside the run, which is solved once as it is believed and once for each
+cause of uncertainty: per set-point or point of a list, and per spike, s."""
+
+BASE = 270e6
+"""Memory of the program with its instruments and figures, bytes."""
+MEMORY_CHANNEL = 12e6
+"""What is kept of a channel's stream, bytes."""
+MEMORY_POINT = 28e3
+"""Per set-point or point of a list in the model beside the run, bytes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Computing:
+    """What one scene costs this computer.
+
+    Attributes:
+        time: processor time by part, s.
+        memory: largest, bytes.
+    """
+
+    time: dict[str, float]
+    memory: float
+
+    @property
+    def seconds(self) -> float:
+        """Processor time of the whole run with its report, s."""
+        return sum(self.time.values())
+
+
+@dataclass(frozen=True)
+class Saving:
+    """What leaving something out saves.
+
+    Attributes:
+        what: is left out.
+        how: the key that does it.
+        disk: compressed, bytes.
+        seconds: processor time, s.
+    """
+
+    what: str
+    how: str
+    disk: float
+    seconds: float
+
+
+@cache
+def slowness() -> float:
+    """How many times longer this computer takes than the reference; some 15 ms."""
+    values, best = np.linspace(0.0, 3.0, 20_000) ** 0.5, np.inf
+    for _ in range(ROUNDS):
+        began = time.thread_time()
+        total = 0
+        for i in range(10_000):
+            total += i * i
+        np.exp(np.sort(values[::-1]))
+        best = min(best, time.thread_time() - began)
+    return best / REFERENCE
+
+
+def computing(
+    scene: Scene, needed: Needs, drive: Timeline, spikes: int, interval: float | None
+) -> Computing:
+    """What running `scene` on the simulated bench costs; a real bench costs no more.
+
+    Args:
+        scene: with what it compares.
+        needed: channels and what is stored of them.
+        drive: its trials.
+        spikes: expected.
+        interval: between two set-points of the coil, s; None without a coil.
+    """
+    slow = slowness()
+    millions = drive.streamed * scene.record.sample_rate / 1e6
+    points = set_points(drive, interval)
+    told = {
+        "start and report": START + PER_TRIAL * len(drive.steps),
+        "streaming": PER_STREAMED_SECOND * drive.streamed,
+        "storing": STORED * millions * len(needed.stored),
+    }
+    if needed.detect_on is not None:
+        told["detection"] = DETECTED * millions
+    memory = BASE + MEMORY_CHANNEL * len(needed.channels)
+    if scene.compared:
+        told["model beside the run"] = COMPARED_POINT * points + COMPARED_SPIKE * spikes
+        memory += MEMORY_POINT * points
+    time_ = {part: slow * seconds for part, seconds in told.items() if seconds}
+    return Computing(time=time_, memory=memory)
+
+
+def set_points(drive: Timeline, interval: float | None) -> float:
+    """Points of lists, and set-points while the current changes: each moves the force.
+
+    Args:
+        drive: trials of a run.
+        interval: between two set-points, s; None without a coil.
+    """
+    number = 0.0
+    for step in drive.steps:
+        if step.drive is not None and step.drive.points is not None:
+            number += len(step.drive.points)
+        elif step.current is not None and interval:
+            moving = np.diff(step.current.value) != 0
+            number += float(np.diff(step.current.time)[moving].sum()) / interval
+    return number
+
+
+def savings(
+    scene: Scene, needed: Needs, cost: Computing, samples: int, disk: float
+) -> Iterator[Saving]:
+    """What each thing saves that the scene could leave out and still run.
+
+    Args:
+        scene: planned.
+        needed: what is opened and stored.
+        cost: of the whole.
+        samples: of one channel.
+        disk: of all stored channels, compressed, bytes.
+    """
+    storing = cost.time.get("storing", 0.0)
+    number = len(needed.stored)
+    for signal in needed.stored if samples and number > 1 else ():
+        how = f'without "{signal}" in record.signals'
+        yield Saving(signal, how, disk / number, storing / number)
+    beside = cost.time.get("model beside the run")
+    if beside is not None and scene.compared:
+        yield Saving("model beside the run", "record.compare = false", 0.0, beside)
