@@ -155,6 +155,8 @@ class Measurement:
         field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
         newtons_per_tesla: force over B2 by Eq. (2), N/T, or None.
         field: teslameter readings, shape (m, 2), s and T, or None.
+        voltages: what source meters were read back to hold, by the circuit's voltage,
+            shape (m, 2), s and V.
         traces: decimated signals, the derived I_DS and the model's V_C1 among them.
         circuit: the sensor as it is believed to be, to compare with, or None.
         bias_uncertainty: half of the 95 % band of the current a measuring follower
@@ -178,6 +180,7 @@ class Measurement:
     field_per_ampere: float | None = None
     newtons_per_tesla: float | None = None
     field: FloatArray | None = None
+    voltages: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
     bias_uncertainty: float = 0.0
@@ -304,6 +307,21 @@ class Measurement:
             return np.empty(0)
         found: FloatArray = value[(time >= start) & (time <= end)]
         return found
+
+    def source_read(self, name: str, trial: MeasuredTrial) -> float | None:
+        """Mean of what the source of a voltage read in a trial, V; None if nothing."""
+        rows = self.voltages.get(name, np.empty((0, 2)))
+        since = rows[:, 0] - trial.start
+        inside = (since >= 0) & (since < trial.duration)
+        return float(rows[inside, 1].mean()) if inside.any() else None
+
+    def source_error(self, name: str, volts: float) -> float | None:
+        """Bound on the error of what the source of `name` reads, V; None: not known."""
+        told = self.settings.get(f"source of {name}", {})
+        try:
+            return float(told["error_V"]) + float(told["error_part"]) * abs(volts)
+        except (KeyError, ValueError):
+            return None
 
     def current_at(self, time: float) -> float | None:
         """Applied coil current at `time` s, A; None before the first set-point."""

@@ -42,8 +42,8 @@ class RunSource(Source):
         signals: what the run stored, force and spikes included.
         model: the twin, once it has come.
         fetched: set each time samples asked for have arrived.
-        moves_probes: its protocol put the probes elsewhere for a while: there is
-            nothing to compare with the model.
+        moves_probes: its protocol put the probes elsewhere for a while, or set the
+            circuit's voltages: there is nothing to compare with the model.
     """
 
     spikes: FloatArray = np.empty(0)
@@ -224,6 +224,7 @@ def _hold(trial: Any) -> Stretch:
 def _moves_probes(run: Run) -> bool:
     """What its protocol says; no where that cannot be read any more."""
     try:
-        return run.scene.protocol.moves_probes
+        protocol = run.scene.protocol
+        return protocol.moves_probes or bool(protocol.sets)
     except SceneError:
         return False

@@ -277,6 +277,7 @@ class Runner:
         begin, start = self._begin(index, trial)
         self._pump.stop_stream()
         self._play_current(drive, begin, begin + trial.length)
+        self._hold(trial.voltages)
         self._pump.rest_until(begin + trial.length)
         self._account.pause(start, self._account.now)
         self._pump.start_stream()

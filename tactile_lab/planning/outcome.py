@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +31,7 @@ class Step:
         force: N, from 0 to the trial's length: as given, or as the coil plays it.
         current: A, likewise; None where the force is taken as given.
         drive: how the coil plays it; None where the force is taken as given.
+        voltages: of the circuit, by name, V, that sources were set to so far.
     """
 
     trial: Trial
@@ -38,6 +39,7 @@ class Step:
     force: Waveform
     current: Waveform | None
     drive: Drive | None = None
+    voltages: Mapping[str, float] = field(default_factory=dict)
 
 
 class ModelOutcome(Outcome):
@@ -116,7 +118,9 @@ class ModelOutcome(Outcome):
         force = joined(
             [(step.start, step.force) for step in self._steps[: self.index + 1]]
         )
-        return model(self._scene, force, self.start + self.trial.length, keep)
+        end = self.start + self.trial.length
+        # V_P depends on no voltage, and the rest has settled since one was changed
+        return model(self._scene, force, end, keep, voltages=self._step.voltages)
 
 
 def joined(waves: Sequence[tuple[float, Waveform]]) -> Waveform:

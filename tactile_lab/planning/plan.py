@@ -45,7 +45,7 @@ class Plan:
         assumptions: what the numbers rest on.
         warnings: where the scene cannot deliver.
         preview: the model under the planned force, only what is recorded; None where
-            it was not asked for.
+            it was not asked for, or the protocol sets voltages from trial to trial.
     """
 
     scene: Scene
@@ -218,7 +218,7 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
 
 
 def _model(scene: Scene, drive: Timeline) -> Result | None:
-    if set(scene.record.signals) <= BENCH_ONLY:
+    if scene.protocol.sets or set(scene.record.signals) <= BENCH_ONLY:
         return None
     from tactile_lab.planning.preview import model, modelled
 

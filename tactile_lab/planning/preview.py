@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from tactile_lab.errors import SceneError
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY
@@ -23,15 +24,32 @@ def model(
     duration: float,
     keep: Sequence[str],
     tolerance: float = DEFAULT_TOLERANCE,
+    voltages: Mapping[str, float] | None = None,
 ) -> Result:
     """The scene's circuit under `force` (N), from the scene's start, for `duration` s.
 
+    Args:
+        scene: whose circuit.
+        force: N.
+        duration: s.
+        keep: what is wanted.
+        tolerance: of spike times, s, and V_C1, V.
+        voltages: of the circuit, by name, V, other than the scene's; needed where its
+            protocol sets some from trial to trial.
+
     Raises:
+        SceneError: they are needed.
         ParameterError: the tolerance cannot be asked for.
         SolverError: the model cannot answer to that tolerance.
     """
+    if scene.protocol.sets and voltages is None:
+        raise SceneError(
+            f"protocol {scene.protocol.name} sets {', '.join(scene.protocol.sets)} "
+            "from trial to trial; the model alone has one for all. `tactile-lab run` "
+            "plays it on the simulated bench."
+        )
     return simulate(
-        scene.circuit,
+        scene.circuit.at(voltages or {}),
         force,
         keep=tuple(keep),
         until=duration,

@@ -40,7 +40,7 @@ def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extr
         for channel in channels
         if channel.signal in ("V_C1", "V_C2") and channel.coupling == "DC"
     ]
-    if not names or scene.protocol.moves_probes:
+    if not names or scene.protocol.moves_probes or scene.protocol.sets:
         return {}
     from tactile_lab.planning.preview import model
 

@@ -138,6 +138,7 @@ class _Driver:
         self._amperes = 0.0
         self._field = (0.0, 0.0)
         self._heat = 0.0
+        self._voltages: dict[str, float] = {}
         self._loaded: CurrentList | None = None
 
     def take(self, trial: Trial) -> Outcome:
@@ -160,7 +161,8 @@ class _Driver:
             force = cut(magnet.force_for(current, beyond="hold"), length)
         else:
             force = cut(force, length)
-        step = Step(trial, self._time, force, current, drive)
+        self._voltages = {**self._voltages, **trial.voltages}
+        step = Step(trial, self._time, force, current, drive, self._voltages)
         self.steps.append(step)
         self._time += length
         outcome = ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)

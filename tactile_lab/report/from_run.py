@@ -67,6 +67,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             current=current,
             warming=_warming(run),
             field=_field(run),
+            voltages=_voltages(run),
             force_uncertainty=scene.bench.magnet.force_uncertainty,
             field_per_ampere=_field_per_ampere(scene),
             newtons_per_tesla=scene.bench.magnet.newtons_per_tesla,
@@ -264,6 +265,16 @@ def _field_per_ampere(scene: Scene) -> float:
     """Slope of the assumed or calibrated field around 0 A, T/A."""
     low, high = scene.bench.magnet.field([-1e-3, 1e-3])
     return float(high - low) / 2e-3
+
+
+def _voltages(run: Run) -> dict[str, NDArray[np.float64]]:
+    """What source meters held, by voltage, shape (n, 2), s and V."""
+    rows = run.voltages
+    return {
+        name.decode(): np.column_stack([mine["time"], mine["measured"]])
+        for name in np.unique(rows["name"])
+        for mine in [rows[rows["name"] == name]]
+    }
 
 
 def _field(run: Run) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from tactile_lab.scene.load import load
 SHIPPED = (
     "hold_10s", "fig5b", "rate_force", "staircase", "repeat", "bipolar", "sine_sweep",
     "threshold_search", "calibrate_field", "force_check", "wiring_check", "monitor",
-    "waveform", "vibration", "texture", "touch",
+    "waveform", "vibration", "texture", "touch", "threshold_trim",
 )  # fmt: skip
 
 

@@ -1,0 +1,271 @@
+"""V_GS trimmed until the critical force is the one wanted, by bisection."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
+from tactile_lab.errors import LimitError, NotIdentifiableError
+from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
+from tactile_lab.quantity import Duration, Pause, Unit, Voltage, show
+from tactile_lab.stimulus.force import pause, step
+from tactile_lab.stimulus.recovery import Recovering
+from tactile_lab.trial import Outcome, Trial, Trials
+
+WantedForce = Annotated[float, Unit("N", above=0.0)]
+Margin = Annotated[float, Unit("N", least=0.0)]
+Width = Annotated[float, Unit("V", above=0.0)]
+
+
+class ThresholdTrim(Recovering):
+    """Find the V_GS at which the sensor begins to fire under just the force wanted.
+
+    Each trial presses with that force at another V_GS, which a source meter of the
+    bench holds: a spike means that V_GS is too high, silence that it is too low. At the
+    end it is pressed a little less and a little more at the V_GS found, as a check.
+    """
+
+    name: ClassVar[str] = "threshold_trim"
+    title: ClassVar[str] = "Trim of V_GS"
+    sets: ClassVar[tuple[str, ...]] = ("V_GS",)
+    needs: ClassVar[tuple[str, ...]] = ("spikes",)
+    as_wired: ClassVar[bool] = True
+
+    wanted: WantedForce = Field(default=0.09, description="Critical force to have")
+    low: Voltage = Field(default=1.38, description="V_GS expected to stay silent")
+    high: Voltage = Field(default=1.45, description="V_GS expected to fire")
+    resolution: Width = Field(default=5e-4, description="Width of V_GS to end with")
+    margin: Margin = Field(
+        default=2e-3, description="Less and more force that checks it; 0 for no check"
+    )
+    ramp: Pause = Field(default=0.25, description="Ramp up and ramp down, each")
+    hold: Duration = Field(default=1.0, description="Time at the force")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> ThresholdTrim:
+        if self.low >= self.high:
+            raise ValueError(
+                f"low {show(self.low, 'V')} must be below high {show(self.high, 'V')}"
+            )
+        if self.margin >= self.wanted:
+            raise ValueError(f"margin must be below wanted, {show(self.wanted, 'N')}")
+        return self
+
+    def presentations(self) -> Trials:
+        """First at `high`, then at `low`, then at halves of what is left; a check.
+
+        Raises:
+            LimitError: it stays silent at `high`, or fires at `low`: between them no
+                V_GS gives the critical force wanted.
+        """
+        wanted, low, high = show(self.wanted, "N"), self.low, self.high
+        outcome = yield self._press(high)
+        if not outcome.spike_times.size:
+            raise LimitError(
+                f"At V_GS = {show(high, 'V', 5)} the sensor stays silent under "
+                f"{wanted}, so its critical force is larger for every V_GS allowed. "
+                "Raise protocol.high, within the source's limits, or want more force."
+            )
+        outcome = yield from self._after_rest(low)
+        if outcome.spike_times.size:
+            raise LimitError(
+                f"At V_GS = {show(low, 'V', 5)} the sensor fires under {wanted}, so "
+                "its critical force is smaller for every V_GS allowed. Lower "
+                "protocol.low, within the source's limits, or want less force."
+            )
+        while high - low > self.resolution * (1 + 1e-9):
+            middle = (low + high) / 2
+            outcome = yield from self._after_rest(middle)
+            fires = outcome.spike_times.size > 0
+            low, high = (low, middle) if fires else (middle, high)
+        if self.margin:
+            found = (low + high) / 2
+            for force in (self.wanted - self.margin, self.wanted + self.margin):
+                yield from self._after_rest(found, force)
+
+    def _after_rest(
+        self, volts: float, force: float | None = None
+    ) -> Generator[Trial, Outcome, Outcome]:
+        """Press at `volts`, V, once the film has forgotten the press before.
+
+        The source is set as the recovery begins, so that the circuit settles in it.
+        """
+        recovery = self.recovery_time(self.wanted + self.margin)
+        yield replace(pause(recovery), voltages={"V_GS": volts})
+        return (yield self._press(volts, force))
+
+    def _press(self, volts: float, force: float | None = None) -> Trial:
+        level = self.wanted if force is None else force
+        pressed = step(level, ramp=self.ramp, hold=self.hold)
+        label = f"{show(level, 'N')} at {show(volts, 'V', 6)}"
+        return replace(pressed, label=label, voltages={"V_GS": volts})
+
+    def conclude(self, run: Measurement) -> Conclusion:
+        """The V_GS found, how well it and the critical force are known, the check."""
+        if not run.searched:
+            return Conclusion(missing=(NOT_SEARCHED,))
+        try:
+            found = self._found(run)
+        except NotIdentifiableError as reason:
+            return Conclusion((), {"V_GS_V": None}, (f"No V_GS found: {reason}.",))
+        return found.conclusion(run, self) + self._check(run, found)
+
+    def plots(self, run: Measurement) -> Iterator[Plot]:
+        """Spikes against V_GS."""
+        pressed = self._pressed(run)
+        if len(pressed) < 2:
+            return
+        volts = np.array([at for at, _ in pressed])
+        spikes = np.array([trial.response.spikes for _, trial in pressed])
+        error = run.source_error("V_GS", float(volts.mean()))
+        bands: tuple[Guide, ...] = ()
+        try:
+            found = self._found(run)
+            bands = (Guide(at=found.silent, to=found.fires),)
+        except NotIdentifiableError:
+            pass  # no band to draw; the conclusion says why
+
+        def points(name: str, mark: Mark, which: NDArray[np.bool_]) -> Series:
+            size = None if error is None else np.full(which.sum(), error)
+            at = volts[which], spikes[which]
+            return Series(x=at[0], y=at[1], name=name, mark=mark, x_error=size)
+
+        series = [points(run.origin, "points", spikes > 0)] if spikes.any() else []
+        if not spikes.all():
+            series.append(points("silent", "open", spikes == 0))
+        yield Plot(
+            name="summary",
+            caption=f"Spikes of each press with {show(self.wanted, 'N')} against V_GS "
+            "as its source was read back, bars: the source's error; open: silent. Grey "
+            "band: the V_GS that gives this critical force lies within.",
+            x_label="V_GS",
+            x_unit="V",
+            x_prefix="",
+            panels=(
+                Panel(
+                    label="Spikes",
+                    prefix="",
+                    series=tuple(series),
+                    guides=bands,
+                    limits=(0, None),
+                ),
+            ),
+        )
+
+    def _pressed(self, run: Measurement) -> list[tuple[float, MeasuredTrial]]:
+        """V_GS as read back, V, and the trial, of each press with the force wanted."""
+        trials = [t for t in run.results if t.level == self.wanted and t.complete]
+        held = [(run.source_read("V_GS", trial), trial) for trial in trials]
+        return [(volts, trial) for volts, trial in held if volts is not None]
+
+    def _found(self, run: Measurement) -> TrimmedGate:
+        pressed = self._pressed(run)
+        silent = [volts for volts, trial in pressed if not trial.response.spikes]
+        fires = [volts for volts, trial in pressed if trial.response.spikes]
+        if not silent or not fires:
+            raise NotIdentifiableError(
+                "it did not both fire and stay silent under the force wanted"
+            )
+        if max(silent) >= min(fires):
+            raise NotIdentifiableError(
+                f"it fired at {show(min(fires), 'V', 6)} and was silent at "
+                f"{show(max(silent), 'V', 6)}: V_GS, temperature or the film drifted "
+                "meanwhile, or noise decides; repeat it, or allow a coarser resolution"
+            )
+        return TrimmedGate(max(silent), min(fires))
+
+    def _check(self, run: Measurement, found: TrimmedGate) -> Conclusion:
+        """Whether a little less force leaves it silent and a little more fires it."""
+        less, more = (
+            _spikes(run.results, self.wanted + sign * self.margin) for sign in (-1, 1)
+        )
+        if not self.margin or less is None or more is None:
+            return Conclusion(values={"checked": None})
+        good = less == 0 and more > 0
+        below, above = (show(self.wanted + sign * self.margin, "N") for sign in (-1, 1))
+        told = (
+            f"Checked at {show(found.middle, 'V', 6)}: {below} gives "
+            f"{less or 'no'} spikes, {above} {more or 'none'}"
+        )
+        if good:
+            return Conclusion((told + ".",), {"checked": True})
+        return Conclusion(
+            (),
+            {"checked": False},
+            (
+                f"{told}: the critical force is not within {show(self.margin, 'N')} of "
+                f"{show(self.wanted, 'N')}. Something drifted meanwhile; repeat it.",
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class TrimmedGate:
+    """The V_GS wanted lies between these two, V, as the source was read back."""
+
+    silent: float
+    fires: float
+
+    @property
+    def middle(self) -> float:
+        """Middle of the bracket, V."""
+        return (self.silent + self.fires) / 2
+
+    @property
+    def half(self) -> float:
+        """Half the bracket, V."""
+        return (self.fires - self.silent) / 2
+
+    def conclusion(self, run: Measurement, asked: ThresholdTrim) -> Conclusion:
+        """What it means, in sentences and values."""
+        wanted = asked.wanted
+        values: dict[str, float | None] = {
+            "V_GS_V": self.middle,
+            "V_GS_half_width_V": self.half,
+            "critical_force_N": wanted,
+        }
+        sentences = [
+            f"V_GS = {show(self.middle, 'V', 6)} ± {show(self.half, 'V', 2)}, as its "
+            f"source reads it, puts the critical force at {show(wanted, 'N')} for a "
+            f"ramp of {asked.ramp:g} s and a hold of {asked.hold:g} s: silent at "
+            f"{show(self.silent, 'V', 6)}, fires at {show(self.fires, 'V', 6)}. To use "
+            f'it, write [sensor] V_GS = "{self.middle:.5f} V" and sourced = ["V_GS"].'
+        ]
+        error = run.source_error("V_GS", self.middle)
+        values["V_GS_uncertainty_V"] = whole = (
+            None if error is None else math.hypot(self.half, error)
+        )
+        if whole is not None:
+            sentences.append(
+                f"By another voltmeter it is known to ±{show(whole, 'V', 2)}: the "
+                "bound that the source's maker gives for its reading is in it."
+            )
+        if run.circuit is not None:
+            left = self.half / abs(run.circuit.k_F)
+            values["critical_force_half_width_N"] = left
+            known = run.uncertain(wanted)
+            told = f"The critical force is within ±{show(left, 'N', 2)} of that"
+            if known is None:
+                sentences += [f"{told} (k_F of Eqs. (3)-(6)).", NOT_STATED]
+            else:
+                both = math.hypot(left, known)
+                values["critical_force_uncertainty_N_95"] = both
+                sentences.append(
+                    f"{told} (k_F of Eqs. (3)-(6)); with the calibration's "
+                    f"uncertainty ±{show(both, 'N', 2)} (95 %)."
+                )
+        return Conclusion(tuple(sentences), values)
+
+
+def _spikes(trials: Sequence[MeasuredTrial], level: float) -> int | None:
+    """Spikes of the press with that force, N; None where there was none."""
+    at = [t.response.spikes for t in trials if t.level == level and t.complete]
+    return at[0] if at else None
