@@ -86,6 +86,7 @@ class Window(QMainWindow):
             session, self.preferences, self.screen_, self.centre.stack
         )
         self.spikes = SpikeTools(self.review.spikes, self.centre.stack, session)
+        self.review.noise.follow(session)
         CursorStatistics(self.centre.stack, session)
         self._leaving = False
         self._connect()

@@ -55,7 +55,8 @@ PANELS = (
         "Monitor",
         "Between runs: V_C1, V_C2, the rate and the distance to the threshold with the "
         "coil off, for trimming V_GS by hand. Record keeps what was seen, up to the "
-        "last 60 s, as a run.",
+        "last 60 s, as a run. Results shows the noise meanwhile: its density, its rms "
+        "value, and what the mains put into it, of 50 or 60 Hz and their multiples.",
     ),
     (
         "Steps and log",

@@ -58,6 +58,14 @@ class Line(pg.InfiniteLine):  # type: ignore[misc]
     paint = guarded(pg.InfiniteLine.paint)
 
 
+def _power(value: float) -> str:
+    """10 to the power of `value`, which is a digit and zeros, as people write it."""
+    ten = math.floor(value + 1e-9)
+    if -3 <= ten <= 3:
+        return f"{10**value:.{max(0, -ten)}f}"
+    return f"{10 ** (value - ten):.0f}e{ten}".replace("-", "−")
+
+
 class RoundAxis(pg.AxisItem):  # type: ignore[misc]
     """Numbers at 1-2-5 steps, so many that they can be read; a grid if asked for.
 
@@ -80,11 +88,18 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
         self.setTickPen(tokens.grid)
 
     def tickValues(self, low: float, high: float, size: float) -> Any:
-        """The step, and the round values in [low, high]; powers where logarithmic."""
+        """The step, and the round values in [low, high]; powers where logarithmic.
+
+        Where less than two powers are in it, their multiples by 2 and 5, too.
+        """
         if self.logMode:
-            return [
-                (1.0, list(range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)))
-            ]
+            tens = range(math.floor(low) - 1, math.ceil(high) + 1)
+            for among in ((1,), (1, 2, 5), range(1, 10)):
+                all_ = [ten + math.log10(k) for ten in tens for k in among]
+                found = [v for v in all_ if low - 1e-9 <= v <= high + 1e-9]
+                if len(found) > 1:
+                    break
+            return [(1.0, found)]
         step, found = value_ticks(low, high, max(2, int(size / self._apart)))
         if step < self._least:
             step, found = 1.0, [*range(math.ceil(low), math.floor(high) + 1)]
@@ -95,7 +110,7 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:
         """The numbers, with a true minus."""
         if self.logMode:
-            return [f"1e{value:.0f}".replace("-", "−") for value in values]
+            return [_power(value) for value in values]
         return [number(value, decimals(spacing)) for value in values]
 
     def boundingRect(self) -> QRectF:

@@ -21,6 +21,7 @@ from gui.parts import (
     with_gutter,
 )
 from gui.review.manual import ManualView
+from gui.review.noise_view import NoiseView
 from gui.review.results import ResultsView
 from gui.review.runs import RunsView
 from gui.review.spikes import SpikesView
@@ -38,6 +39,10 @@ class ReviewPanel(QFrame):
         self.runs = RunsView(theme)
         self.manual = ManualView(theme)
         self.spikes = SpikesView(theme)
+        self.noise = NoiseView(theme)
+        self._first = QStackedWidget()
+        self._first.addWidget(self.results)
+        self._first.addWidget(self.noise)
         self.export = IconButton(theme, "folder", "Open the run's folder")
         self.help = IconButton(theme, "help", "Help on this panel")
         manual = with_gutter(scrolling(self.manual), self.manual.rows)
@@ -45,7 +50,7 @@ class ReviewPanel(QFrame):
         self._tabs = QButtonGroup(self)
         head = row(spacing=2)
         pages = {
-            "Results": self.results,
+            "Results": self._first,
             "Runs": self.runs,
             "Manual": manual,
             "Spikes": self.spikes,
@@ -70,6 +75,10 @@ class ReviewPanel(QFrame):
     def tab(self) -> int:
         """Number of the tab shown."""
         return self._pages.currentIndex()
+
+    def show_monitor(self, *, on: bool) -> None:
+        """Show the noise of what is monitored in place of results, or no longer."""
+        self._first.setCurrentWidget(self.noise if on else self.results)
 
     def show_tab(self, number: int) -> None:
         """0 Results, 1 Runs, 2 Manual, 3 Spikes."""

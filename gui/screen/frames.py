@@ -97,6 +97,7 @@ class Frames(QObject):
         elif bar.isVisible():
             bar.hide()
         panels.centre.tools.show_monitor(on=monitor.alive)
+        panels.review.show_monitor(on=monitor.alive)
 
     def _keep_budget(self, cost: float) -> None:
         self.costs.append(cost)

@@ -24,9 +24,11 @@ from tactile_lab.lab import lab
 from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
+    from tactile_lab.analysis.noise import Noise
     from tactile_lab.bench import Bench, OffReport
     from tactile_lab.engine.manual import FieldReading
     from tactile_lab.engine.model_parts import StoredParts
+    from tactile_lab.engine.monitor import Monitor
     from tactile_lab.scene.scene import Scene
     from tactile_lab.store.spike_shapes import SpikeShapes
     from tactile_lab.store.statistics import Statistics
@@ -125,13 +127,12 @@ def read_field(engine: Engine, request: Request, task: int) -> FieldReading:
 
 def record(engine: Engine, task: int, out: Path, notes: Mapping[str, str]) -> Path:
     """Keep what the monitor `task` holds, the last minute, as a run in `out`."""
-    from tactile_lab.engine.monitor import Monitor
+    return _monitor(engine, task).record(out, notes)
 
-    held = engine.tasks.get(task)
-    monitor = None if held is None else held.task
-    if not isinstance(monitor, Monitor):
-        raise RecordingError("Nothing has been seen yet.")
-    return monitor.record(out, notes)
+
+def noise_of_monitor(engine: Engine, task: int, signal: str) -> Noise:
+    """The noise of a signal in the last seconds that the monitor `task` holds."""
+    return _monitor(engine, task).noise(signal)
 
 
 def recover_run(engine: Engine, folder: Path) -> str:
@@ -231,6 +232,16 @@ def _stored(folder: Path) -> StoredParts:
     from tactile_lab.engine.model_parts import StoredParts
 
     return StoredParts(folder)
+
+
+def _monitor(engine: Engine, task: int) -> Monitor:
+    from tactile_lab.engine.monitor import Monitor
+
+    held = engine.tasks.get(task)
+    monitor = None if held is None else held.task
+    if not isinstance(monitor, Monitor):
+        raise RecordingError("Nothing has been seen yet.")
+    return monitor
 
 
 def _open(scene: Scene, *, realtime: bool) -> Bench:

@@ -21,13 +21,14 @@ from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import Bench
+from tactile_lab.analysis.noise import Noise, noise
+from tactile_lab.bench import Bench, Block
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
 from tactile_lab.engine.task import Task
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import RecordingError, SceneError
 from tactile_lab.planning.plan import plan
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
@@ -39,6 +40,8 @@ from tactile_lab.waveform import Waveform
 
 MOST = 1_000_000_000
 """Bytes that may be held."""
+HEARD = 4.0
+"""Length of the record that the noise is told from, s."""
 LOOK = 0.5
 """Length of the record that the sensor's state is told from, s."""
 
@@ -144,6 +147,31 @@ class Monitor(Task[Ending]):
             self._write(folder, held)
             write_certificate(folder.path)
         return folder.path
+
+    def noise(self, signal: str) -> Noise:
+        """The noise of a channel in the last seconds, from any thread.
+
+        Of a scope with gaps between its records: in the last record.
+
+        Raises:
+            RecordingError: nothing has been streamed yet, or the channel is not.
+            NotIdentifiableError: it was too short.
+        """
+        held = self._ring.held()
+        stream = held.stream
+        names = [channel.signal for channel in stream.channels]
+        if signal not in names:
+            raise RecordingError(f"{signal} is not monitored; {', '.join(names)} are.")
+        row, most = names.index(signal), round(HEARD / stream.interval)
+        parts: list[Block] = []
+        for block in reversed(held.blocks):
+            whole = not parts or block.first + block.samples == parts[-1].first
+            if not whole or sum(part.samples for part in parts) >= most:
+                break
+            parts.append(block)
+        codes = np.concatenate([part.codes[row] for part in reversed(parts)])[-most:]
+        gain, offset = stream.volts_per_code(row)
+        return noise(gain * codes + offset, stream.interval)
 
     def _write(self, folder: RunFolder, held: Held) -> None:
         recorder = Recorder(

@@ -135,3 +135,24 @@ def test_a_scope_that_polls_is_watched_and_kept_with_its_gaps(tmp_path):
         assert 0.2 < proof.covered < 0.99 * proof.streamed
         assert proof.streamed == pytest.approx(run.duration, abs=0.01)
     assert verify(folder).sound
+
+
+def test_noise_tells_hum_as_the_bench_puts_it_in():
+    scene = load(
+        "monitor",
+        (
+            "protocol.duration=3 s",
+            "record.sample_rate=20 kS/s",
+            "simulated.hum=5 mV",
+        ),
+    )
+    monitor = Monitor(scene)
+    with pytest.raises(RecordingError, match="no sample"):
+        monitor.noise("V_C1")
+    monitor.run()
+    found = monitor.noise("V_C1")
+    sizes = {line.frequency: line.rms for line in found.lines if line.mains == 50}
+    assert sizes[50.0] == pytest.approx(5e-3 / np.sqrt(2), rel=0.1)
+    assert found.rms >= sizes[50.0]
+    with pytest.raises(RecordingError, match="V_X is not monitored"):
+        monitor.noise("V_X")

@@ -144,3 +144,19 @@ def test_every_mark_is_drawn(app):
         )
         image = view.grab().toImage()
         assert view.panels[1].box.addedItems and not image.isNull(), mark
+
+
+@pytest.mark.parametrize(
+    "low, high, told",
+    [
+        (1.0, 1e5, ["1", "10", "100", "1000", "1e4", "1e5"]),
+        (2e-6, 3e-5, ["2e−6", "5e−6", "1e−5", "2e−5"]),
+        (3.2, 4.7, ["4"]),
+        (0.03, 0.07, ["0.03", "0.04", "0.05", "0.06", "0.07"]),
+    ],
+)
+def test_a_logarithmic_axis_of_less_than_two_powers_has_numbers(app, low, high, told):
+    axis = RoundAxis("left", 26)
+    axis.logMode = True
+    ((step, values),) = axis.tickValues(np.log10(low), np.log10(high), 200)
+    assert axis.tickStrings(values, 1.0, step) == told
