@@ -89,8 +89,17 @@ def carry_out_attended(
         TactileLabError: it cannot be carried out, or not to its end.
     """
     from tactile_lab.studies.carry_out import carry_out
-    from tactile_lab.studies.page import write_page
+    from tactile_lab.studies.page import REPORT, told_before, write_page
 
+    folder = out / study.name
+    if (told := told_before(study, folder)) is not None:
+        text = told.pop("text")
+        if as_json:
+            print_json({"study": str(folder), **told})
+        else:
+            say(f"Nothing to do: all points are known ({study.design.size:,}).")
+            _say_all(text, folder, folder / REPORT)
+        return
     with ProgressLine(study.design.size, study.name) as line:
 
         def tell(progress: Progress) -> None:
@@ -103,16 +112,20 @@ def carry_out_attended(
             fail("interrupted; the same command goes on where it was.", 130)
             return
     with working("writing the report"):
-        html, said = write_page(found, out / study.name)
+        html, said = write_page(found, folder)
     for text in said.missing:
         warn(text)
     if as_json:
-        print_json({"study": str(out / study.name), **said.plain})
+        print_json({"study": str(folder), **said.plain})
         return
-    say(said.text)
+    _say_all(said.text, folder, html)
+
+
+def _say_all(text: str, folder: Path, report: Path) -> None:
+    say(text)
     say()
-    say(f"data    {out / study.name / 'data.zarr'}")
-    say(f"report  {html}")
+    say(f"data    {folder / 'data.zarr'}")
+    say(f"report  {report}")
 
 
 def _now(progress: Progress) -> str:

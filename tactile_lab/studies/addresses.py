@@ -129,6 +129,21 @@ def addresses(study: Study) -> NDArray[np.void]:
     return found
 
 
+def study_digest(study: Study) -> str:
+    """What tells a study's results from any other's; made without its addresses."""
+    design = study.design
+    axes = Axes(design.axes, study.scene)
+    others: set[tuple[Any, ...]] = {()}
+    if axes.others:
+        columns = design.columns(np.arange(design.size))
+        others = {group.others for group in axes.groups(columns, design.size)}
+    told = [design, study.title, study.require, study.kept, sorted(axes.sensor.items())]
+    found = hashlib.blake2b(repr(told).encode(), digest_size=ADDRESS)
+    for digest in sorted(_digest(study, axes, values) for values in others):
+        found.update(digest)
+    return found.hexdigest()
+
+
 def seeds_of(study: Study, repeats: NDArray[np.intp]) -> NDArray[np.int64]:
     """Seeds of the simulated bench's noise; 0 where nothing is random."""
     if study.on == "model":

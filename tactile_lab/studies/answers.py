@@ -21,6 +21,8 @@ FloatArray = NDArray[np.float64]
 
 CURVES = 8
 """Most curves in one panel."""
+DOTS = 3000
+"""Most dots in one panel."""
 RESAMPLES = 200
 """Of the bootstrap behind the intervals of Sobol indices."""
 
@@ -152,16 +154,23 @@ def _scatter(found: Gathered, axis: Axis, number: int) -> Plot:
     for name, column in found.numbers().items():
         moved = np.moveaxis(column, along, -1)
         x = np.broadcast_to(np.array(drawn), moved.shape).ravel()
-        dots = Series(x=x, y=moved.ravel(), mark="dots")
+        step = math.ceil(x.size / DOTS)
+        dots = Series(x=x[::step], y=moved.ravel()[::step], mark="dots")
         panels.append(Panel(label=name, unit=found.unit(name), series=(dots,)))
     return Plot(
         name=f"draws_{number}",
         title=f"draws of {axis.key}",
-        caption=f"Each point against its {axis.key}; all other axes vary as well.",
+        caption=f"{_each(design.size)} against its {axis.key}; all other axes vary as "
+        "well.",
         x_label=axis.key,
         x_unit=axis.unit,
         panels=tuple(panels),
     )
+
+
+def _each(size: int) -> str:
+    step = math.ceil(size / DOTS)
+    return "Each point" if step == 1 else f"One point in {step}"
 
 
 def _yield(found: Gathered) -> tuple[int, Estimate]:

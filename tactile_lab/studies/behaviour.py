@@ -18,7 +18,7 @@ from tactile_lab.model.batch import (
 )
 from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit, FloatArray
 from tactile_lab.spikes.trains import Trains
-from tactile_lab.studies.specification import Specification
+from tactile_lab.studies.specification import Silence, Specification
 from tactile_lab.waveform import Waveform
 
 RAMP = 0.01
@@ -43,8 +43,7 @@ class Behaviour:
     Attributes:
         threshold: the least force that makes it spike, N; NaN where none does.
         rate: mean rate of the first second, Hz; NaN below two spikes.
-        silence: time from the push to the last spike, s; NaN without spikes, and the
-            whole push where it still fires at the end.
+        silence: time from the push to the last spike, s; NaN without spikes.
         headroom: V_C1 above V_fire - 0.5 V at the strongest force, V.
         critical: force that would just keep it firing if the film did not leak, N.
     """
@@ -72,7 +71,7 @@ def behaviour(asked: Specification, changes: Mapping[str, FloatArray]) -> Behavi
         trains = _pushed(circuit, changes, wants.rate.force, FIRST)
         rate = trains.mean_rate
     if wants.silence is not None:
-        hold = 2 * wants.silence.value * (1 + wants.silence.within)
+        hold = silence_hold(circuit, wants.silence)
         silence = _pushed(circuit, changes, wants.silence.force, hold).last
     if wants.unsaturated is not None:
         gate = changes.get("V_GS", np.full(size, circuit.V_GS))
@@ -82,6 +81,15 @@ def behaviour(asked: Specification, changes: Mapping[str, FloatArray]) -> Behavi
         headroom = rests(circuit, many) - floor  # a leaking film pulls less than that
     critical = critical_forces(circuit, records(circuit, changes))
     return Behaviour(threshold, rate, silence, headroom, critical)
+
+
+def silence_hold(circuit: Circuit, want: Silence) -> float:
+    """How long a push is looked at for its last spike, s.
+
+    Until the film has lost all but a 400th of it: what has no threshold below that
+    stays silent from then on.
+    """
+    return 2 * want.value * (1 + want.within) + 6 * circuit.tau
 
 
 def thresholds(circuit: Circuit, changes: Mapping[str, FloatArray]) -> FloatArray:

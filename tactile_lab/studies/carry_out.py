@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.planning.plan import plan
 from tactile_lab.studies.addresses import addresses
-from tactile_lab.studies.dataset import Gathered, gathered, write
+from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
 from tactile_lab.studies.points import Points, Task
 from tactile_lab.studies.shelf import Batch, Shelf
 from tactile_lab.studies.study import Study
@@ -133,7 +133,8 @@ def carry_out(
                 done, failed = done + size, failed + len(batch.reasons)
                 tell(Progress(done, study.design.size, there, failed, crew.count))
     found = gathered(study, shelf, shelf.find(named))
-    write(found, out / study.name)
+    if missing.size or not is_written(study, out / study.name):
+        write(found, out / study.name)
     return found
 
 

@@ -14,7 +14,13 @@ from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit, FloatArray
 from tactile_lab.model.simulate import simulate
 from tactile_lab.quantity import show
 from tactile_lab.spikes.trains import Trains
-from tactile_lab.studies.behaviour import FIRST, RAMP, THRESHOLD_HOLD, push
+from tactile_lab.studies.behaviour import (
+    FIRST,
+    RAMP,
+    THRESHOLD_HOLD,
+    push,
+    silence_hold,
+)
 from tactile_lab.studies.specification import Specification, Wants
 
 
@@ -139,7 +145,7 @@ def checks_of(wants: Wants, circuit: Circuit) -> Iterator[Check]:
         name = f"rate at {show(rated.force, 'N')}"
         yield _check(name, rated.value, rated.within, rate, "Hz")
     if (quiet := wants.silence) is not None:
-        spikes = _spikes(circuit, quiet.force, 2 * quiet.value * (1 + quiet.within))
+        spikes = _spikes(circuit, quiet.force, silence_hold(circuit, quiet))
         last = float(spikes[-1]) if spikes.size else math.nan
         name = f"silence at {show(quiet.force, 'N')}"
         yield _check(name, quiet.value, quiet.within, last, "s")

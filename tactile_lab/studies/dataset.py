@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.column import Column, Rows
 from tactile_lab.studies.shelf import Places, Shelf
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     import xarray
 
 DATA = "data.zarr"
+MADE_OF = "made_of"
+"""Attribute that tells of which study a data set is; see `study_digest`."""
 FloatArray = NDArray[np.float64]
 
 
@@ -89,6 +93,7 @@ class Gathered:
             "title": self.study.title,
             "study": tomli_w.dumps(_plain(self.study.source)),
             "scene": self.study.scene.to_toml(),
+            MADE_OF: study_digest(self.study),
         }
         return xarray.Dataset(variables, coordinates, about)
 
@@ -96,6 +101,15 @@ class Gathered:
 def gathered(study: Study, shelf: Shelf, places: Places) -> Gathered:
     """All points of a study that has been computed."""
     return Gathered(study, *shelf.gather(places, [one.name for one in study.kept]))
+
+
+def is_written(study: Study, folder: Path) -> bool:
+    """Whether `folder` holds the data set of this very study."""
+    try:
+        about = json.loads((folder / DATA / ".zattrs").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return bool(about.get(MADE_OF) == study_digest(study))
 
 
 def write(found: Gathered, folder: Path) -> None:

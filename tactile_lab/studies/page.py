@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.quantity import show
-from tactile_lab.report.canvas import draw, save
-from tactile_lab.report.html import picture, rendered
-from tactile_lab.studies.answers import conclude, plots
+from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
-from tactile_lab.studies.dataset import Gathered
+from tactile_lab.studies.dataset import MADE_OF, Gathered, is_written
+from tactile_lab.studies.study import Study
 
+RESULTS, REPORT = "results.json", "report.html"
 MARKS = {"model": "Circuit model", "simulated": "Simulated bench", "bench": "Measured"}
 
 
@@ -26,9 +27,12 @@ def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     Raises:
         OSError: the folder cannot be written.
     """
+    # heavy, and a study that is finished needs neither
+    from tactile_lab.report.canvas import draw, save
+    from tactile_lab.report.html import picture, rendered
+    from tactile_lab.studies.answers import conclude, plots
+
     study, said = found.study, conclude(found)
-    results = json.dumps(said.plain, indent=2, allow_nan=False)
-    (folder / "results.json").write_text(results + "\n", encoding="utf-8")
     subtitle = f"{study.scene.name} · {' × '.join(map(str, study.design.shape)) or 1}"
     pictures = []
     for plot in plots(found):
@@ -55,9 +59,23 @@ def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
         none="none",
         made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
     )
-    html = folder / "report.html"
+    html = folder / REPORT
     html.write_text(text, encoding="utf-8")
+    # last, for `told_before`
+    results = {MADE_OF: study_digest(study), "text": said.text, **said.plain}
+    whole = json.dumps(results, indent=2, allow_nan=False)
+    (folder / RESULTS).write_text(whole + "\n", encoding="utf-8")
     return html, said
+
+
+def told_before(study: Study, folder: Path) -> dict[str, Any] | None:
+    """results.json of this very study where all its files are there; else None."""
+    try:
+        told: dict[str, Any] = json.loads((folder / RESULTS).read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+    whole = (folder / REPORT).is_file() and is_written(study, folder)
+    return told if whole and told.get(MADE_OF) == study_digest(study) else None
 
 
 def described(axis: Axis) -> str:

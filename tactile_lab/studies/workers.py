@@ -18,6 +18,9 @@ from concurrent.futures import (
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
+from multiprocessing import parent_process
+from multiprocessing.connection import wait as wait_for
+from threading import Thread
 from typing import Any, Protocol
 
 from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
@@ -171,7 +174,19 @@ def workers(
         yield Alone(points)
     else:
         count = count or os.cpu_count() or 1
-        yield Pool(lambda: ProcessPoolExecutor(count), study, count)
+        yield Pool(lambda: _processes(count), study, count)
+
+
+def _processes(count: int) -> Executor:
+    return ProcessPoolExecutor(count, initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """Let this process end when the one that began it is killed."""
+    parent = parent_process()
+    if parent is not None:
+        sentinel = parent.sentinel
+        Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
 
 
 @contextmanager

@@ -96,7 +96,7 @@ def good(chosen: Chosen, circuit: Circuit) -> bool:
         if abs(found / rate.value - 1) > rate.within:
             return False
     if (quiet := wants.silence) is not None:
-        spikes = _spikes(circuit, quiet.force, 2.5 * quiet.value)
+        spikes = _spikes(circuit, quiet.force, 2.5 * quiet.value + 80.0)
         if not spikes.size or abs(spikes[-1] / quiet.value - 1) > quiet.within:
             return False
     if (held := wants.unsaturated) is not None:

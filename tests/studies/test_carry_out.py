@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from tactile_lab import simulate, study
+from tactile_lab.cli import cli
 from tactile_lab.errors import NotFoundError, SceneError
 from tactile_lab.studies.carry_out import Progress, carry_out, forecast
 from tactile_lab.studies.dataset import Gathered
@@ -75,6 +77,32 @@ def test_what_is_known_is_not_computed_again(tmp_path: Path) -> None:
     more = {**LEVELS, "axis": [wider, LEVELS["axis"][1]]}
     _, told = done(load_study(more, "another"), tmp_path)
     assert (told[0].there, told[-1].done) == (15, 20)
+
+
+def test_a_finished_study_is_not_written_again(tmp_path: Path) -> None:
+    file = tmp_path / "one.toml"
+    (tmp_path / "mine.py").write_text("def f(result):\n    return 1.0\n")
+    file.write_text('scene = "demo"\n[keep]\none = "mine.py:f"\n')
+    arguments = ["study", str(file), "--out", str(tmp_path), "--workers", "1"]
+    written = tmp_path / "one" / "data.zarr" / ".zattrs", tmp_path / "one/report.html"
+
+    def again() -> tuple[str, list[int]]:
+        said = CliRunner().invoke(cli, arguments)
+        assert said.exit_code == 0, said.output
+        return said.stdout, [path.stat().st_mtime_ns for path in written]
+
+    first, before = again()
+    assert "Nothing to do" not in first
+    second, after = again()
+    assert second.startswith("Nothing to do: all points are known (1).\n")
+    assert second.partition("\n")[2] == first and after == before
+    study(file, out=tmp_path, workers=1)
+    assert again()[1] == before
+    (tmp_path / "mine.py").write_text("def f(result):\n    return 2.0\n")
+    third, after = again()
+    assert "Nothing to do" not in third and all(map(int.__lt__, before, after))
+    written[1].unlink()
+    assert "Nothing to do" not in again()[0]
 
 
 def test_points_are_shared_whichever_key_varies(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from click.testing import CliRunner
 from tactile_lab import Circuit, simulate
 from tactile_lab.cli import cli
 from tactile_lab.errors import SceneError
-from tactile_lab.studies.behaviour import push, thresholds
-from tactile_lab.studies.chosen import threshold_of
+from tactile_lab.studies.behaviour import behaviour, push, thresholds
+from tactile_lab.studies.chosen import checks_of, threshold_of
 from tactile_lab.studies.parts import choose
 from tactile_lab.studies.specification import E96, load_specification
 
@@ -30,6 +30,19 @@ def test_thresholds_of_many_are_those_of_each() -> None:
         assert force == pytest.approx(alone, rel=4e-3)
         spikes = simulate(Circuit(V_GS=bias), push(3.0, 0.99 * alone)).spike_times
         assert len(spikes) == 0
+
+
+def test_silence_is_of_the_last_spike_however_long_after() -> None:
+    """A slow integrator that fires after 2 s, and once more long after."""
+    parts = {"R1": 15.8e6, "R_L": 825e6, "C1": 110e-12, "C2": 820e-12, "V_GS": 1.169}
+    want = {"silence": {"force": "50 mN", "is": "2 s"}}
+    asked = load_specification({"want": want})
+    changes = {name: np.array([value]) for name, value in parts.items()}
+    later = simulate(Circuit(**parts), push(100.0, 0.05)).spike_times
+    assert later[-1] > 4.4
+    assert behaviour(asked, changes).silence[0] == pytest.approx(later[-1], abs=1e-6)
+    (check,) = checks_of(asked.wants, Circuit(**parts))
+    assert not check.met
 
 
 def test_a_wanted_threshold_is_had_with_parts_that_are_sold() -> None:
