@@ -58,6 +58,7 @@ reports: $(DEV_STAMP)
 	$(BIN)/python docs/make_paper.py
 	$(BIN)/python tests/benchmarks/surprises.py --out docs/surprise-figures.md
 	$(BIN)/python tests/benchmarks/protocol_speed.py --out docs/protocol-figures.md
+	$(BIN)/python tests/benchmarks/plan_cost.py --out docs/plan-figures.md
 	$(BIN)/python tests/benchmarks/spike_detection.py --out docs/detection-figures.md
 	$(BIN)/python tests/benchmarks/store_speed.py --out docs/store-figures.md
 	$(BIN)/python tests/benchmarks/kill_store.py --kills 200 --out docs/kill-figures.md
