@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_lab.plot import Guide, Panel, Plot, Series, y_scale
 from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
+from tactile_lab.store.folder import replacing
 
 FloatArray = NDArray[np.float64]
 
@@ -346,9 +347,12 @@ def save(figure: Figure, stem: Path, *, pdf: bool = False) -> tuple[Path, str]:
     """
     png, buffer = stem.with_suffix(".png"), io.StringIO()
     with rc_context(STYLE):
-        figure.savefig(png, dpi=160, pil_kwargs={"compress_level": 3})
+        with replacing(png) as new:
+            figure.savefig(new, dpi=160, pil_kwargs={"compress_level": 3})
         if pdf:
-            figure.savefig(stem.with_suffix(".pdf"))
+            with replacing(stem.with_suffix(".pdf")) as new:
+                figure.savefig(new)
         figure.savefig(buffer, format="svg", metadata={"Date": None})
-    stem.with_suffix(".svg").write_text(buffer.getvalue(), encoding="utf-8")
+    with replacing(stem.with_suffix(".svg")) as new:
+        new.write_text(buffer.getvalue(), encoding="utf-8")
     return png, buffer.getvalue()

@@ -12,6 +12,7 @@ from tactile_lab.report.findings import Findings, find
 from tactile_lab.report.page import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
+from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, counted, nothing, share
 
 FOUND = 0.3
@@ -58,7 +59,8 @@ def write(
     progress(FOUND)
     results = folder / "results.json"
     # the numbers first: they survive if drawing should fail
-    results.write_text(as_json(findings), encoding="utf-8")
+    with replacing(results) as new:
+        new.write_text(as_json(findings), encoding="utf-8")
     _keep(folder, findings.conclusion.files)
     pictures = []
     plots = findings.plots
@@ -73,7 +75,8 @@ def write(
             said = f"No plot {plot.name!r}: it cannot be drawn ({error})"
             findings = replace(findings, missing=(*findings.missing, said))
     html = folder / "report.html"
-    html.write_text(page(findings, pictures), encoding="utf-8")
+    with replacing(html) as new:
+        new.write_text(page(findings, pictures), encoding="utf-8")
     return Report(
         findings=findings,
         png=folder / "figure.png",
@@ -87,9 +90,8 @@ def _keep(folder: Path, files: Mapping[str, str]) -> None:
     """Write files that are never changed; one that is there already stays."""
     for name, text in files.items():
         path = folder / Path(name).name
-        try:
-            with path.open("x", encoding="utf-8") as file:
-                file.write(text)
-            path.chmod(0o444)
-        except FileExistsError:
+        if path.exists():
             continue
+        with replacing(path) as new:
+            new.write_text(text, encoding="utf-8")
+            new.chmod(0o444)

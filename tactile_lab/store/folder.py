@@ -198,6 +198,28 @@ def check_space(path: Path, needed: int) -> None:
         )
 
 
+@contextmanager
+def replacing(path: Path, size: int = 0) -> Iterator[Path]:
+    """A new file to write, which takes the place of `path` once it is whole.
+
+    Args:
+        path: what it will be called; its folder is made.
+        size: about how many bytes it will take.
+
+    Raises:
+        RecordingError: that many are not free.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    check_space(path.parent, size)
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    part.unlink(missing_ok=True)  # of one that was killed
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def is_live(path: Path) -> bool:
     """Whether a process still writes the run in folder `path`."""
     try:

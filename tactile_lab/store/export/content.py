@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import derivable, derivation
-from tactile_lab.store.folder import SCENE, check_space
+from tactile_lab.store.folder import SCENE
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
@@ -147,24 +144,3 @@ def compressed_size(run: Run, selection: Selection) -> int:
 def unit(name: str) -> str:
     """SI unit of a signal; V where it is none this program knows."""
     return SIGNALS[name].unit if name in SIGNALS else "V"
-
-
-@contextmanager
-def replacing(path: Path, size: int) -> Iterator[Path]:
-    """A new file to write, which takes the place of `path` once it is whole.
-
-    Args:
-        path: what it will be called; its folder is made.
-        size: about how many bytes it will take.
-
-    Raises:
-        RecordingError: that many are not free.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    check_space(path.parent, size)
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        yield part
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

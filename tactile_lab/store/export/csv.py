@@ -12,7 +12,6 @@ from tactile_lab.store.export.content import (
     UNITS,
     Table,
     about,
-    replacing,
     tables,
     unit,
 )
@@ -25,6 +24,7 @@ from tactile_lab.store.export.lines import (
     steps,
     written,
 )
+from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection

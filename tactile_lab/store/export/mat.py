@@ -13,10 +13,10 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export.content import (
     Table,
     about,
-    replacing,
     tables,
     unit,
 )
+from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection

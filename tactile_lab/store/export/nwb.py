@@ -14,9 +14,9 @@ from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivation
 from tactile_lab.store.export.content import (
     about,
-    replacing,
     tables,
 )
+from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection

@@ -12,10 +12,10 @@ from tactile_lab.store.export.content import (
     UNITS,
     about,
     compressed_size,
-    replacing,
     tables,
     unit,
 )
+from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection

@@ -15,7 +15,7 @@ from typing import Any
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.export.content import replacing
+from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
