@@ -23,6 +23,7 @@ VERBS = {
     "simulate": "The model alone, no bench: spikes, error estimate, run time.",
     "study": "One scene at many points, on every core; goes on where it was.",
     "design": "Parts for a wanted threshold, rate or silence, with their yield.",
+    "skin": "An array of sensors under a load: events, a film of them.",
     "validate": "The model's solver: error against run time, honesty, stability.",
     "devices": "What is attached, what answers there, which dialect row fits.",
     "doctor": "Environment, drivers, permissions, timing, disk; each with its remedy.",

@@ -154,6 +154,55 @@ def appended(whole: FloatArray, size: int, part: FloatArray, more: int) -> Float
     return whole
 
 
+@inner
+def numbers_of(c: Any, direct: bool, par: FloatArray) -> float:
+    """Fill `par` with a record's numbers, and give its k_F, V/N."""
+    _fill(c, _decay(c), _critical_V_C1(c, direct), direct, par)
+    return float(_per_newton(c))
+
+
+@inner
+def train(
+    c: Any,
+    k_F: float,
+    begin: FloatArray,
+    time: FloatArray,
+    force: FloatArray,
+    until: float,
+    tolerance: float,
+    keep_times: bool,
+    most: float,
+    par: FloatArray,
+    node: FloatArray,
+    S: FloatArray,
+    counts: Any,
+) -> Any:
+    """One record's spikes; `begin` holds V_P, V_C1, V_C2 or NaN for the equilibrium.
+
+    Returns:
+        The kernel's status, and spike times, of which `S` tells the number.
+    """
+    V_P, y, v = begin[0], begin[1], begin[2]
+    if not V_P == V_P:
+        V_P = 0.0
+        y, v = rest_of_cascade(par)
+        if v >= c.fire_voltage:
+            v = c.reset_voltage
+    node[:] = 0.0
+    node[kernel.Y] = y
+    node[kernel.V_P] = node[kernel.V_P_HIGHEST] = V_P
+    S[:] = 0.0
+    S[spiking.VOLTAGE], S[spiking.RESUME] = v, -1.0
+    S[spiking.LAST] = S[spiking.PREVIOUS] = -np.inf
+    S[spiking.SHORTEST] = np.inf
+    counts[:] = 0
+    status, _rows_0, _rows_1, _rows_2, spikes = kernel.run(
+        time, force, 0.0, force[0], until, k_F, par, node, S, counts,
+        tolerance, True, True, keep_times, False, False, most,
+    )  # fmt: skip
+    return status, spikes
+
+
 def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
     @entry
     def run(
@@ -176,25 +225,10 @@ def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
         node, S = np.empty(6), np.empty(spiking.MEMORY)
         counts = np.empty(kernel.COUNTS, np.int64)
         for i in range(n):
-            c = many[i]
-            _fill(c, _decay(c), _critical_V_C1(c, direct), direct, par)
-            V_P, y, v = begin[0], begin[1], begin[2]
-            if not V_P == V_P:
-                V_P = 0.0
-                y, v = rest_of_cascade(par)
-                if v >= c.fire_voltage:
-                    v = c.reset_voltage
-            node[:] = 0.0
-            node[kernel.Y] = y
-            node[kernel.V_P] = node[kernel.V_P_HIGHEST] = V_P
-            S[:] = 0.0
-            S[spiking.VOLTAGE], S[spiking.RESUME] = v, -1.0
-            S[spiking.LAST] = S[spiking.PREVIOUS] = -np.inf
-            S[spiking.SHORTEST] = np.inf
-            counts[:] = 0
-            status[i], _rows_0, _rows_1, _rows_2, spikes = kernel.run(
-                time, force, 0.0, force[0], until, _per_newton(c), par, node, S, counts,
-                tolerance, True, True, keep_times, False, False, most,
+            k_F = numbers_of(many[i], direct, par)
+            status[i], spikes = train(
+                many[i], k_F, begin, time, force, until, tolerance, keep_times, most,
+                par, node, S, counts,
             )  # fmt: skip
             if status[i] != kernel.DONE:
                 continue
@@ -221,8 +255,7 @@ def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
         found = np.empty(many.size)
         par = np.empty(ALL_PARAMETERS)
         for i in range(many.size):
-            c = many[i]
-            _fill(c, _decay(c), _critical_V_C1(c, direct), direct, par)
+            numbers_of(many[i], direct, par)
             found[i] = rest_of_cascade(par)[0]
         return found
 

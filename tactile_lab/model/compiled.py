@@ -61,9 +61,9 @@ def entry(function: F) -> F:
     return cast(F, njit(error_model="numpy", cache=True, nogil=True)(function))
 
 
-def source_stamp() -> int:
-    """A number that changes with any of the files above."""
+def source_stamp(*more: Path) -> int:
+    """A number that changes with any of the files above, or of `more`."""
     stamp = 0
-    for name in COMPILED:
-        stamp = zlib.crc32((Path(__file__).parent / name).read_bytes(), stamp)
+    for file in (*(Path(__file__).with_name(name) for name in COMPILED), *more):
+        stamp = zlib.crc32(file.read_bytes(), stamp)
     return stamp

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.model.circuit import Circuit
 
@@ -15,28 +17,41 @@ V_GS, V_TH = 2e-3, 5e-3
 """Two standard deviations of the voltages set by hand and by the PUT, V."""
 
 
-def specimen(circuit: Circuit, number: int) -> Circuit:
-    """The circuit as specimen `number` has it; 0: as its parts are marked.
+def parts(circuit: Circuit, numbers: Iterable[int]) -> dict[str, NDArray[np.float64]]:
+    """The parts of specimens that differ from the marked ones, by name.
 
     The same number is always the same specimen. All values are drawn from normal
     distributions, two standard deviations of which are the tolerances above.
+
+    Args:
+        circuit: as its parts are marked.
+        numbers: of the specimens, from 1.
+
+    Returns:
+        SI, each of shape (numbers,).
     """
+    bands = {name: RESISTOR for name in ("R1", "R2", "R3", "R_L", "R_k")}
+    bands |= {name: CAPACITOR for name in ("C1", "C2")}
+    bands |= {"V_GS": V_GS, "V_th": V_TH}
+    if circuit.V_fire is not None:
+        bands["V_fire"] = V_TH
+    drawn = np.array(
+        [np.random.default_rng(n).standard_normal(len(bands)) for n in numbers]
+    )
+    off = drawn * (np.array(list(bands.values())) / 2)
+    return {
+        name: getattr(circuit, name) + column
+        if name.startswith("V")
+        else getattr(circuit, name) * (1.0 + column)
+        for name, column in zip(bands, off.T, strict=True)
+    }
+
+
+def specimen(circuit: Circuit, number: int) -> Circuit:
+    """The circuit as specimen `number` has it; 0: as its parts are marked."""
     if number == 0:
         return circuit
-    made = np.random.default_rng(number)
-
-    def near(value: float, band: float) -> float:
-        return float(value + made.normal(0, band / 2))
-
-    parts: dict[str, Any] = {
-        name: near(1.0, tolerance) * getattr(circuit, name)
-        for tolerance, names in (
-            (RESISTOR, ("R1", "R2", "R3", "R_L", "R_k")),
-            (CAPACITOR, ("C1", "C2")),
-        )
-        for name in names
+    made: dict[str, Any] = {
+        name: float(values[0]) for name, values in parts(circuit, [number]).items()
     }
-    parts |= {"V_GS": near(circuit.V_GS, V_GS), "V_th": near(circuit.V_th, V_TH)}
-    if circuit.V_fire is not None:
-        parts["V_fire"] = near(circuit.V_fire, V_TH)
-    return replace(circuit, **parts)
+    return replace(circuit, **made)

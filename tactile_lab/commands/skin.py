@@ -1,0 +1,125 @@
+"""``tactile-lab skin``: an array of sensors under a load, to events."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tactile_lab.commands.options import json_option
+from tactile_lab.commands.terminal import (
+    ProgressLine,
+    print_json,
+    refusing,
+    say,
+    warn,
+    working,
+)
+
+if TYPE_CHECKING:
+    from tactile_lab.skin.press import Pressed
+    from tactile_lab.skin.skin import Skin
+
+
+@click.command()
+@click.argument("skin", type=click.Path(path_type=Path))
+@click.option(
+    "--plan", "only_plan", is_flag=True, help="Say what it is; compute nothing."
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("skins"),
+    show_default=True,
+    metavar="DIR",
+    help="Where a folder for the skin is put.",
+)
+@click.option(
+    "--cores",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Threads; as many as cores unless given.",
+)
+@click.option(
+    "--export",
+    "exports",
+    type=click.Path(path_type=Path, dir_okay=False),
+    multiple=True,
+    metavar="FILE",
+    help="Also write the events as FILE: .csv, or .npy as Tonic reads it.",
+)
+@json_option
+def command(
+    skin: Path,
+    only_plan: bool,
+    out: Path,
+    cores: int | None,
+    exports: tuple[Path, ...],
+    as_json: bool,
+) -> None:
+    """Press on the array of sensors that SKIN, a TOML file, describes.
+
+    Writes the spikes of all taxels in order of time, and a page with a film of them.
+    """
+    with refusing():
+        from tactile_lab.skin.events import Events
+        from tactile_lab.skin.formats import export
+        from tactile_lab.skin.page import write_page
+        from tactile_lab.skin.press import highest, press
+        from tactile_lab.skin.skin import load_skin
+
+        asked = load_skin(skin)
+        force, warnings = highest(asked)
+        for text in warnings:
+            warn(text)
+        if only_plan:
+            _print_plan(asked, force)
+            return
+        folder = out / asked.name
+        with ProgressLine(asked.array.size, asked.name) as line:
+            done = press(asked, folder, cores=cores, tell=line.update)
+        events = Events.read(folder)
+        with working("writing the report"):
+            page = write_page(asked, events, done, folder)
+        for file in exports:
+            with working(f"writing {file}"):
+                export(events, file)
+    if as_json:
+        print_json(
+            {
+                "folder": str(folder),
+                "report": str(page),
+                "events": done.events,
+                "taxels": done.taxels,
+                "error_s": done.error,
+                "run_time_s": done.seconds,
+                "warnings": list(done.warnings),
+            }
+        )
+        return
+    _print(asked, done, page)
+
+
+def _print_plan(skin: Skin, force: float) -> None:
+    from tactile_lab.quantity import show
+    from tactile_lab.skin.page import settings
+
+    say(f"{skin.title}: {skin.array.size:,} taxels, {show(skin.duration, 's')}")
+    for name, value in settings(skin).items():
+        if value:
+            say(f"{name.lower():<12}{value}")
+    say(f"{'most':<12}{show(force, 'N')} on one taxel at the corners of the stimuli")
+    say("Taxels whose force cannot bring them to threshold are left out as it runs.")
+
+
+def _print(skin: Skin, done: Pressed, page: Path) -> None:
+    from tactile_lab.quantity import show
+
+    say(f"{skin.title}: {skin.array.size:,} taxels, {show(skin.duration, 's')}")
+    say(f"spikes      {done.events:,}")
+    told = ", ".join(f"{n:,} {what}" for what, n in done.taxels.items() if n)
+    say(f"taxels      {told}")
+    say(f"error       at most about {show(done.error, 's', 2)} in spike times")
+    say(f"run time    {show(done.seconds, 's', 3)}")
+    say(f"report      {page}")

@@ -1,0 +1,1 @@
+"""Arrays of sensors under a moving load: forces, spikes as events, figures."""

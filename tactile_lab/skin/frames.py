@@ -1,0 +1,94 @@
+"""``kind = "frames"``: the force on every taxel from a file of arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from tactile_lab.errors import SceneError
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.quantity import Pause, SampleRate
+from tactile_lab.skin.layout import Array
+from tactile_lab.table import SceneTable
+
+CHECKED = 1 << 22
+"""Numbers looked at in one go: a file may be larger than the memory."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frames(SceneTable):
+    """Frames of forces, linear in between; before the first and after the last held.
+
+    Attributes:
+        file: a .npy of shape (frames, taxels) or (frames, rows, columns), N.
+        rate: frames a second.
+        start: when the first frame is, s.
+        scale: what each force is multiplied by.
+    """
+
+    kind: ClassVar[str] = "frames"
+    file: Annotated[str, Field(min_length=1)]
+    rate: SampleRate = 1e3
+    start: Pause = 0.0
+    scale: Annotated[float, Field(gt=0)] = 1.0
+
+    @cached_property
+    def forces(self) -> FloatArray:
+        """What the file holds, shape (frames, taxels), N; not read into memory.
+
+        Raises:
+            SceneError: it is no such file.
+        """
+        try:
+            found = np.load(Path(self.file), mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError) as reason:
+            raise SceneError(f"{self.file} is no .npy file: {reason}.") from reason
+        numbers = found.dtype.kind in "fiu" and 0 not in found.shape
+        if found.ndim not in (2, 3) or not numbers:
+            raise SceneError(
+                f"{self.file} holds {found.dtype} of shape {found.shape}; forces of "
+                "shape (frames, taxels) or (frames, rows, columns) are needed."
+            )
+        flat: FloatArray = found.reshape(found.shape[0], -1)
+        return flat
+
+    def checked(self, array: Array) -> None:
+        """Read it once, a piece at a time.
+
+        Raises:
+            SceneError: another number of taxels, or a force that is not finite.
+        """
+        shape = self.forces.shape
+        if shape[1] != array.size:
+            raise SceneError(
+                f"{self.file} has forces for {shape[1]} taxels; the array has "
+                f"{array.size}."
+            )
+        rows = max(1, CHECKED // shape[1])
+        for first in range(0, shape[0], rows):
+            bad = np.argwhere(~np.isfinite(self.forces[first : first + rows]))
+            if bad.size:
+                frame, taxel = int(bad[0, 0]) + first, int(bad[0, 1])
+                raise SceneError(
+                    f"{self.file}: the force on taxel {taxel} in frame {frame} is "
+                    f"{self.forces[frame, taxel]}; give finite forces."
+                )
+
+    @property
+    def times(self) -> FloatArray:
+        """When each frame is, s."""
+        return self.start + np.arange(self.forces.shape[0]) / self.rate
+
+    def at(self, time: FloatArray, taxels: slice) -> FloatArray:
+        """The force on these taxels, shape (taxels, time), N."""
+        frames = np.asarray(self.forces[:, taxels], dtype=np.float64) * self.scale
+        place = np.clip((time - self.start) * self.rate, 0, frames.shape[0] - 1)
+        low = np.minimum(place.astype(int), max(frames.shape[0] - 2, 0))
+        high = np.minimum(low + 1, frames.shape[0] - 1)
+        part = (place - low)[:, None]
+        return np.ascontiguousarray(((1 - part) * frames[low] + part * frames[high]).T)

@@ -1,0 +1,118 @@
+"""A block of taxels, from load to spikes, without returning to Python in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.model import kernel, spiking
+from tactile_lab.model.batch import appended, numbers_of, train
+from tactile_lab.model.circuit import FloatArray
+from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.integrator import Y_CRITICAL
+from tactile_lab.model.node_a import TAU, B_at, V_P_at, equilibrium
+from tactile_lab.model.transistor import ALL_PARAMETERS
+from tactile_lab.skin.forces import SOURCES, force_on, thinned
+
+FIRED, SILENT, UNTOUCHED, DEAD, STUCK, REFUSED = range(6)
+"""What became of a taxel: it fired; it was solved and did not; it was not solved, for
+its force cannot bring it to threshold; it is broken; the solver refused it."""
+NEAR = 1e-6
+"""A taxel is solved whose V_C1 may come so near to where it would fire, V."""
+CHUNK = 1 << 12
+"""Spike times for which there is room at first."""
+
+
+@inner
+def highest_V_P(time: FloatArray, force: FloatArray, k_F: float, tau: float) -> float:
+    """The highest V_P under a force from rest, V: it is monotone on every piece."""
+    V = highest = 0.0
+    for k in range(time.size - 1):
+        T = time[k + 1] - time[k]
+        V = V_P_at(T, V, k_F * (force[k + 1] - force[k]) / T, tau)
+        highest = max(highest, V)
+    return highest
+
+
+@inner
+def surely_silent(
+    time: FloatArray, force: FloatArray, k_F: float, par: FloatArray
+) -> bool:
+    """Whether V_C1 cannot come down to where V_C2 would reach V_fire.
+
+    V_C1 starts at its equilibrium, and is never below the lowest equilibrium so far.
+    """
+    V = highest_V_P(time, force, k_F, par[TAU])
+    return bool(equilibrium(B_at(V, par), par) > par[Y_CRITICAL] + NEAR)
+
+
+def _build(stamp: int) -> Callable[..., Any]:
+    @entry
+    def run(
+        many: Any,
+        direct: bool,
+        role: Any,
+        stuck_rate: float,
+        places: FloatArray,
+        depth: float,
+        area: float,
+        time: FloatArray,
+        rows: FloatArray,
+        owner: Any,
+        courses: FloatArray,
+        framed: FloatArray,
+        force_error: float,
+        until: float,
+        tolerance: float,
+        most: float,
+    ) -> Any:
+        _ = stamp
+        n = places.shape[0]
+        count, pieces = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        largest, error = np.zeros(n), np.zeros(n)
+        spikes, size = np.empty(CHUNK), 0
+        rest = np.full(3, np.nan)
+        par = np.empty(ALL_PARAMETERS)
+        node, S = np.empty(6), np.empty(spiking.MEMORY)
+        counts = np.empty(kernel.COUNTS, np.int64)
+        for i in range(n):
+            if role[i] == DEAD:
+                continue
+            if role[i] == STUCK:
+                count[i] = int(until * stuck_rate)
+                train_i = np.arange(1, count[i] + 1) / stuck_rate
+                spikes = appended(spikes, size, train_i, count[i])
+                size += count[i]
+                continue
+            t, F = force_on(
+                places[i, 0], places[i, 1], depth, area, rows, owner, courses, time,
+                framed[i], 0.5 * force_error,
+            )  # fmt: skip
+            largest[i] = F.max()
+            pieces[i] = thinned(t, F, 0.5 * force_error)
+            t, F = t[: pieces[i]], F[: pieces[i]]
+            k_F = numbers_of(many[i], direct, par)
+            if surely_silent(t, F, k_F, par):
+                role[i] = UNTOUCHED
+                continue
+            status, found = train(
+                many[i], k_F, rest, t, F, until, tolerance, True, most, par, node, S,
+                counts,
+            )  # fmt: skip
+            if status != kernel.DONE:
+                role[i] = REFUSED
+                continue
+            count[i] = int(S[spiking.COUNT])
+            error[i] = S[spiking.LARGEST_ERROR]
+            role[i] = FIRED if count[i] else SILENT
+            spikes = appended(spikes, size, found, count[i])
+            size += count[i]
+        return count, pieces, largest, error, spikes[:size].copy()
+
+    return run
+
+
+run = _build(source_stamp(*SOURCES, Path(__file__)))

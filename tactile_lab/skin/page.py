@@ -1,0 +1,165 @@
+"""The page of a skin: a film of its spikes, a raster, the rate of all."""
+
+from __future__ import annotations
+
+import base64
+import json
+from datetime import UTC, datetime
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.quantity import show
+from tactile_lab.report.canvas import draw, save
+from tactile_lab.report.html import picture, rendered
+from tactile_lab.skin.events import Events
+from tactile_lab.skin.press import Pressed
+from tactile_lab.skin.skin import Skin
+
+CELLS = 4_000_000
+"""Most counts in a film."""
+FRAMES = 200
+"""Frames of a film unless there are too many taxels for as many."""
+DOTS = 20_000
+"""Most events in the raster; of more, every so many-th is drawn."""
+BINS = 200
+"""Of the rate of all taxels."""
+
+
+def write_page(skin: Skin, events: Events, done: Pressed, folder: Path) -> Path:
+    """Write `report.html` and its figure beside the events.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    plot = raster(events)
+    size = skin.array.size
+    subtitle = f"{size:,} taxels · {show(skin.duration, 's')}"
+    figure = draw(plot, skin.title, subtitle, simulated=True)
+    film = _film(skin, events)
+    text = rendered(
+        "skin.html",
+        title=skin.title,
+        subtitle=subtitle,
+        key={
+            "Spikes": f"{done.events:,}",
+            "Taxels that fired": f"{done.taxels['fired']:,} of {size:,}",
+            "Left out": f"{done.taxels['left out']:,}",
+            "Spike times within": show(done.error, "s", 2),
+            "Computed in": show(done.seconds, "s", 2),
+        },
+        warnings=done.warnings,
+        film=film,
+        pictures=[picture(skin.title, plot, save(figure, folder / plot.name)[1])],
+        settings=settings(skin),
+        none="none",
+        made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC. Spike times are as "
+        "exact as said above for the force in straight pieces; taxels left out were shown to "
+        "stay below threshold and not solved.",
+    )
+    html = folder / "report.html"
+    html.write_text(text, encoding="utf-8")
+    return html
+
+
+def settings(skin: Skin) -> dict[str, str]:
+    """What the skin is, for a person."""
+    array = skin.array
+    kinds = [one.kind for one in skin.stimuli] + [one.kind for one in skin.frames]
+    spread = "within the tolerances of their parts" if array.spread else "as marked"
+    return {
+        "Taxels": f"{show(array.side, 'm')} wide, {show(array.depth, 'm')} deep, parts "
+        f"{spread}",
+        "Layer": f"elastic half-space, effective modulus {show(array.modulus, 'Pa')}",
+        "Stimuli": ", ".join(kinds),
+        "Force": f"straight pieces within {show(skin.force_error, 'N')}",
+        "Dead": ", ".join(map(str, array.dead)),
+        "Stuck": ", ".join(map(str, array.stuck)),
+    }
+
+
+def raster(events: Events) -> Plot:
+    """Every spike, by taxel, and the mean rate of all taxels."""
+    time = events.time
+    every = max(1, -(-time.shape[0] // DOTS))
+    edges = np.linspace(0.0, events.duration, BINS + 1)
+    step = 1 << 22
+    counts = np.zeros(BINS)
+    for first in range(0, time.shape[0], step):
+        counts += np.histogram(time[first : first + step], edges)[0]
+    rate = counts / (edges[1] * events.places.shape[0])
+    part = "" if every == 1 else f" One of {every} spikes is drawn."
+    return Plot(
+        name="raster",
+        caption="Every dot is a spike of the taxel with that number, row by row from "
+        f"the top left; below, spikes per taxel and time in {show(edges[1], 's', 2)}."
+        + part,
+        title="Spikes",
+        x_label="Time",
+        x_unit="s",
+        x_prefix="",
+        x_limits=(0.0, events.duration),
+        panels=(
+            Panel(
+                label="Taxel",
+                series=(
+                    Series(
+                        x=time[::every],
+                        y=events.taxel[::every].astype(float),
+                        mark="dots",
+                        colour="V_K",
+                    ),
+                ),
+                limits=(-1.0, float(events.places.shape[0])),
+                height=3.6,
+            ),
+            Panel(
+                label="Mean rate",
+                unit="Hz",
+                prefix="",
+                series=(Series(x=edges, y=np.append(rate, rate[-1]), mark="steps"),),
+                limits=(0.0, None),
+                height=1.6,
+            ),
+        ),
+        letters=True,
+    )
+
+
+def _film(skin: Skin, events: Events) -> dict[str, Any]:
+    size = events.places.shape[0]
+    frames = max(1, min(FRAMES, CELLS // size))
+    counts = np.zeros((frames, size), np.int64)
+    time, taxel, step = events.time, events.taxel, 1 << 22
+    for first in range(0, time.shape[0], step):
+        when = (time[first : first + step] / events.duration * frames).astype(int)
+        at = np.minimum(when, frames - 1), taxel[first : first + step]
+        np.add.at(counts, at, 1)
+    long = events.duration / frames
+    data = {
+        "x": events.places[:, 0].tolist(),
+        "y": events.places[:, 1].tolist(),
+        "side": skin.array.side,
+        "frames": frames,
+        "fullest": int(counts.sum(axis=1).argmax()),
+        "from": long / 2,
+        "step": long,
+        "most": int(max(counts.max(), 1)),
+        "most_of_all": int(max(events.count.max(), 1)),
+        "counts": base64.b64encode(
+            np.minimum(counts, 255).astype(np.uint8).tobytes()
+        ).decode(),
+    }
+    script = resources.files("tactile_lab.report") / "film.js"
+    return {
+        "frames": frames,
+        "data": Markup(json.dumps(data).replace("<", "\\u003c")),
+        "script": Markup(script.read_text(encoding="utf-8")),
+        "caption": f"Each square is a taxel where it lies; the darker, the more spikes "
+        f"in {show(long, 's', 2)}, up to {data['most']}. Seen from above, x to the "
+        "right.",
+    }

@@ -1,0 +1,212 @@
+"""Carry out a skin: every taxel on every core, the events to disk."""
+
+from __future__ import annotations
+
+import os
+import time as wall
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import ParameterError, SolverError
+from tactile_lab.model.batch import Records, certain, records
+from tactile_lab.model.circuit import (
+    LARGEST_VOLTAGE,
+    SUBTHRESHOLD_LIMIT,
+    FloatArray,
+)
+from tactile_lab.model.solver import MOST_SPIKES
+from tactile_lab.model.specimen import parts
+from tactile_lab.quantity import show
+from tactile_lab.skin import kernel
+from tactile_lab.skin.events import FILE, EventWriter
+from tactile_lab.skin.forces import Loads
+from tactile_lab.skin.skin import Skin
+
+BLOCK = 64
+"""Taxels solved in one go."""
+AHEAD = 4
+"""Blocks for each core that may be under way."""
+CORNERS = 64
+"""Times at which forces are looked at beforehand."""
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What was computed.
+
+    Attributes:
+        events: number of spikes.
+        taxels: how many fired, were silent, left out, dead, stuck, by name.
+        error: largest estimated error of a spike time, s.
+        seconds: of wall time.
+        warnings: for people.
+    """
+
+    events: int
+    taxels: dict[str, int]
+    error: float
+    seconds: float
+    warnings: tuple[str, ...]
+
+
+def specimens(skin: Skin, taxels: NDArray[np.int64]) -> Records:
+    """The circuits of these taxels, each its own specimen where the array is spread."""
+    if not skin.array.spread:
+        return np.repeat(records(skin.circuit, {}), taxels.size)
+    return records(skin.circuit, parts(skin.circuit, first_specimen(skin) + taxels))
+
+
+def first_specimen(skin: Skin) -> int:
+    """The number of the specimen that taxel 0 is; the others follow."""
+    return 1 + skin.seed * (1 << 24)
+
+
+def press(
+    skin: Skin,
+    folder: Path,
+    *,
+    cores: int | None = None,
+    tell: Callable[[int], object] = lambda taxels: None,
+) -> Pressed:
+    """Compute all spikes and write them; the same to the last bit on any cores.
+
+    Args:
+        skin: what to compute.
+        folder: where `events.h5` is put.
+        cores: threads; as many as cores unless given.
+        tell: is told how many taxels are done.
+
+    Raises:
+        SolverError: a taxel cannot be solved to the tolerance.
+        RecordingError: the events cannot be written.
+    """
+    began = wall.perf_counter()
+    size = skin.array.size
+    cores = cores or os.cpu_count() or 1
+    loads = Loads(skin)
+    role = np.zeros(size, np.uint8)
+    role[skin.array.named(skin.array.dead)] = kernel.DEAD
+    role[skin.array.named(skin.array.stuck)] = kernel.STUCK
+    count, largest = np.zeros(size, np.int64), np.zeros(size)
+    worst, pieces = 0.0, 0
+    blocks = deque(range(0, size, BLOCK))
+    waiting: deque[tuple[int, Future[Any]]] = deque()
+    folder.mkdir(parents=True, exist_ok=True)
+    with (
+        EventWriter(folder / FILE, skin.duration) as writer,
+        ThreadPoolExecutor(cores) as pool,
+    ):
+        while blocks or waiting:
+            while blocks and len(waiting) < AHEAD * cores:
+                first = blocks.popleft()
+                part = slice(first, min(first + BLOCK, size))
+                waiting.append((first, pool.submit(_block, skin, loads, part, role)))
+            first, future = waiting.popleft()
+            part = slice(first, min(first + BLOCK, size))
+            try:
+                count[part], found, largest[part], error, times = future.result()
+                _refuse(skin, role[part], largest[part], first)
+            except BaseException:
+                for _, other in waiting:
+                    other.cancel()
+                raise
+            worst, pieces = max(worst, float(error.max())), pieces + int(found.sum())
+            writer.add(first, count[part], times)
+            tell(part.stop)
+        names = ("fired", "silent", "left out", "dead", "stuck")
+        told = {name: int((role == k).sum()) for k, name in enumerate(names)}
+        seconds = wall.perf_counter() - began
+        most = float(largest.max())
+        writer.finish(
+            {
+                "places": skin.array.places,
+                "count": count,
+                "role": role,
+                "largest_force": largest,
+            },
+            {
+                "name": skin.name,
+                "title": skin.title,
+                "duration_s": skin.duration,
+                "taxels": told,
+                "specimen": first_specimen(skin) if skin.array.spread else None,
+                "error_s": worst,
+                "pieces": pieces,
+                "skin": _plain(skin.source),
+            },
+        )
+    return Pressed(int(count.sum()), told, worst, seconds, warnings(skin, most))
+
+
+def _block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) -> Any:
+    array = skin.array
+    taxels = np.arange(part.start, part.stop)
+    many = specimens(skin, taxels)
+    refused = ~certain(skin.circuit, many, None)
+    role[part][refused] = kernel.REFUSED
+    return kernel.run(
+        many, skin.circuit.t1 == "direct", role[part], array.stuck_rate,
+        array.places[part], array.depth, array.side**2, loads.time, loads.rows,
+        loads.owner, loads.courses, loads.framed(part),
+        skin.force_error, skin.duration, skin.tolerance, MOST_SPIKES,
+    )  # fmt: skip
+
+
+def _refuse(
+    skin: Skin, role: NDArray[np.uint8], largest: FloatArray, first: int
+) -> None:
+    bad = np.flatnonzero(role == kernel.REFUSED)
+    if not bad.size:
+        return
+    taxel, force = first + int(bad[0]), show(float(largest[bad[0]]), "N")
+    raise SolverError(
+        f"Taxel {taxel}, pressed with up to {force}, cannot be solved to "
+        f"{skin.tolerance:g} s; press less, or check the [sensor]."
+    )
+
+
+def highest(skin: Skin) -> tuple[float, tuple[str, ...]]:
+    """The highest force on a taxel at the corners of the stimuli, N, and warnings.
+
+    Raises:
+        ParameterError: it makes a voltage beyond what the model describes.
+    """
+    loads = Loads(skin)
+    corners = [one.corners.ravel() for one in skin.stimuli]
+    at = np.unique(np.concatenate([np.empty(0), *corners]))
+    at = at[at <= skin.duration][:CORNERS]
+    most = loads.largest(at)
+    for one in skin.frames:
+        most = max(most, float(one.forces.max()) * one.scale)
+    if abs(skin.circuit.k_F) * most > LARGEST_VOLTAGE:
+        raise ParameterError(
+            f"A taxel feels up to {show(most, 'N')}; at most "
+            f"{show(LARGEST_VOLTAGE / abs(skin.circuit.k_F), 'N')} can be simulated. "
+            "Press less, or make side smaller."
+        )
+    return most, warnings(skin, most)
+
+
+def warnings(skin: Skin, most: float) -> tuple[str, ...]:
+    """Where a fast touch leaves what the model describes well, Eq. (1)'s law."""
+    limit = (SUBTHRESHOLD_LIMIT - skin.circuit.V_GS) / abs(skin.circuit.k_F)
+    if most <= limit:
+        return ()
+    return (
+        f"Taxels feel up to {show(most, 'N')}: a fast touch beyond "
+        f"{show(limit, 'N')} leaves the exponential law of Eq. (1), and I_DS is "
+        "overestimated there.",
+    )
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _plain(value) for key, value in data.items()}
+    return [_plain(v) for v in data] if isinstance(data, list | tuple) else data

@@ -1,0 +1,162 @@
+"""A skin: an array of sensors, what presses on it, and for how long."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from tactile_lab.columns import read_text
+from tactile_lab.complaint import validated
+from tactile_lab.errors import SceneError, choices
+from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.quantity import Duration, Unit
+from tactile_lab.scene.sensor import Sensor, with_preset
+from tactile_lab.skin.frames import Frames
+from tactile_lab.skin.layout import Array
+from tactile_lab.skin.stimulus import KINDS, Stimulus
+from tactile_lab.table import SceneTable
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkinFile(SceneTable):
+    """What a skin's TOML file holds; see docs/skin.md."""
+
+    duration: Duration
+    array: Array
+    stimulus: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)]
+    title: str = ""
+    sensor: dict[str, Any] = field(default_factory=dict)
+    tolerance: Annotated[float, Unit("s", above=0.0)] = 1e-9
+    force_error: Annotated[float, Unit("N", least=0.0)] = 10e-6
+    seed: Annotated[int, Field(ge=0, le=2**31)] = 1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Skin:
+    """An array under a load, validated; nothing is computed yet.
+
+    Attributes:
+        name: of its folder.
+        title: for people.
+        circuit: of every taxel, its parts as marked.
+        array: where the taxels are.
+        stimuli: what presses on them.
+        frames: forces from files, added to these.
+        duration: s, from 0.
+        tolerance: of spike times, s.
+        force_error: by how much the force on a taxel, straight between few points, may
+            differ from the computed one, N.
+        seed: of the spread between taxels.
+        source: the file's contents, kept with the events.
+    """
+
+    name: str
+    title: str
+    circuit: Circuit
+    array: Array
+    stimuli: tuple[Stimulus, ...]
+    frames: tuple[Frames, ...]
+    duration: float
+    tolerance: float
+    force_error: float
+    seed: int
+    source: Mapping[str, Any]
+
+    @property
+    def times(self) -> FloatArray:
+        """When the forces are computed, ascending from 0 to the duration, s."""
+        ends = [np.array([0.0, self.duration])]
+        found = [one.points(self.array.depth, self.duration) for one in self.stimuli]
+        found += [one.times for one in self.frames]
+        times = np.unique(np.concatenate([*ends, *found]))
+        return times[(times >= 0) & (times <= self.duration)]
+
+
+def load_skin(
+    skin: str | Path | Mapping[str, Any],
+    name: str = "skin",
+    *,
+    folder: Path | None = None,
+) -> Skin:
+    """A skin, validated; computes nothing.
+
+    Args:
+        skin: a skin file (TOML), or what one would hold.
+        name: of a skin that is no file.
+        folder: what a mapping's files are relative to; where one is unless given.
+
+    Raises:
+        SceneError: something cannot be used as written.
+    """
+    if isinstance(skin, Mapping):
+        return _skin(dict(skin), name, folder or Path.cwd(), f"skin {name}")
+    path = Path(skin)
+    if not path.is_file():
+        raise SceneError(f"Skin {skin} does not exist; give the path of a TOML file.")
+    try:
+        data = tomllib.loads(read_text(path, "Skin"))
+    except SceneError:
+        raise
+    except ValueError as reason:
+        raise SceneError(f"{path} is not TOML: {reason}.") from reason
+    return _skin(data, path.stem, path.parent, str(path))
+
+
+def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
+    def blame(_: tuple[str, ...]) -> str:
+        return origin
+
+    table = validated(SkinFile, tuples(data), (), blame, None)
+    given = with_preset(table.sensor, {})
+    sensor = validated(Sensor, given, ("sensor",), blame)
+    if sensor.start != "equilibrium":
+        raise SceneError(f"{origin}: [sensor] start: taxels start at equilibrium.")
+    if sensor.circuit.saturation:
+        raise SceneError(
+            f"{origin}: [sensor] saturation = true: arrays are computed with the "
+            "cascade of Eqs. (16) to (18) only; leave it out."
+        )
+    stimuli: list[Stimulus] = []
+    frames: list[Frames] = []
+    for number, one in enumerate(table.stimulus):
+        keys = dict(one)
+        at = ("stimulus", f"number {number + 1}")
+        kind = keys.pop("kind", None)
+        if kind == Frames.kind:
+            made = validated(Frames, keys, at, blame)
+            made = replace(made, file=str((folder / made.file).resolve()))
+            made.checked(table.array)
+            frames.append(made)
+        elif kind in KINDS:
+            stimuli.append(validated(KINDS[kind], keys, at, blame))
+        else:
+            told = choices(str(kind), [*KINDS, Frames.kind], "Kinds")
+            raise SceneError(f'{origin}: [{".".join(at)}] kind = "{kind}": {told}')
+    return Skin(
+        name=name,
+        title=table.title or name,
+        circuit=sensor.circuit,
+        array=table.array,
+        stimuli=tuple(stimuli),
+        frames=tuple(frames),
+        duration=table.duration,
+        tolerance=table.tolerance,
+        force_error=table.force_error,
+        seed=table.seed,
+        source=data,
+    )
+
+
+def tuples(data: Any) -> Any:
+    """What a file holds, its lists as tuples."""
+    if isinstance(data, Mapping):
+        return {key: tuples(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return tuple(tuples(value) for value in data)
+    return data
