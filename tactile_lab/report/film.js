@@ -1,7 +1,9 @@
 "use strict";
-// Plays spikes per taxel and frame: a disc each, its colour the number of spikes.
+// Plays spikes per taxel and frame: a square each, the stronger the more spikes, which
+// fade over some frames.
 (() => {
   const film = JSON.parse(document.getElementById("film").textContent);
+  const FADING = 0.75, LONGEST = 12;
   const bytes = Uint8Array.from(atob(film.counts), (c) => c.charCodeAt(0));
   const n = film.x.length;
   const at = (frame, taxel) => bytes[frame * n + taxel];
@@ -12,7 +14,7 @@
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   const low = [Math.min(...film.x), Math.min(...film.y)];
   const wide = Math.max(Math.max(...film.x) - low[0], Math.max(...film.y) - low[1]);
-  const scale = 680 / (wide + film.side || 1);
+  const scale = 500 / (wide + film.side || 1);
   const size = Math.max(film.side * scale, 2);
   let timer = 0;
 
@@ -28,9 +30,13 @@
     draw.clearRect(0, 0, map.width, map.height);
     for (let i = 0; i < n; i += 1) {
       const x = 20 + (film.x[i] - low[0] + film.side / 2) * scale;
-      const y = 700 - (film.y[i] - low[1] + film.side / 2) * scale;
-      let count = at(frame, i);
-      if (all.checked) for (let k = 0; k < frame; k += 1) count += at(k, i);
+      const y = 520 - (film.y[i] - low[1] + film.side / 2) * scale;
+      let count = 0, weight = 1;
+      const first = all.checked ? 0 : Math.max(0, frame - LONGEST);
+      for (let k = frame; k >= first; k -= 1) {
+        count += weight * at(k, i);
+        if (!all.checked) weight *= FADING;
+      }
       const strong = shade(count / (all.checked ? film.most_of_all : film.most));
       draw.fillRect(x - size / 2, y - size / 2, size, size);
       if (strong > 0) {

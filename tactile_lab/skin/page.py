@@ -58,8 +58,8 @@ def write_page(skin: Skin, events: Events, done: Pressed, folder: Path) -> Path:
         settings=settings(skin),
         none="none",
         made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC. Spike times are as "
-        "exact as said above for the force in straight pieces; taxels left out were shown to "
-        "stay below threshold and not solved.",
+        "exact as said above for the force in straight pieces; taxels left out were "
+        "shown to stay below threshold and not solved.",
     )
     html = folder / "report.html"
     html.write_text(text, encoding="utf-8")
@@ -159,7 +159,8 @@ def _film(skin: Skin, events: Events) -> dict[str, Any]:
         "frames": frames,
         "data": Markup(json.dumps(data).replace("<", "\\u003c")),
         "script": Markup(script.read_text(encoding="utf-8")),
-        "caption": f"Each square is a taxel where it lies; the darker, the more spikes "
-        f"in {show(long, 's', 2)}, up to {data['most']}. Seen from above, x to the "
-        "right.",
+        "caption": "Each square is a taxel where it lies, seen from above, x to the "
+        f"right. A frame lasts {show(long, 's', 2)}; a spike fades by a quarter from "
+        f"frame to frame. Full colour: {data['most']} in a frame, "
+        f"{data['most_of_all']} of all spikes.",
     }

@@ -1,0 +1,144 @@
+"""An array under a load: each taxel what it is alone, whatever the cores."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tactile_lab.cli import cli as command_line
+from tactile_lab.errors import ParameterError, RunFolderError
+from tactile_lab.skin import kernel
+from tactile_lab.skin.events import Events
+from tactile_lab.skin.forces import Loads
+from tactile_lab.skin.formats import export, tonic
+from tactile_lab.skin.press import highest, press
+from tactile_lab.skin.single import force_of, simulate_taxel
+from tactile_lab.skin.skin import load_skin
+
+SLIDE = {
+    "duration": "1 s",
+    "sensor": {"preset": "fig5b"},
+    "array": {"grid": [9, 10], "dead": [44], "stuck": [0], "stuck_rate": "10 Hz"},
+    "stimulus": [
+        {
+            "kind": "sphere", "force": "0.6 N", "start": "50 ms", "hold": "700 ms",
+            "speed": "15 mm/s", "rests": "300 ms", "at": ["-6 mm", "1 mm"],
+            "vibration": 0.2, "frequency": "20 Hz",
+        },
+        {"kind": "braille", "text": "ab", "at": ["4 mm", "0 mm"], "start": "0.2 s"},
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("skin")
+    skin = load_skin(SLIDE)
+    return skin, press(skin, folder), Events.read(folder), folder
+
+
+def test_every_taxel_fires_as_it_would_alone_to_the_last_bit(pressed):
+    skin, done, events, _ = pressed
+    assert done.taxels["fired"] > 20 and done.taxels["left out"] > 20
+    for taxel in set(range(skin.array.size)) - {0, 44}:
+        alone = simulate_taxel(skin, taxel).spike_times
+        assert np.array_equal(events.train(taxel), alone), taxel
+    assert events.train(44).size == 0
+    assert events.train(0) == pytest.approx(np.arange(1, 11) / 10)
+
+
+def test_events_are_in_order_and_the_same_on_any_cores(pressed, tmp_path):
+    skin, done, events, _ = pressed
+    assert np.all(np.diff(events.time[:]) >= 0)
+    assert events.time.shape == (done.events,)
+    for cores in (1, 3):
+        press(skin, tmp_path, cores=cores)
+        again = Events.read(tmp_path)
+        assert np.array_equal(again.time[:], events.time[:])
+        assert np.array_equal(again.taxel[:], events.taxel[:])
+
+
+def test_who_is_left_out_would_not_have_fired_and_fewer_do_with_more_force(pressed):
+    skin, _, events, _ = pressed
+    left_out = np.flatnonzero(events.role == kernel.UNTOUCHED)
+    for taxel in left_out[::10]:
+        assert simulate_taxel(skin, int(taxel)).spike_times.size == 0
+
+
+def test_the_force_is_as_true_as_asked(pressed):
+    skin, *_ = pressed
+    loads = Loads(skin)
+    fine = load_skin({**SLIDE, "force_error": "0.01 uN"})
+    at = np.linspace(0, 1, 4001)
+    for taxel in (33, 47, 56):
+        coarse = force_of(skin, taxel)
+        exact = force_of(fine, taxel)
+        assert np.abs(coarse.at(at) - exact.at(at)).max() < 1.01 * skin.force_error
+        assert coarse.time.size < exact.time.size
+    assert loads.largest(np.array([0.5])) > 0.01
+
+
+def test_frames_are_the_force_on_each_taxel(tmp_path):
+    frames = np.zeros((3, 2, 2))
+    frames[1, 0, 1] = 0.5
+    np.save(tmp_path / "f.npy", frames)
+    skin = load_skin(
+        {
+            "duration": "0.5 s",
+            "array": {"grid": [2, 2], "spread": False},
+            "stimulus": [{"kind": "frames", "file": "f.npy", "rate": "10 S/s"}],
+        },
+        folder=tmp_path,
+    )
+    assert force_of(skin, 1).at(np.array([0.05, 0.1, 0.15, 0.3])) == pytest.approx(
+        [0.25, 0.5, 0.25, 0]
+    )
+    done = press(skin, tmp_path)
+    events = Events.read(tmp_path)
+    assert done.events > 0 and set(events.taxel[:]) == {1}
+
+
+def test_what_no_model_describes_is_refused_beforehand(pressed):
+    strong = {"kind": "punch", "force": "1 MN", "radius": "1 mm"}
+    with pytest.raises(ParameterError, match="Press less"):
+        highest(load_skin({**SLIDE, "stimulus": [strong]}))
+    firm = {"kind": "punch", "force": "20 N", "radius": "1 mm"}
+    assert "exponential law" in highest(load_skin({**SLIDE, "stimulus": [firm]}))[1][0]
+    assert highest(pressed[0])[1] == ()
+    with pytest.raises(ParameterError, match="numbered 0 to 89"):
+        force_of(pressed[0], 90)
+
+
+def test_events_leave_as_csv_and_as_tonic_reads_them(pressed, tmp_path):
+    _, done, events, _ = pressed
+    export(events, tmp_path / "e.csv")
+    rows = np.loadtxt(tmp_path / "e.csv", delimiter=",", skiprows=1)
+    assert np.array_equal(rows[:, 0], events.time[:])
+    assert np.array_equal(rows[:, 1], events.taxel[:])
+    export(events, tmp_path / "e.npy")
+    array = np.load(tmp_path / "e.npy")
+    assert array.dtype.names == ("x", "y", "t", "p") and array.size == done.events
+    assert np.array_equal(array, tonic(events))
+    assert np.array_equal(array["y"] * 10 + array["x"], events.taxel[:])
+    with pytest.raises(ParameterError, match=r"\.csv or \.npy"):
+        export(events, tmp_path / "e.xyz")
+    with pytest.raises(RunFolderError, match="holds no events"):
+        Events.read(tmp_path)
+
+
+def test_from_the_command_line_to_a_page(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tap.toml").write_text(
+        'duration = "0.3 s"\n[array]\nhexagonal = [4, 4]\n'
+        '[[stimulus]]\nkind = "sphere"\nforce = "2 N"\nstart = "0.1 s"\n'
+    )
+    run = CliRunner().invoke
+    plan = run(command_line, ["skin", "tap.toml", "--plan"])
+    assert plan.exit_code == 0 and "on one taxel" in plan.output
+    assert not (tmp_path / "skins").exists()
+    done = run(command_line, ["skin", "tap.toml", "--export", "tap.npy"])
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "skins/tap/report.html").read_text()
+    assert "Spikes on the skin" in page and "<canvas" in page
+    assert (tmp_path / "tap.npy").exists()
+    wrong = run(command_line, ["skin", "none.toml"])
+    assert wrong.exit_code != 0 and "does not exist" in wrong.output
