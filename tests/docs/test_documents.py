@@ -149,3 +149,12 @@ def test_the_page_of_the_architecture_draws_the_layers_that_are_checked() -> Non
     ]
     page = (DOCS / "architecture.md").read_text(encoding="utf-8")
     assert "\n".join(layers) in page
+
+
+def test_the_skin_of_its_page_is_pressed_and_its_python_runs(tmp_path):
+    (toml,) = blocks("skin.md", "toml")
+    (tmp_path / "ball.toml").write_text(toml, encoding="utf-8")
+    assert "256 taxels" in tactile_lab("skin", "ball.toml", "--plan", folder=tmp_path)
+    (source,) = blocks("skin.md", "python")
+    (tmp_path / "press.py").write_text(source, encoding="utf-8")
+    python("press.py", folder=tmp_path)
