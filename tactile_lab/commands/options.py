@@ -12,6 +12,7 @@ from click.shell_completion import CompletionItem
 from tactile_lab.commands.terminal import refusing
 
 if TYPE_CHECKING:
+    from tactile_lab.scene.overrides import Overrides
     from tactile_lab.scene.scene import Scene
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -94,9 +95,7 @@ run_argument: Decorator = click.argument(
 )
 
 
-def scene_asked(
-    scene: str | None, overrides: tuple[str, ...], bench: str | None
-) -> Scene:
+def scene_asked(scene: str | None, overrides: Overrides, bench: str | None) -> Scene:
     """The scene that somebody asked for, on the lab's bench where it names none.
 
     Raises:

@@ -1,0 +1,320 @@
+"""``tactile-lab sequence``: several runs in turn; goes on after a fault."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactile_lab.commands.attended import Signals
+from tactile_lab.commands.one_run import (
+    Narrator,
+    Watchers,
+    answer,
+    concluded,
+    finished,
+    print_run,
+    serve_status,
+)
+from tactile_lab.commands.options import (
+    noted,
+    notes_option,
+    runs_option,
+    scene_asked,
+    status_option,
+)
+from tactile_lab.commands.terminal import StatusLine, refusing, say, somebody, warn
+from tactile_lab.errors import SceneError, choices
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.ending import Executed
+    from tactile_lab.report.write import Report
+    from tactile_lab.scene.scene import Scene
+
+STATE = "sequence.json"
+"""In the folder of the runs: what is to be done, and what was."""
+
+LOOK_EVERY = 0.2
+"""Time between two looks at clock and signals while it waits, s."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One run of a sequence.
+
+    Attributes:
+        scene: name or path, as `run` takes it.
+        changes: of single keys.
+        bench: bench file or "sim"; None for the scene's own.
+        status: how it ended; "" while it has not.
+        run: its folder, once there is one.
+    """
+
+    scene: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    bench: str | None = None
+    status: str = ""
+    run: str = ""
+
+    def load(self) -> Scene:
+        """The scene.
+
+        Raises:
+            SceneError: it cannot be used.
+        """
+        return scene_asked(self.scene, self.changes, self.bench)
+
+
+@click.command()
+@click.argument("scenes", nargs=-1, metavar="SCENE...|FILE")
+@click.option("--bench", metavar="FILE|sim", help="Bench of all that name none.")
+@runs_option
+@notes_option
+@click.option(
+    "--at", "begin", metavar="HH:MM",
+    help="Begin at that time of day, or at a date and time such as 2026-12-01T22:00.",
+)  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with what was not completed.")
+@click.option(
+    "--go-on", is_flag=True, help="After a fault try the next; the coil verified off."
+)
+@click.option("--realtime", is_flag=True, help="Pace the simulated bench by the clock.")
+@status_option
+@click.option("--no-report", is_flag=True, help="Leave out figures and reports.")
+def command(
+    scenes: tuple[str, ...],
+    bench: str | None,
+    out: Path,
+    notes: tuple[str, ...],
+    begin: str | None,
+    resume: bool,
+    go_on: bool,
+    realtime: bool,
+    status: str | None,
+    no_report: bool,
+) -> None:
+    """Run each SCENE in turn, or those of a FILE with [[run]] tables.
+
+    All are planned before anything is opened. What was done is kept in the folder of
+    the runs. The exit code is that of the last run.
+    """
+    code = 0
+    with Signals() as signals, ExitStack() as served:
+        with refusing():
+            state = out / STATE
+            steps = _resumed(state, scenes) if resume else _asked(scenes, bench)
+            if not resume:
+                _refuse_to_forget(state)
+            _plan_all(steps)
+            kept_notes = noted(notes)
+            start = None if begin is None else _time(begin)
+            server = serve_status(status, served)
+            signals.look()
+            _keep(state, steps)
+        if start is not None:
+            _wait(start, signals)
+        for number, step in enumerate(steps):
+            if step.status == "complete":
+                continue
+            say(f"{number + 1} of {len(steps)}: {step.scene}", sys.stderr)
+            with refusing():
+                watchers = Watchers(Narrator(step.scene), server)
+                done = _run(step, out, watchers, signals, kept_notes, realtime=realtime)
+            signals.opened = False
+            steps[number] = Step(
+                step.scene, step.changes, step.bench, str(done.state), str(done.folder)
+            )
+            _keep(state, steps)
+            _tell(done, watchers, no_report=no_report)
+            code = done.exit_code
+            if code and not (go_on and code == 3):
+                break
+    _summary(steps, state)
+    raise click.exceptions.Exit(code)
+
+
+def _run(
+    step: Step,
+    out: Path,
+    watchers: Watchers,
+    signals: Signals,
+    notes: dict[str, str],
+    *,
+    realtime: bool,
+) -> Executed:
+    from tactile_lab.commands.read_off import field_reader
+    from tactile_lab.engine.execution import Execution
+
+    scene, person = step.load(), somebody()
+    execution = Execution(
+        scene,
+        out,
+        realtime=realtime,
+        emit=watchers,
+        notes=notes,
+        ask=person,
+        asked_field=field_reader(scene, person, None),
+    )
+    return finished(execution, signals, watchers)
+
+
+def _tell(done: Executed, watchers: Watchers, *, no_report: bool) -> None:
+    began = time.monotonic() - done.took
+
+    def tell(done: Executed, report: Report | None) -> None:
+        watchers.end(answer(done, report))
+        print_run(done, report, time.monotonic() - began)
+
+    concluded(done, no_report=no_report, tell=tell)
+
+
+def _asked(scenes: tuple[str, ...], bench: str | None) -> list[Step]:
+    """What the arguments name.
+
+    Raises:
+        SceneError: nothing, or a file of runs that cannot be used.
+    """
+    steps = [step for name in scenes for step in _named(name, bench)]
+    if not steps:
+        raise SceneError("Name one scene at least, or a file with [[run]] tables.")
+    return steps
+
+
+def _named(name: str, bench: str | None) -> Iterator[Step]:
+    from tactile_lab.scene.load import read_toml
+
+    path = Path(name)
+    held = read_toml(path, "Sequence") if path.suffix == ".toml" else {}
+    if "run" not in held:
+        yield Step(str(path.resolve()) if path.is_file() else name, {}, bench)
+        return
+    known = ("scene", "set", "bench", "times")
+    runs = held["run"]
+    if not (isinstance(runs, list) and all(isinstance(one, dict) for one in runs)):
+        raise SceneError(f"{path}: write each run as a table [[run]].")
+    for number, one in enumerate(runs, 1):
+        where = f"{path}: [[run]] number {number}"
+        for key in (key for key in one if key not in known):
+            raise SceneError(f'{where} has no key "{key}"; {choices(key, known)}')
+        scene, times = one.get("scene"), one.get("times", 1)
+        own, changes = one.get("bench", bench), one.get("set", {})
+        if not isinstance(scene, str):
+            raise SceneError(f'{where}: scene is missing; write scene = "hold_10s".')
+        if not isinstance(times, int) or isinstance(times, bool) or times < 1:
+            raise SceneError(f"{where}: times = {times}: a number from 1 on is needed.")
+        if not isinstance(changes, dict):
+            raise SceneError(f'{where}: set: write {{ "protocol.hold" = "2 s" }}.')
+        beside = path.parent / scene
+        file = str(beside.resolve()) if beside.is_file() else scene
+        if own is not None and own != "sim":
+            own = str((path.parent / str(own)).resolve())
+        yield from [Step(file, changes, own)] * times
+
+
+def _resumed(state: Path, scenes: tuple[str, ...]) -> list[Step]:
+    """The sequence that was begun in that folder.
+
+    Raises:
+        SceneError: there is none that can be read.
+    """
+    if scenes:
+        raise SceneError(f"--resume goes on with {state}; leave the scenes out.")
+    try:
+        held = json.loads(state.read_text(encoding="utf-8"))
+        return [Step(**one) for one in held["runs"]]
+    except FileNotFoundError as reason:
+        raise SceneError(
+            f"{state} does not exist: no sequence was begun in {state.parent}. Name "
+            "its folder with --out."
+        ) from reason
+    except (OSError, ValueError, KeyError, TypeError) as reason:
+        raise SceneError(f"{state} cannot be read: {reason}.") from reason
+
+
+def _refuse_to_forget(state: Path) -> None:
+    if not state.exists():
+        return
+    left = [s for s in _resumed(state, ()) if s.status != "complete"]
+    if left:
+        raise SceneError(
+            f"{state} holds a sequence with {len(left)} runs to be done. Go on with "
+            "--resume, or remove that file."
+        )
+
+
+def _plan_all(steps: list[Step]) -> None:
+    """Refuse before anything is opened what any of them would be refused for."""
+    from tactile_lab.planning.plan import plan
+
+    planned: dict[str, float] = {}
+    whole = 0.0
+    for step in steps:
+        if step.status == "complete":
+            continue
+        key = json.dumps(asdict(step), default=str, sort_keys=True)
+        if key not in planned:
+            planned[key] = plan(step.load(), preview=False).estimate.duration
+        whole += planned[key]
+    say(f"{len(steps)} runs, {whole:.4g} s of experiment to do", sys.stderr)
+
+
+def _keep(state: Path, steps: list[Step]) -> None:
+    from tactile_lab.store.folder import write_json
+
+    state.parent.mkdir(parents=True, exist_ok=True)
+    write_json(state, {"runs": [asdict(step) for step in steps]})
+
+
+def _time(text: str) -> datetime:
+    """When that is next.
+
+    Raises:
+        SceneError: it is no time, or has passed.
+    """
+    now = datetime.now()
+    try:
+        if len(text) <= len("22:00"):
+            clock = datetime.strptime(text, "%H:%M").time()
+            today = datetime.combine(now.date(), clock)
+            return today if today >= now else today + timedelta(days=1)
+        when = datetime.fromisoformat(text).replace(tzinfo=None)
+    except ValueError as reason:
+        raise SceneError(
+            f"--at {text}: write HH:MM, or a date and time such as 2026-12-01T22:00."
+        ) from reason
+    if when < now:
+        raise SceneError(f"--at {text} has passed; it is {now:%Y-%m-%dT%H:%M} now.")
+    return when
+
+
+def _wait(start: datetime, signals: Signals) -> None:
+    """Wait until then; a signal ends it."""
+    say(f"waiting until {start:%Y-%m-%d %H:%M}", sys.stderr)
+    line = StatusLine(sys.stderr) if sys.stderr.isatty() else None
+    while (left := (start - datetime.now()).total_seconds()) > 0:
+        signals.look()
+        if line is not None:
+            line.show(f"{timedelta(seconds=round(left))} to wait, Ctrl-C ends")
+        time.sleep(min(left, LOOK_EVERY))
+    if line is not None:
+        line.close()
+
+
+def _summary(steps: list[Step], state: Path) -> None:
+    say()
+    for number, step in enumerate(steps, 1):
+        say(f"{number:3}  {step.status or 'not begun':<10} {step.scene}  {step.run}")
+    left = sum(step.status != "complete" for step in steps)
+    if left:
+        warn(
+            f"{left} of {len(steps)} are not complete; `tactile-lab sequence --resume "
+            f"--out {state.parent}` goes on with them."
+        )

@@ -1,0 +1,135 @@
+"""Several runs in turn: planned before, kept on disk, gone on with after a fault."""
+
+import json
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+SHORT = {
+    "protocol.hold": "0.2 s",
+    "protocol.ramp": "0.1 s",
+    "protocol.rest": "0.1 s",
+    "protocol.levels": ["50 mN"],
+    "record.sample_rate": "20 kS/s",
+}
+
+
+@pytest.fixture
+def asked(tmp_path):
+    def write(*runs):
+        text = ""
+        for one in runs:
+            changes = json.dumps({**SHORT, **one.pop("set", {})})
+            changes = changes.replace('": ', '" = ')
+            text += f"[[run]]\nset = {changes}\n"
+            text += "".join(f"{k} = {json.dumps(v)}\n" for k, v in one.items())
+        (tmp_path / "night.toml").write_text(text)
+        return tmp_path / "night.toml"
+
+    return write
+
+
+@pytest.fixture
+def sequence(tactile_lab, tmp_path):
+    def run(*arguments):
+        out = ("--out", tmp_path / "runs", "--no-report")
+        return tactile_lab("sequence", *arguments, *out)
+
+    return run
+
+
+def kept(tmp_path):
+    held = json.loads((tmp_path / "runs" / "sequence.json").read_text())["runs"]
+    return [(one["status"], one["run"]) for one in held]
+
+
+FAULTS = """
+from typing import ClassVar
+
+from tactile_lab.trial import Protocol, Trial, Trials
+from tactile_lab.waveform import Waveform
+from pathlib import Path
+
+
+class Faults(Protocol):
+    name: ClassVar[str] = "faults"
+    title: ClassVar[str] = "Faults until it is mended"
+    signals: ClassVar[tuple[str, ...]] = ("V_C1",)
+
+    def trials(self) -> Trials:
+        yield Trial(force=Waveform.pulse(0.05, ramp=0.1, hold=0.2), label="1")
+        if not Path(__file__).with_name("mended").exists():
+            raise RuntimeError("the probe fell off")
+"""
+
+
+def test_a_fault_ends_it_and_resume_goes_on_with_that_run(
+    sequence, asked, tmp_path, monkeypatch
+):
+    (tmp_path / "faults.py").write_text(FAULTS)
+    text = asked({"scene": "demo", "times": 2}, {"scene": "demo"}).read_text()
+    text += '[[run]]\nscene = "faults.py"\n[[run]]\nscene = "faults.py"\n'
+    (tmp_path / "night.toml").write_text(text)
+    (tmp_path / "mended").touch()  # the plan draws the trials, too
+
+    def load_then_break(step):
+        if kept(tmp_path)[2][0] == "complete":
+            (tmp_path / "mended").unlink(missing_ok=True)
+        return real(step)
+
+    from tactile_lab.engine import execution
+
+    real = execution.Execution.run
+    monkeypatch.setattr(execution.Execution, "run", load_then_break)
+    ended = sequence(tmp_path / "night.toml")
+    assert ended.code == 3, ended.err
+    assert "the probe fell off" in ended.err
+    done = kept(tmp_path)
+    assert [status for status, _ in done] == ["complete"] * 3 + ["faulted", ""]
+    assert "sequence --resume" in ended.err
+
+    refused = sequence("demo")
+    assert refused.code == 2
+    assert "2 runs to be done" in refused.err
+
+    monkeypatch.setattr(execution.Execution, "run", real)
+    (tmp_path / "mended").touch()
+    again = sequence("--resume")
+    assert again.code == 0, again.err
+    assert kept(tmp_path)[:3] == done[:3], "what was complete was run again"
+    assert [status for status, _ in kept(tmp_path)] == ["complete"] * 5
+    assert all(Path(run).is_dir() for _, run in kept(tmp_path))
+
+
+def test_nothing_is_begun_if_one_of_them_cannot_be(sequence, asked, tmp_path):
+    levels = {"protocol.levels": ["9 N"]}
+    answer = sequence(asked({"scene": "demo"}, {"scene": "demo", "set": levels}))
+    assert answer.code == 2
+    assert "9 N" in answer.err
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[[run]]\nscene = 3\n", "scene is missing"),
+        ('[[run]]\nscene = "demo"\ntimes = 0\n', "times = 0"),
+        ('[[run]]\nscene = "demo"\ntime = 2\n', 'no key "time"; did you mean "times"'),
+        ('run = "demo"\n', "[[run]]"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_refused(sequence, tmp_path, text, told):
+    (tmp_path / "night.toml").write_text(text)
+    answer = sequence(tmp_path / "night.toml")
+    assert answer.code == 2
+    assert told in answer.err
+
+
+def test_a_time_to_begin(sequence):
+    past = f"{datetime.now() - timedelta(hours=1):%Y-%m-%dT%H:%M}"
+    for text, told in (("25:00", "write HH:MM"), (past, "has passed")):
+        answer = sequence("demo", "--at", text)
+        assert answer.code == 2
+        assert told in answer.err
+    assert "no sequence was begun" in sequence("--resume").err
