@@ -79,6 +79,18 @@ class Teslameter:
             self._talk.link.close()
             raise
 
+    def look(self) -> str:
+        """Who answers: asked and closed, nothing is set.
+
+        Raises:
+            InstrumentError: the port or what is behind it, as `open`.
+        """
+        try:
+            self._talk.meet()
+            return self.identity
+        finally:
+            self._talk.link.close()
+
     def read(self) -> Reading:
         """Magnetic flux density, T.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList, ListCapability
 from tactile_lab.generator import AnalogueInput, Generator, GeneratorCapability
-from tactile_lab.quantity import Unit
+from tactile_lab.quantity import Unit, show
 from tactile_lab.table import SceneTable
 from tactile_lab.voltage_source import VoltageSource
 
@@ -98,6 +98,35 @@ class OffReport:
     verified: bool
     current: float | None
     text: str
+
+
+@dataclass(frozen=True)
+class SeenOutput:
+    """A current source's output as a look found it.
+
+    Attributes:
+        identity: of the source.
+        on: whether the output is on.
+        current: that flows, A.
+    """
+
+    identity: str
+    on: bool
+    current: float
+
+    @property
+    def report(self) -> OffReport:
+        """The same as of a coil that should be off."""
+        flows = show(self.current, "A")
+        if not self.on:
+            return OffReport(True, self.current, f"Output off, {flows} read back.")
+        return OffReport(
+            False,
+            self.current,
+            f"The output is on at {flows}, and this program has not switched it on. "
+            "Nothing was touched. Whoever drives it by hand may go on; connecting "
+            "again ramps it down and switches it off.",
+        )
 
 
 class Coil(Protocol):

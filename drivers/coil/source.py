@@ -13,7 +13,7 @@ from drivers.coil.interlock import GENERATOR, Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, check_points, load
 from drivers.coil.wire import CoilWire
 from drivers.serial_line.link import SerialLink, Spy
-from tactile_lab.bench import CoilLimits, OffReport, Reading
+from tactile_lab.bench import CoilLimits, OffReport, Reading, SeenOutput
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError, InterlockError, LimitError, UnsafeError
@@ -147,6 +147,22 @@ class CoilSource:
         except BaseException:
             wire.link.close()
             raise
+
+    def look(self) -> SeenOutput:
+        """Whether the output is on, and what flows: asked and closed, nothing is set.
+
+        Raises:
+            InstrumentError: the port or what is behind it, as `open`.
+        """
+        wire = self._wire
+        try:
+            wire.meet()
+            on = wire.output_is_on()
+            return SeenOutput(
+                self.identity, on, wire.current() if on else wire.current_when_off()
+            )
+        finally:
+            wire.link.close()
 
     def energise(self) -> None:
         """Set compliance and 0 A, verify both, then switch the output on.

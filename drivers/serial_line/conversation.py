@@ -46,7 +46,18 @@ class Conversation(Generic[D]):
         self.dialect = dialect
 
     def connect(self) -> None:
-        """Open the link, with more than one try, and have the instrument listen.
+        """Open the link and have the instrument listen.
+
+        Raises:
+            NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
+            BadReplyError: another instrument answers, or none that can be understood.
+        """
+        self.meet()
+        self._empty_errors(self.query)
+        self.offer(self.dialect.optional)
+
+    def meet(self) -> None:
+        """Open the link, with more than one try; the instrument only says its name.
 
         Raises:
             NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
@@ -63,8 +74,6 @@ class Conversation(Generic[D]):
                 if not left:
                     raise
         self.recognise()
-        self._empty_errors(self.query)
-        self.offer(self.dialect.optional)
 
     def set_up(self, danger: str) -> None:
         """Send the row's settings and read back that they were taken.

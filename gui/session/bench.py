@@ -12,7 +12,13 @@ from gui.session.log import Log, Severity
 from gui.session.status import Status
 from gui.state import WindowState
 from tactile_lab.engine.engine import Reply
-from tactile_lab.engine.jobs import Checked, InstrumentAnswer, check_bench, read_field
+from tactile_lab.engine.jobs import (
+    Checked,
+    InstrumentAnswer,
+    check_bench,
+    look_at_bench,
+    read_field,
+)
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request, bench_request
 from tactile_lab.errors import TactileLabError
@@ -99,12 +105,13 @@ class ConnectedBench(QObject):
     def look(self) -> None:
         """Ask who is still there, between runs; what is gone becomes a fault.
 
+        Nothing is set: an output that was switched on by hand stays on, and is told.
         A simulated bench is there as long as the program is.
         """
         real = self.spec is not None and not self.spec.simulated
         if real and self.request is not None and self._free() and not self._looking:
             self._looking = True
-            self._link.ask(self._looked, check_bench, self.request)
+            self._link.ask(self._looked, look_at_bench, self.request)
 
     @property
     def age(self) -> float | None:
@@ -222,7 +229,9 @@ class ConnectedBench(QObject):
                 self._log.add(Severity.ERROR, one.role, one.problem)
             else:
                 self._log.add(Severity.GOOD, one.role, one.identity)
-        if found.off is not None and not found.off.verified:
+        if found.on and found.off is not None:
+            status.set_fault("The coil's output is on.", found.off.text)
+        elif found.off is not None and not found.off.verified:
             status.set_fault("The coil's state is unknown.", found.off.text)
         elif broken:
             names = " and ".join(ROLES[one.role].lower() for one in broken)

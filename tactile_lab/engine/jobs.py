@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
     from tactile_lab.analysis.noise import Noise
-    from tactile_lab.bench import Bench, OffReport
+    from tactile_lab.bench import Bench, Coil, FieldMeter, OffReport, Scope, SeenOutput
     from tactile_lab.engine.manual import FieldReading
     from tactile_lab.engine.model_parts import StoredParts
     from tactile_lab.engine.monitor import Monitor
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from tactile_lab.store.spike_shapes import SpikeShapes
     from tactile_lab.store.statistics import Statistics
     from tactile_lab.trace import FloatArray
+
+    Instrument = Coil | Scope | FieldMeter
 
 LONGEST = 300.0
 """Seconds a report may take."""
@@ -59,15 +61,18 @@ class InstrumentAnswer:
 
 @dataclass(frozen=True)
 class Checked:
-    """The bench was asked who is there, and the coil was made safe.
+    """The bench was asked who is there.
 
     Attributes:
         found: one entry per instrument of the bench.
-        off: how the coil was left; None without a coil.
+        off: how the coil was left, or found; None without a coil, or where its driver
+            cannot look.
+        on: whether the coil's output was found on and left so.
     """
 
     found: tuple[InstrumentAnswer, ...]
     off: OffReport | None
+    on: bool = False
 
     @property
     def sound(self) -> bool:
@@ -82,6 +87,21 @@ def check_bench(engine: Engine, request: Request) -> Checked:
     Raises:
         RefusedError: something uses them, and goes on doing so.
     """
+    return _alone(engine, request, check)
+
+
+def look_at_bench(engine: Engine, request: Request) -> Checked:
+    """Ask every instrument of a request's bench who it is; nothing is set or switched.
+
+    Raises:
+        RefusedError: something uses them, and goes on doing so.
+    """
+    return _alone(engine, request, look)
+
+
+def _alone(
+    engine: Engine, request: Request, ask: Callable[[Bench], Checked]
+) -> Checked:
     bench = _open(request.load(), realtime=engine.realtime)
     if not engine.instruments.acquire(timeout=BUSY):
         raise RefusedError(
@@ -89,30 +109,70 @@ def check_bench(engine: Engine, request: Request) -> Checked:
             "has ended, or switch the source off at its front panel."
         )
     try:
-        return check(bench)
+        return ask(bench)
     finally:
         engine.instruments.release()
 
 
 def check(bench: Bench) -> Checked:
     """Open, identify and close each instrument; the coil is verified off on the way."""
+    off: list[OffReport] = []
+
+    def opened(instrument: Instrument) -> str:
+        instrument.open()
+        if instrument is bench.coil:
+            off.append(bench.coil.safe_off())
+        identity = instrument.identity
+        instrument.close()
+        return identity
+
+    found = _answers(bench, opened)
+    return Checked(found, off[0] if off else None)
+
+
+def look(bench: Bench) -> Checked:
+    """Ask each instrument who it is, and the coil's source whether its output is on.
+
+    Nothing is set: a person may be using it. An oscilloscope is opened and closed; a
+    driver that cannot look is left alone.
+    """
+    seen: list[SeenOutput] = []
+
+    def looked(instrument: Instrument) -> str:
+        if instrument is bench.scope:
+            instrument.open()
+            identity = instrument.identity
+            instrument.close()
+            return identity
+        ask = getattr(instrument, "look", None)
+        if ask is None:
+            return "not asked: its driver cannot look without setting anything"
+        answer: SeenOutput | str = ask()
+        if isinstance(answer, str):
+            return answer
+        seen.append(answer)
+        return answer.identity
+
+    found = _answers(bench, looked)
+    on = bool(seen) and seen[0].on
+    return Checked(found, seen[0].report if seen else None, on)
+
+
+def _answers(
+    bench: Bench, ask: Callable[[Instrument], str]
+) -> tuple[InstrumentAnswer, ...]:
+    """What each instrument of the bench answers when it is asked."""
     found: list[InstrumentAnswer] = []
-    off: OffReport | None = None
     every = (("coil", bench.coil), ("scope", bench.scope), ("meter", bench.field_meter))
     with bench.clock.taking_part("check"):
         for role, instrument in every:
             if instrument is None:
                 continue
             try:
-                instrument.open()
-                if instrument is bench.coil:
-                    off = bench.coil.safe_off()
-                identity = instrument.identity
-                instrument.close()
-                found.append(InstrumentAnswer(role, identity, ""))
+                found.append(InstrumentAnswer(role, ask(instrument), ""))
             except (TactileLabError, OSError) as error:
                 found.append(InstrumentAnswer(role, "", str(error)))
-    return Checked(tuple(found), off)
+    return tuple(found)
 
 
 def read_field(engine: Engine, request: Request, task: int) -> FieldReading:

@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from provenance import provenance
@@ -32,6 +33,7 @@ from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.magnetics import Magnet
 
 OWNER = """
+import os
 import sys
 import numpy as np
 from drivers.coil.source import CoilSource
@@ -39,31 +41,36 @@ from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.current_list import CurrentList
-clock = RealClock()
-limits = CoilLimits(list_slew=100.0)
-playing = sys.argv[2]
-row, analogue = coil_dialect("kepco-bop"), playing == "generator"
-coil = CoilSource(row, sys.argv[1], limits, clock, analogue=analogue)
-coil.open()
-coil.energise()
-if playing == "list":  # 20 Hz, 8 s long
-    wave = 0.1 * np.sin(2 * np.pi * np.arange(800) / 5)
-    coil.load_list(CurrentList(np.append(wave, 0.0), np.full(801, 0.01)))
-    coil.start_list()
-elif playing == "generator":  # 0.3 A for 20 s; whoever serves the source plays it
-    coil.follow(CurrentList(np.array([0.0, 0.3, 0.0]), np.array([0.1, 20.0, 0.1])), 0.0)
-print("live", flush=True)
-k = 0
-while True:
-    if playing == "list":
-        coil.read_current()
-    elif playing == "generator":
-        pass
-    else:
-        coil.set_current(0.3 if k // 25 % 2 else -0.3)
-    coil.beat()
-    clock.sleep_until(clock.now() + max(0.01, coil.update_interval))
-    k += 1
+
+def own(url, playing):
+    clock = RealClock()
+    row, analogue = coil_dialect("kepco-bop"), playing == "generator"
+    coil = CoilSource(row, url, CoilLimits(list_slew=100.0), clock, analogue=analogue)
+    coil.open()
+    coil.energise()
+    if playing == "list":  # 20 Hz, 8 s long
+        wave = 0.1 * np.sin(2 * np.pi * np.arange(800) / 5)
+        coil.load_list(CurrentList(np.append(wave, 0.0), np.full(801, 0.01)))
+        coil.start_list()
+    elif playing == "generator":  # 0.3 A for 20 s; who serves the source plays it
+        points = np.array([0.0, 0.3, 0.0]), np.array([0.1, 20.0, 0.1])
+        coil.follow(CurrentList(*points), 0.0)
+    print("live", os.getpid(), flush=True)
+    k = 0
+    while True:
+        if playing == "set-points":
+            coil.set_current(0.3 if k // 25 % 2 else -0.3)
+        elif playing == "list":
+            coil.read_current()
+        coil.beat()
+        clock.sleep_until(clock.now() + max(0.01, coil.update_interval))
+        k += 1
+
+for line in sys.stdin:
+    child = os.fork()  # what it imported is there already
+    if child == 0:
+        own(*line.split())
+    os.waitpid(child, 0)
 """
 
 
@@ -95,22 +102,26 @@ def times_to_off(
     """
     chance, found = random.Random(1), []
     with tempfile.TemporaryDirectory() as state:
+        owners = subprocess.Popen(
+            [sys.executable, "-c", OWNER],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | {"XDG_STATE_HOME": state},
+            text=True,
+        )
+        assert owners.stdin is not None and owners.stdout is not None
         for _ in range(times):
             source, plant, server, clock = served(kind, baud)
-            owner = subprocess.Popen(
-                [sys.executable, "-c", OWNER, server.url, playing],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env=os.environ | {"XDG_STATE_HOME": state},
-            )
-            assert owner.stdout is not None
-            assert owner.stdout.readline() == b"live\n"
+            print(server.url, playing, file=owners.stdin, flush=True)
+            live, pid = owners.stdout.readline().split()
+            assert live == "live"
             if playing == "generator":
                 plant.analogue_input([(clock.now(), 0.6)])
             time.sleep(chance.uniform(0.05, 0.6))
             assert playing != "generator" or source.measured_current() > 0.2
             since = clock.now()
-            owner.send_signal(how)
+            os.kill(int(pid), how)
             while source.output_on and clock.now() < since + 10:
                 time.sleep(0.0005)
             assert not source.output_on, "the output stayed on"
@@ -120,10 +131,12 @@ def times_to_off(
             clock.sleep_until(off.time + 0.05)  # the coil's lag
             assert abs(source.measured_current()) < 1e-3, "a current flows on"
             logged(Path(state), len(found))
-            owner.kill()
-            owner.wait()
-            owner.stdout.close()
+            with suppress(ProcessLookupError):
+                os.kill(int(pid), signal.SIGKILL)
             server.close()
+        owners.stdin.close()
+        owners.wait()
+        owners.stdout.close()
     return found
 
 

@@ -241,3 +241,17 @@ def test_teslameter_reads_tesla(resistor):
         with pytest.raises(LimitError, match="range"):
             meter.read()
         meter.close()
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_a_look_tells_what_a_person_did_and_touches_nothing(serial_bench, on):
+    source, coil = serial_bench.source, serial_bench.coil
+    source.set_current(0.3)
+    source.switch(on)
+    before = list(source.changes)
+    seen = coil.look()
+    assert (seen.on, seen.current) == (on, pytest.approx(0.3 if on else 0.0, abs=1e-4))
+    assert seen.report.verified is not on
+    coil.close()
+    assert source.changes == before and not source.remote
+    assert source.output_on is on

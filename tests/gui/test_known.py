@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtWidgets import QApplication
+from serial import serial_for_url
 from served_source import Source
 
 from gui.session import bench as connected
@@ -73,6 +74,25 @@ def test_a_source_that_is_there_is_looked_at_and_stays_ready(
     until(served, lambda: served.bench.age < before)
     assert served.state is WindowState.READY and served.snapshot().known
     assert len(served.log.lines) == said, "a look that finds all well says nothing"
+
+
+def test_an_output_that_is_switched_on_by_hand_is_told_and_left_on(
+    served: Session, source: Source
+) -> None:
+    """A look each minute is no reason to take the coil from a person."""
+    with serial_for_url(source.served.addresses["coil"]) as by_hand:
+        by_hand.write(b"CURR 0.3\nOUTP 1\n")
+        while not source.output:
+            time.sleep(0.005)
+    served.bench.look()
+    until(served, lambda: served.state is WindowState.FAULT)
+    fault = served.snapshot().fault
+    assert fault is not None and "output is on" in fault.title
+    assert source.output, "nothing was touched"
+    served.acknowledge()
+    served.connect_bench(str(source.bench))
+    until(served, lambda: served.state is WindowState.READY)
+    assert not source.output, "connecting again makes it safe"
 
 
 def test_a_run_that_begins_during_a_look_waits_for_its_end(
