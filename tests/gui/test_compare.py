@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from gui.dialogs.saving import table
 from gui.lanes.compare import Comparison, ComparisonRows
 from gui.lanes.expected import Stretch
 from gui.lanes.lane import lanes_for
@@ -118,3 +119,54 @@ def test_values_are_read_on_the_common_time(comparison: Comparison) -> None:
         assert np.allclose(values, [3.5, 3.52, 3.5], atol=2e-3)
     assert values_at(LANES["rate"], comparison, 2.55, painted)[:2] == (2.0, 0.0)
     assert values_at(lane, comparison, 9.8, painted)[1] is None, "that run has ended"
+
+
+def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.runs(1)
+    lab.complete_run()
+    window.screen_.list_runs()
+    lab.until(lambda: len(window.review.runs.cards) >= 2)
+    complete = [c for c in window.review.runs.cards if c.entry.status == "complete"]
+    for card in complete[:2]:
+        card.tick.setChecked(True)
+    assert window.review.runs.compare.isEnabled()
+    window.review.runs.compare.click()
+    lab.until(lambda: window.centre.compare_bar.isVisible())
+    comparison = window.screen_.run
+    keys = [row.lane.key for row in window.centre.stack.visible_rows()]
+    assert "residual" not in keys, "the model is not compared"
+    window.centre.compare_bar.align.group.button(1).click()
+    starts = [m.source.holds[0].start + m.shift for m in comparison.members]
+    assert abs(starts[0] - starts[1]) < 1e-9
+    stack = window.centre.stack
+    lab.until(lambda: stack.row("V_C1").card.text.count("\n") == 2)
+    assert stack.row("spikes").card.text.startswith("Spikes in view")
+    window.centre.tools.toggle_cursors(True)
+    lab.until(lambda: "Δ" in stack.row("V_C1").card.text)
+    at_cursor = window.centre.compare_bar.align.group.button(2)
+    window.centre.view.place_cursors(starts[0] + 0.02, 1.0)
+    at_cursor.click()
+    assert window.centre.view.cursors[0] == comparison.members[0].source.holds[0].start
+    window.centre.tools.toggle_cursors(False)
+    assert not at_cursor.isEnabled(), "there is no cursor to align at"
+    window.centre.compare_bar.layout_.group.button(2).click()
+    lab.until(lambda: "less ●" in stack.row("V_C1").card.text)
+    view = window.centre.view
+    view.show_span(0.0, 1.0)
+    said = table(stack, "Comparing 2 runs").splitlines()[1]
+    assert "run2_less_run1_force_mean_N" in said and ",run1_force" not in said
+    window.centre.compare_bar.layout_.group.button(0).click()
+    lines = table(stack, "Comparing 2 runs").splitlines()
+    assert lines[0].count("run1 ") == lines[0].count("run2 ") == 1
+    header = lines[1].split(",")
+    for run, member in zip(("run1", "run2"), comparison.members, strict=True):
+        time = float(lines[2].split(",")[header.index(f"{run}_force_time_s")])
+        known = member.source.trace("force", 0.0, 1.0, 100)
+        assert abs(time - known.time[0] - member.shift) < 1e-6
+    window.screen_.close_run()
+    assert not window.centre.compare_bar.isVisible()
+    assert stack.source is session.source, "back to the last run"
+    lab.until(lambda: stack.source is window.screen_.run, 30.0)
+    assert window.screen_.run.path == session.run.folder, "and then to its record"
+    lab.until(lambda: "●" not in stack.row("V_C1").card.text)

@@ -150,3 +150,25 @@ def test_a_field_is_read_while_the_coil_is_held(lab) -> None:
     assert abs(session.bench.field - 5.5e-3) < 1e-4, "11 mT/A, of that coil"
     session.stop("test is over")
     lab.until(lambda: not session.manual.alive)
+
+
+def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
+    window, session = lab.window, lab.session
+    session.begin_manual()
+    lab.until(lambda: session.manual.coil is not None)
+    window.review.manual.current.setText("5 A")
+    window.review.manual.set.click()
+    assert session.coil_view().output is not True, "beyond the limit nothing is sent"
+    window.review.manual.current.setText("100 mA")
+    window.review.manual.set.click()
+    lab.until(lambda: abs((session.coil_view().current or 0) - 0.1) < 2e-3)
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
+    assert not window.setup.run.isEnabled()
+    session.run.expected = 10.0  # of the run before
+    assert not window.close(), "the coil is live: closing asks"
+    assert "100 mA" in window.closing.now.text()
+    assert "remaining" not in window.closing.now.text(), "that was the run's"
+    window.closing.keep.click()
+    window.header.stop.click()
+    lab.until(lambda: not session.manual.alive)
+    assert session.coil_view().verified_off

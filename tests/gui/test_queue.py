@@ -303,3 +303,45 @@ def test_one_undo_takes_back_what_was_typed_in_one_stay(lab) -> None:
     QTest.keyClick(edit, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
     lab.until(lambda: edit.text() == "600 ms")
     setup.form.edits.undo()
+
+
+def test_queue_can_be_edited_while_running(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    for name in ("one", "two", "three"):
+        session.queue.add(Queued(name, window.setup.request()))
+    session.queue.move(session.queue.items[2], -1)
+    session.queue.remove(session.queue.items[0])
+    assert [item.title for item in session.queue.items] == ["three", "two"]
+    assert window.setup.queue.isVisible()
+    session.queue.remove(session.queue.items[1])
+    first = session.run.folder
+    assert session.state is WindowState.RUNNING, "a queued run waits"
+    session.stop("the next one shall not follow")
+    lab.until(lambda: session.state is WindowState.READY)
+    assert [item.title for item in session.queue.items] == [
+        "three"
+    ] and not session.busy
+    session.queue.add(Queued("four", window.setup.request()))
+    assert session.state is WindowState.READY, "nothing starts by being queued"
+    session.queue.resume()
+    lab.until(lambda: session.queue.items == [] and session.state is WindowState.READY)
+    assert session.run.folder != first
+
+
+def test_invalid_value_forbids_run_and_says_why(lab) -> None:
+    window = lab.window
+    window.setup.form.field("hold").put("−1 s")
+    window.setup.form.changed.emit()
+    assert not window.setup.run.isEnabled()
+    assert "Hold" in window.setup.run.toolTip()
+
+
+def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
+    window, session = lab.window, lab.session
+    window.setup.form.field("levels").put("900 mN")
+    window.setup.plan_now()
+    lab.until(lambda: session.plan.problem)
+    assert "reachable" in session.plan.problem
+    assert not window.setup.run.isEnabled()
+    window.setup.form.reset()

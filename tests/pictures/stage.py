@@ -15,6 +15,9 @@ from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+from PIL import Image
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
 from drivers.usb_presence import PICO, Present
@@ -26,6 +29,9 @@ from gui.state import WindowState
 from gui.window import Window
 
 SIZE = (1720, 1080)
+
+FILM, STEP, FORMAT = 1032, 0.25, QImage.Format.Format_RGB888
+"""Width of a film, px; seconds between two of its frames; and how they are read."""
 
 
 class Port(NamedTuple):
@@ -104,6 +110,25 @@ class Stage:
         self.live(0.15)
         file = self.folder / f"{name}.png"
         self.window.grab().save(str(file))
+        print(file, flush=True)
+
+    def film(self, name: str, ended: Callable[[], object]) -> None:
+        """Save an animated picture of all until `ended()`, twice as fast as it was."""
+        frames = []
+        while not ended():
+            self.live(STEP)
+            image = self.window.grab().toImage().convertToFormat(FORMAT)
+            image = image.scaledToWidth(
+                FILM, Qt.TransformationMode.SmoothTransformation
+            )
+            size = image.width(), image.height()
+            rows = image.constBits(), "raw", "RGB", image.bytesPerLine()
+            frames.append(Image.frombytes("RGB", size, *rows))
+        file = self.folder / f"{name}.webp"
+        frames[0].save(
+            file, save_all=True, append_images=frames[1:], quality=60, method=4,
+            duration=[*[int(500 * STEP)] * (len(frames) - 1), 3000], loop=0,
+        )  # fmt: skip
         print(file, flush=True)
 
     def planned(self) -> None:

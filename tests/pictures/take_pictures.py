@@ -51,6 +51,7 @@ def main(folder: Path) -> None:
         stage.planned()
         stage.shoot("window_ready")
         for scene in (
+            _film,
             _run,
             _after,
             _manual,
@@ -66,6 +67,13 @@ def main(folder: Path) -> None:
         _read_by_a_person(folder)
 
 
+def _film(stage: Stage) -> None:
+    """A run from the click on Run to its results."""
+    stage.window.setup.start()
+    stage.film("run", stage.window.review.results.report.isVisible)
+    stage.ended()
+
+
 def _run(stage: Stage) -> None:
     window, session = stage.window, stage.session
     window.setup.start()
@@ -75,11 +83,11 @@ def _run(stage: Stage) -> None:
     window.close()
     stage.shoot("window_close_light")
     window.closing.keep.click()
+    session.queue.remove(session.queue.items[0])
     stage.theme.choose("dark")
     stage.until(lambda: session.source is not None and session.source.reach > 15.4)
     stage.shoot("window_running_dark", "dark")
     stage.theme.choose("light")
-    session.queue.remove(session.queue.items[0])
     stage.ended()
 
 

@@ -1,0 +1,413 @@
+"""A long session through X: what a person does, and seeded clicks and keys between.
+
+    python tests/benchmarks/window_session.py [SEED] [SECONDS] [--out FILE]
+
+The window stands on a virtual screen. In turn it is made to run, queue, edit, stop,
+meet a fault (a source that falls silent, one that answers late, a pulled plug), find
+back, compare and export; between these, keys and clicks at random places and on random
+buttons, from one seed. Engine and simulated far ends are in the window's process, so
+that the source itself is the witness of what the window says.
+
+It ends with 1 where an exception came, where the window said that the coil is off, or
+was ready, for over two seconds while the output was on, where it was ready without
+knowing the coil, where a key STOP left the output on for five seconds, where the
+program ended, or where its memory grew by more than a fifth from the second quarter of
+the session to the last.
+"""
+
+import argparse
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve()
+SIZE = 1366, 768
+LIE, STOPPED = 2.0, 5.0
+KEYS = (
+    "space f a z c 1 2 m shift+m plus minus BackSpace shift+BackSpace x Left Right "
+    "period comma Home End n F1 F5 F7 F8 F11 ctrl+1 ctrl+2 ctrl+3 ctrl+4 ctrl+z ctrl+y "
+    "ctrl+f ctrl+i ctrl+k ctrl+comma ctrl+o ctrl+s Tab Tab Tab shift+Tab Return Down "
+    "Up Prior Next 5 9 Delete ctrl+a ctrl+Return ctrl+shift+Return ctrl+r Escape"
+).split()
+FAULTS = ("missing", "late", "unplug")
+LEFT_ALONE = ("STOP", "Menu", "Open report", "Open folder", "Quit", "Delete")
+"""Buttons that are pressed on purpose, lead out of the window, or move what is kept."""
+
+
+class LostError(Exception):
+    """The session cannot go on."""
+
+
+class Session:
+    """The program on its screen, and the one who drives it."""
+
+    def __init__(self, seed: int, folder: Path) -> None:
+        self.random = random.Random(seed)
+        self.folder = folder
+        self.problems: list[str] = []
+        self.reports: list[dict] = []
+        self.done: dict[str, int] = {}
+        read, write = os.pipe()
+        screen = "x".join(map(str, (*SIZE, 24)))
+        self._started = [
+            subprocess.Popen(
+                ["Xvfb", "-displayfd", str(write), "-screen", "0", screen],
+                pass_fds=(write,), stderr=subprocess.DEVNULL,
+            )
+        ]  # fmt: skip
+        os.close(write)
+        with os.fdopen(read) as told:
+            display = f":{told.readline().strip()}"
+        self.env = {
+            **os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb",
+            "BROWSER": "true", "HOME": str(folder), "XDG_DATA_HOME": str(folder / "d"),
+            "XDG_CONFIG_HOME": str(folder / "config"),
+        }  # fmt: skip
+        self._started.append(
+            subprocess.Popen(["openbox"], env=self.env, stderr=subprocess.DEVNULL)
+        )
+        self.program = subprocess.Popen(
+            [sys.executable, str(HERE), "--inside", str(folder)],
+            env=self.env, cwd=folder, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        )  # fmt: skip
+        self._started.append(self.program)
+        threading.Thread(target=self._listen, daemon=True).start()
+        self.wait(lambda: self.now["state"] == "ready", 180, "ready")
+        self.main = self.tool("search", "--onlyvisible", "--name", ".*Tactile Lab")
+        self.main = self.main.split()[0]
+
+    def _listen(self) -> None:
+        for line in self.program.stdout:
+            told = json.loads(line)
+            if "exception" in told:
+                self.problems.append(told["exception"])
+            else:
+                self.reports.append(told)
+
+    @property
+    def now(self) -> dict:
+        """What the program told last."""
+        return self.reports[-1] if self.reports else {"state": "", "buttons": {}}
+
+    def wait(self, done, longest: float, what: str) -> None:
+        end = time.monotonic() + longest
+        while not done():
+            if self.program.poll() is not None:
+                raise LostError(f"the program ended with {self.program.returncode}")
+            if time.monotonic() > end:
+                raise LostError(
+                    f"not {what} within {longest} s; it is {self.now['state']}"
+                )
+            time.sleep(0.1)
+
+    def tool(self, *arguments: str) -> str:
+        done = subprocess.run(
+            ["xdotool", *map(str, arguments)],
+            env=self.env, capture_output=True, text=True, timeout=60,
+        )  # fmt: skip
+        return done.stdout.strip()
+
+    def key(self, *keys: str) -> None:
+        self.tool("windowfocus", self.main, "key", *keys)
+
+    def press(self, name: str) -> bool:
+        """Click a button by its name, if it is there to be clicked."""
+        place = self.now["buttons"].get(name)
+        if place:
+            self.tool("mousemove", *place, "click", 1)
+        return bool(place)
+
+    def tell(self, word: str) -> None:
+        self.program.stdin.write(f"{word}\n")
+        self.program.stdin.flush()
+
+    # --- what a person does
+
+    def anything(self, seconds: float) -> None:
+        """Keys and clicks without a plan."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and self.program.poll() is None:
+            what = self.random.choices(
+                ("key", "button", "click", "drag", "wheel", "type"), (6, 5, 3, 2, 2, 2)
+            )[0]
+            self.done[what] = self.done.get(what, 0) + 1
+            x, y = self.random.randrange(SIZE[0]), self.random.randrange(90, SIZE[1])
+            if what == "key":
+                self.key(self.random.choice(KEYS))
+            elif what == "type":
+                self.tool("type", self.random.choice(("80 mN", "300 ms", "-1 s", "x")))
+            elif what == "button":
+                names = sorted(
+                    n for n in self.now["buttons"] if not n.startswith(LEFT_ALONE)
+                )
+                if names:
+                    self.press(self.random.choice(names))
+            elif what == "drag":
+                self.tool("mousemove", x, y, "mousedown", 1)
+                self.tool("mousemove", self.random.randrange(SIZE[0]), y, "mouseup", 1)
+            else:
+                button = 1 if what == "click" else self.random.choice((4, 5))
+                self.tool("mousemove", x, y, "click", button)
+
+    def clear(self) -> None:
+        """Stop what is in progress, close what is open, and be ready."""
+        self.tool("keyup", "shift", "keyup", "ctrl", "mouseup", 1)
+        self.tell("mend")
+
+        def ready() -> bool:
+            if self.now["state"] == "ready" and not self.now["open"]:
+                return True
+            if self.now["state"] == "disconnected":
+                self.tell("connect")
+            if not self.press("Acknowledge") and self.now["state"] != "connecting":
+                self.key("Escape")
+            time.sleep(0.5)
+            return False
+
+        self.wait(ready, 120, "ready again")
+
+    def begin(self) -> None:
+        """Have the form's run begin; its scene is opened anew where it is unusable."""
+        self.clear()
+        self.tell("scene")
+        self.wait(lambda: "Run" in self.now["buttons"], 60, "planned")
+        self.press("Run")
+        self.wait(lambda: self.now["output"], 90, "running with the coil on")
+
+    def stop(self) -> None:
+        """STOP by key or button, and see to it that the output goes off."""
+        how = self.random.choice(("F12", "Escape", "button"))
+        place = self.now["stop"]
+        if how == "button":
+            self.tool("mousemove", *place, "click", 1)
+        else:
+            self.key("F12" if how == "F12" else "Escape")
+        begun = time.monotonic()
+        while self.now["output"] and time.monotonic() < begun + STOPPED:
+            time.sleep(0.05)
+        if self.now["output"]:
+            self.problems.append(f"{how} left the output on for {STOPPED} s")
+
+    def round(self) -> None:
+        """All that a session holds, once."""
+        self.begin()
+        self.key("ctrl+Return")
+        self.anything(8)
+        self.stop()
+        self.begin()
+        self.tell(f"fault {self.random.choice(FAULTS)}")
+        self.anything(6)
+        self.clear()
+        self.begin()
+        self.wait(lambda: self.now["state"] != "running", 120, "at the end of its run")
+        self.clear()
+        self.key("ctrl+2")
+        time.sleep(1)
+        ticks = [n for n in self.now["buttons"] if n.startswith("Compare 2")][:2]
+        for name in ticks:
+            self.press(name)
+        time.sleep(0.5)
+        self.press("Compare")
+        self.anything(5)
+        self.clear()
+        self.key("ctrl+e")
+        time.sleep(1.5)
+        name = self.random.choice(("png", "svg", "csv"))
+        self.tool("type", str(self.folder / f"view{len(self.reports)}.{name}"))
+        self.tool("key", "Return")
+        self.anything(5)
+        self.done["round"] = self.done.get("round", 0) + 1
+
+    def close(self) -> None:
+        for process in reversed(self._started):
+            if process.poll() is None:
+                process.terminate()
+                process.wait(30)
+
+
+def lies(reports: list[dict]) -> list[str]:
+    """Where the window said for longer than `LIE` what the source contradicts."""
+    found = []
+    begun: dict[str, float] = {}
+    for told in reports:
+        on = told["output"]
+        claims = {
+            "the coil is off while its output is on": on and told["truth"] == "off",
+            "ready while the output is on": on and told["state"] == "ready",
+            "ready without knowing the coil": told["state"] == "ready"
+            and told["truth"] == "unknown",
+        }
+        for claim, false in claims.items():
+            if not false or told["manual"]:
+                begun.pop(claim, None)
+            elif told["at"] - begun.setdefault(claim, told["at"]) > LIE:
+                found.append(f"{claim}, at {told['at'] - reports[0]['at']:.0f} s")
+                begun[claim] = float("inf")
+    return found
+
+
+def drive(seed: int, seconds: float) -> tuple[str, bool]:
+    """One session; its row, and whether nothing was wrong."""
+    with tempfile.TemporaryDirectory() as folder:
+        session = Session(seed, Path(folder))
+        end = time.monotonic() + seconds
+        try:
+            while time.monotonic() < end:
+                session.round()
+        except LostError as lost:
+            session.problems.append(str(lost))
+        finally:
+            session.close()
+    session.problems += lies(session.reports)
+    memory = np.array([told["memory"] for told in session.reports])
+    quarter = max(len(memory) // 4, 1)
+    before, after = (
+        np.median(memory[quarter : 2 * quarter]),
+        np.median(memory[-quarter:]),
+    )
+    if after > 1.2 * before:
+        session.problems.append(f"memory grew from {before:.0f} to {after:.0f} MB")
+    lived = session.reports[-1]["at"] - session.reports[0]["at"]
+    gap = max(np.diff([told["at"] for told in session.reports]))
+    acts = sum(n for what, n in session.done.items() if what != "round")
+    row = (
+        f"| {seed} | {lived:.0f} | {session.done.get('round', 0)} | {acts} | "
+        f"{before:.0f} | {after:.0f} | {gap:.1f} | {len(session.problems)} |"
+    )
+    return "\n".join([row, *session.problems]), not session.problems
+
+
+# --- the program
+
+
+def inside(folder: Path) -> None:
+    """The window; every tenth of a second it tells what it says, and what is true."""
+    import traceback
+
+    from PySide6.QtCore import QPoint, QTimer
+    from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu
+
+    from gui.app import application, begin
+    from gui.dialogs.overlay import Overlay
+    from gui.look.theme import Theme
+    from gui.session.session import Session as Behind
+    from gui.window import Window
+    from sim_backend.serial_line import wires
+    from sim_backend.serial_line.faults import SerialFault
+
+    def tell(what: object) -> None:
+        sys.stdout.write(json.dumps(what) + "\n")
+        sys.stdout.flush()
+
+    def failed(kind, error, trace) -> None:
+        tell({"exception": "".join(traceback.format_exception(kind, error, trace))})
+
+    sys.excepthook = failed
+    threading.excepthook = lambda a: failed(a.exc_type, a.exc_value, a.exc_traceback)
+    sys.setswitchinterval(1e-3)
+    scene = folder / "short.toml"
+    scene.write_text(
+        '[protocol]\nname = "pulses"\nlevels = ["120 mN", "160 mN"]\nhold = "4 s"\n'
+        'rest = "1 s"\n[record]\nsample_rate = "100 kS/s"\n'
+    )
+    app = application(["session"])
+    theme = Theme("light")
+    theme.apply()
+    behind = Behind(folder / "runs", separate=False)
+    behind.run.reports = False
+    window = Window(behind, theme)
+    window.resize(SIZE[0] - 8, SIZE[1] - 40)
+    window.show()
+    begin(window, str(scene), "sim")
+
+    def coils():
+        ends = [far for name, far in wires._far_ends.items() if "coil" in name]
+        return [far for far in ends if hasattr(far.instrument, "output_on")]
+
+    def buttons() -> dict[str, list[int]]:
+        found = {}
+        for one in app.allWidgets():
+            if not (isinstance(one, QAbstractButton) and one.isVisible()):
+                continue
+            middle = one.mapToGlobal(QPoint(one.width() // 2, one.height() // 2))
+            if one.isEnabled() and app.widgetAt(middle) is one:
+                name = one.accessibleName() or one.text()
+                found.setdefault(name, [middle.x(), middle.y()])
+        return found
+
+    count, names = 0, {}
+
+    def report() -> None:
+        nonlocal count, names
+        if count % 5 == 0:
+            names = buttons()
+        count += 1
+        stop = window.header.stop
+        at = stop.mapToGlobal(QPoint(60, 25))
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        cards = [c for c in window.findChildren(Overlay) if c.isVisible()]
+        others = [w for w in app.topLevelWidgets() if isinstance(w, QDialog | QMenu)]
+        others = [w for w in others if w.isVisible()]
+        tell(
+            {
+                "at": time.monotonic(), "state": behind.state.value,
+                "truth": stop.truth.value, "manual": behind.manual.alive,
+                "output": any(far.instrument.output_on for far in coils()),
+                "open": len(cards) + len(others), "stop": [at.x(), at.y()],
+                "memory": int(pages) * 4096 / 1e6, "buttons": names,
+            }
+        )  # fmt: skip
+
+    def act(word: str) -> None:
+        what, _, kind = word.strip().partition(" ")
+        if what == "fault":
+            amount = {"late": 1.0, "unplug": 2.0}.get(kind, 0.0)
+            for far in coils():
+                far.faults.add(SerialFault(kind=kind, times=None, amount=amount))
+        elif what == "mend":
+            for far in coils():
+                far.faults.clear()
+        elif what == "connect":
+            behind.connect_bench("sim")
+        elif what == "scene":
+            window.fold(window.setup, False)
+            window.screen_.open_scene(str(scene))
+
+    def listen() -> None:
+        for word in sys.stdin:
+            QTimer.singleShot(0, app, lambda word=word: act(word))
+
+    threading.Thread(target=listen, daemon=True).start()
+    timer = QTimer()
+    timer.timeout.connect(report)
+    timer.start(100)
+    QApplication.setQuitOnLastWindowClosed(True)
+    app.exec()
+    behind.close()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    parser.add_argument("seconds", type=float, nargs="?", default=600.0)
+    parser.add_argument("--inside", type=Path)
+    options = parser.parse_args()
+    if options.inside:
+        inside(options.inside)
+        return
+    row, well = drive(options.seed, options.seconds)
+    print(row)
+    sys.exit(not well)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+"""The sensor watched between runs."""
+
+from gui.state import CoilKnowledge, WindowState
+from tactile_lab.store.run import Run
+
+
+def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
+    window, session = lab.window, lab.session
+    window.centre.tools.monitor.click()
+    lab.until(lambda: "silent" in window.centre.monitor_bar.words)
+    assert "mV" in window.centre.monitor_bar.words
+    keys = [row.lane.key for row in window.centre.stack.visible_rows()]
+    assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
+    assert session.state is WindowState.READY
+    assert window.header.stop.truth is CoilKnowledge.OFF
+    session.out.mkdir(exist_ok=True)
+    before = set(session.out.iterdir())
+    window.setup.run.click()
+    lab.until(lambda: session.state is WindowState.RUNNING)
+    assert not session.monitor.alive, "the scope is handed over before the run"
+    lab.until(lambda: session.state in (WindowState.READY, WindowState.FAULT))
+    new = set(session.out.iterdir()) - before
+    assert len(new) == 1, "watching keeps nothing"
+
+
+def test_record_keeps_what_the_monitor_saw(lab) -> None:
+    window, session = lab.window, lab.session
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.sensor.held > 0.3)
+    window.centre.monitor_bar.record.click()
+    kept = []
+    session.monitor.recorded.connect(kept.append)
+    lab.until(lambda: kept)
+    assert session.monitor.alive, "watching goes on"
+    run = Run.load(kept[0])
+    assert run.status == "complete" and "V_C1" in run.signals
+    run.close()
+    session.show_monitor(False)
+    lab.until(lambda: not session.monitor.alive)
+    lab.until(lambda: not window.centre.monitor_bar.isVisible())

@@ -1,0 +1,177 @@
+"""A run from start to end, as the window shows and stops it."""
+
+import threading
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+)
+
+from gui.dialogs.help import Help
+from gui.lanes.source import PlanSource
+from gui.state import CoilKnowledge, WindowState
+from sim_backend.serial_line import wires as serial_wires
+from sim_backend.serial_line.faults import SerialFault
+
+
+def newest_coil() -> serial_wires.FarEnd:
+    """Far end of the coil wire plugged in last."""
+    return [far for name, far in serial_wires._far_ends.items() if "coil" in name][-1]
+
+
+def red_share(button: QAbstractButton) -> float:
+    image = button.grab().toImage()
+    red = 0
+    for x in range(0, image.width(), 4):
+        for y in range(0, image.height(), 4):
+            colour = image.pixelColor(x, y)
+            red += colour.red() > 150 and colour.green() < 90 and colour.blue() < 110
+    return red / ((image.width() // 4) * (image.height() // 4))
+
+
+def test_ready_offers_run_and_shows_the_plan(lab) -> None:
+    window = lab.window
+    window.screen_.leave_run()
+    lab.session.source = None  # a run that another test left on screen
+    window.setup.plan_now()
+    lab.until(lambda: isinstance(window.centre.stack.source, PlanSource))
+    assert window.setup.run.isEnabled()
+    assert window.header.stop.truth is CoilKnowledge.OFF
+    assert window.header.badge.isVisible()
+    keys = [row.lane.key for row in window.centre.stack.visible_rows()]
+    assert keys == ["force", "V_C1", "residual", "V_C2", "V_K", "spikes", "rate"]
+    assert window.centre.stack.source.twin_spikes.size > 0
+
+
+def test_a_run_in_progress_shows_the_coil_live(lab) -> None:
+    window = lab.window
+    lab.run()
+    assert not window.setup.run.isEnabled()
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
+    assert red_share(window.header.stop) > 0.5
+
+
+def test_run_moves_lanes_and_gives_results(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.complete_run()
+    source = session.source
+    assert source is not None and source.reach > 1.0
+    assert not source.trace("V_C1", 0.0, 2.0, 500).empty
+    assert [f.label for f in window.screen_.results.steps] == ["80 mN", "120 mN"]
+    assert window.review.results.mark.text().startswith("final")
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.OFF)
+
+
+@pytest.mark.parametrize("how", ["click", "Esc", "F12"])
+def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    assert window.header.stop.isEnabled()
+    if how == "click":
+        QTest.mouseClick(window.header.stop, Qt.MouseButton.LeftButton)
+    else:
+        window.activateWindow()
+        lab.until(window.isActiveWindow)
+        key = {"Esc": Qt.Key.Key_Escape, "F12": Qt.Key.Key_F12}[how]
+        QTest.keyClick(window, key)
+    assert session.state is WindowState.ABORTING
+    lab.until(lambda: session.state is WindowState.READY)
+    coil = session.coil_view()
+    assert coil is not None and coil.output is False and coil.verified_off
+    assert window.screen_.ending.startswith("Aborted")
+
+
+def test_stop_is_enabled_in_every_state(lab) -> None:
+    for state in WindowState:
+        lab.session.status.state = state
+        lab.window.render_state()
+        assert lab.window.header.stop.isEnabled()
+        assert lab.window.header.stop.isVisible()
+    lab.session.status.state = WindowState.READY
+    lab.window.render_state()
+
+
+def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    assert not window.close()
+    assert window.closing.isVisible() and window.closing.keep.isDefault()
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert not window.closing.isVisible()
+    assert session.state is WindowState.RUNNING, "Esc in the question is not STOP"
+    assert window.isVisible()
+
+
+def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    newest_coil().faults.add(SerialFault(kind="unplug", times=None))
+    lab.until(lambda: session.state is WindowState.FAULT)
+    assert window.banner.isVisible()
+    assert window.header.stop.truth is CoilKnowledge.UNKNOWN
+    assert window.header.stop.words.title == "COIL STATE UNKNOWN"
+    assert not window.setup.run.isEnabled()
+    window.banner.acknowledge.click()
+    assert session.state is not WindowState.FAULT
+    assert window.header.stop.truth is CoilKnowledge.UNKNOWN, (
+        "reading a fault verifies nothing"
+    )
+    assert not window.setup.run.isEnabled(), "and nothing runs beside it"
+    lab.until(lambda: session.state is WindowState.READY)
+    assert window.header.stop.truth is CoilKnowledge.OFF, "the instruments were asked"
+
+
+def test_reconnecting_makes_the_coil_known_again(lab) -> None:
+    session = lab.session
+    session.connect_bench("sim")
+    assert session.state is WindowState.CONNECTING
+    lab.until(lambda: session.state is WindowState.READY)
+    assert lab.window.header.stop.truth is CoilKnowledge.OFF
+
+
+def test_a_run_stopped_before_its_first_sample_is_no_new_problem(lab) -> None:
+    window, session = lab.window, lab.session
+    window.setup.start()
+    session.stop("at once")
+    lab.until(lambda: not session.busy and session.state is not WindowState.ABORTING)
+    lab.until(lambda: not any(t.name == "open run" for t in threading.enumerate()))
+    lab.app.processEvents()
+    assert not window.centre.notice.isVisible(), window.centre.notice.text()
+    session.acknowledge()
+
+
+def test_freeze_holds_the_lanes_while_acquisition_goes_on(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    view = window.centre.view
+    lab.until(lambda: view.now > 0)
+    window.page.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_Space)
+    seen = view.now
+    lab.until(lambda: session.source.reach > seen + 1.0)
+    assert view.now == seen
+    window.centre.tools.freeze.click()
+    lab.until(lambda: view.now > seen + 1.0)
+
+
+def test_another_run_is_not_frozen(lab) -> None:
+    window = lab.window
+    window.centre.tools.freeze.setChecked(True)
+    lab.run()
+    lab.until(lambda: window.centre.view.now > 0)
+    assert not window.centre.tools.freeze.isChecked()
+
+
+def test_esc_closes_a_card_between_runs_and_is_stop_in_one(lab) -> None:
+    window, session = lab.window, lab.session
+    window.actions_.show_help()
+    card = window.findChild(Help)
+    QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
+    assert not card.isVisible() and session.state is WindowState.READY
+    lab.run()
+    window.actions_.show_help()
+    QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
+    assert session.state is WindowState.ABORTING
+    card.hide()

@@ -1,0 +1,96 @@
+"""Runs on disk in the lanes: opened, looked at closely, exported."""
+
+import numpy as np
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+
+
+def test_old_run_opens_in_the_same_lanes(lab) -> None:
+    window, session = lab.window, lab.session
+    folder = lab.complete_run()
+    live_spikes = session.source.spikes.copy()
+    lab.until(lambda: window.screen_.run is not None)  # its record, by itself
+    record = window.screen_.run
+    window.screen_.open_run(folder)
+    lab.until(lambda: window.screen_.run not in (None, record))
+    run = window.screen_.run
+    assert np.allclose(run.spikes, live_spikes, atol=1e-3)
+    lab.until(lambda: run.model is not None)
+    window.centre.view.show_span(0.2, 0.001)
+    lab.until(lambda: run.twin("V_C2", 0.2, 0.201, 1000).time.size > 500)
+    run.trace("V_C2", 0.2, 0.201, 1000)
+    lab.until(lambda: run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+    moved = run.trace("V_C2", 0.2004, 0.2014, 1000)
+    closer = run.trace("V_C2", 0.2003, 0.2007, 1000)
+    assert moved.time.size > 150 and closer.time.size > 60, "read around what is seen"
+
+
+def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
+    window, screen = lab.window, lab.window.screen_
+    folder = lab.complete_run()
+    lab.until(lambda: screen.run is not None)
+    assert screen.run.path == folder
+    assert window.session.name == folder.name
+    assert window.centre.stack.source is screen.run
+    assert screen.run.model is not None, "the model does not blink"
+    live = window.session.source
+    window.centre.view.show_span(0.2, 0.001)
+    lab.until(lambda: screen.run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
+    assert live.trace("V_C2", 0.2, 0.201, 1000).time.size < 10, "seen live: bins"
+
+
+def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
+    window = lab.window
+    folder = lab.runs(1)[0]
+    window.screen_.open_run(folder)
+    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    run, stack, view = window.screen_.run, window.centre.stack, window.centre.view
+    begin, _ = run.holds[-1].held
+    run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])
+    view.show_span(begin, 0.25)
+
+    def says(key: str) -> str:
+        return stack.row(key).card.text
+
+    lab.until(lambda: says("spikes") == "2" and says("force") == "120.0")
+    lab.until(lambda: says("rate") == "10.00")
+    assert stack.row("spikes").card.more in ("", "of 4 · last ISI 100.0 ms")
+    shown = run.trace("V_C1", begin, begin + 0.25, 500)
+    assert abs(float(says("V_C1")) - shown.at(begin + 0.25)) < 0.02
+    view.show_span(0.0, run.holds[0].start)
+    lab.until(lambda: says("spikes") == "0" and says("rate") == "0.00")
+    view.show_all()
+    lab.until(lambda: says("spikes") == "4" and says("force") == "0.0")
+
+
+def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
+    window = lab.window
+    file = lab.folder / "dropped.toml"
+    file.write_text('[protocol]\nname = "pulses"\nlevels = ["70 mN"]\n')
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(file))])
+    event = QDropEvent(
+        QPointF(50, 200), Qt.DropAction.CopyAction, data,
+        Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+    )  # fmt: skip
+    window.dropEvent(event)
+    assert window.setup.form.field("levels").text == "70 mN"
+    bad = lab.folder / "bad.toml"
+    bad.write_text('[protocol]\nname = "pulses"\nlevel = ["70 mN"]\n')
+    window.screen_.open_path(bad)
+    assert window.centre.notice.isVisible()
+    assert "levels" in window.centre.notice.text()
+    assert window.setup.form.field("levels").text == "70 mN"
+
+
+def test_view_is_exported(lab) -> None:
+    from gui.dialogs.saving import write_scene, write_view
+
+    window, folder = lab.window, lab.folder
+    for name in ("view.png", "view.svg", "view.csv"):
+        write_view(window.panels, None, folder / name)
+        assert (folder / name).stat().st_size > 100
+    header = (folder / "view.csv").read_text().splitlines()[1]
+    assert "V_C1_time_s" in header and "force_mean_N" in header
+    write_scene(window.panels, folder / "saved.toml")
+    assert 'name = "pulses"' in (folder / "saved.toml").read_text()
