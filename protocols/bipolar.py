@@ -123,7 +123,8 @@ class Bipolar(Levels):
             caption="(a) I_DS, from V_C1 by Eq. (16), under the forces applied, as in "
             "Fig. 2c. Dotted: Eq. (8) with the sensor's parameters as believed; "
             "dashed: with the time constant fitted to the decays in the holds. (b) "
-            "I_DS less both; short peaks at the ramps are what Eq. (16) averages over.",
+            "What I_DS exceeds both by; short peaks at the ramps are what Eq. (16) "
+            "averages over.",
             x_label="Time",
             x_unit="s",
             x_limits=(0.0, run.duration),
@@ -143,7 +144,7 @@ class Bipolar(Levels):
                     height=2.2,
                 ),
                 Panel(
-                    label="Less Eq. (8)",
+                    label="Residual",
                     unit="A",
                     series=tuple(
                         Series(x=trace.time, y=trace.mean - y, mark=mark, colour=hue)

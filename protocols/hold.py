@@ -107,8 +107,10 @@ class Hold(ForceProtocol):
                     label="Rate",
                     unit="Hz",
                     series=(
-                        Series(x=middles, y=1 / np.diff(held), mark="dots"),
                         *curves,
+                        Series(
+                            x=middles, y=1 / np.diff(held), mark="dots", name="1/ISI"
+                        ),
                     ),
                     limits=(0, None),
                     text="\n".join(fitted),

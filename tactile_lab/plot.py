@@ -18,9 +18,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.errors import ParameterError
-from tactile_lab.quantity import PREFIXES, prefix_of
+from tactile_lab.quantity import PREFIXES, count, prefix_of
 
 FloatArray = NDArray[np.float64]
+
+MOST_TICKS = 150
+"""More spikes than that run into one another: their density is drawn."""
+SPIKES_IN_BIN, MOST_BINS = 5, 200
+"""Of that density: spikes in a bin on average, at least, and bins."""
 
 Mark = Literal[
     "line", "dashed", "dotted", "steps", "filled",
@@ -195,6 +200,30 @@ class Plot:
             for panel in data["panels"]
         )
         return cls(**{**data, "panels": panels})
+
+
+def spike_train(spikes: FloatArray, begin: float, end: float) -> tuple[Panel, str]:
+    """A lane of ticks, and its caption; many spikes as how many a second there are.
+
+    Args:
+        spikes: times, s.
+        begin: of the x axis, s.
+        end: of the x axis, s.
+    """
+    told = count(spikes.size, "spike")
+    if spikes.size <= MOST_TICKS:
+        ticks = Series(x=spikes, mark="ticks", colour="V_K")
+        panel = Panel(
+            label="Spikes", series=(ticks,), limits=(0, 1), blank=True, height=0.3
+        )
+        return panel, f"{told}"
+    bins = min(spikes.size // SPIKES_IN_BIN, MOST_BINS)
+    edges = np.linspace(begin, end, bins + 1)
+    density = np.histogram(spikes, edges)[0] / np.diff(edges)
+    middles = (edges[:-1] + edges[1:]) / 2
+    filled = Series(x=middles, y=density, mark="filled", colour="V_K")
+    panel = Panel(label="Spikes/s", series=(filled,), limits=(0, None), height=0.5)
+    return panel, f"{told}: how many a second, in {bins} bins"
 
 
 def y_scale(panel: Panel) -> tuple[float, str]:

@@ -10,7 +10,7 @@ from tactile_lab.planning.current import cut
 from tactile_lab.planning.outcome import joined
 from tactile_lab.planning.plan import Plan
 from tactile_lab.planning.timeline import Timeline
-from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.plot import Guide, Panel, Plot, Series, spike_train
 from tactile_lab.signals import SIGNALS
 from tactile_lab.spikes.rate import rates_between
 
@@ -23,7 +23,7 @@ HEIGHT = 1.25
 def preview_plot(plan: Plan) -> Plot:
     """The planned force, and below it the model's signals as far as recorded."""
     panels = [_force(plan.timeline)]
-    recorded = plan.scene.record.signals
+    recorded, said = plan.scene.record.signals, ""
     if plan.preview is not None:
         times, spikes = _times(plan.preview), plan.preview.spike_times
         shown = [name for name in LANES if name in recorded]
@@ -31,10 +31,13 @@ def preview_plot(plan: Plan) -> Plot:
             shown.append("rate")
         panels += [_lane(plan.preview, name, times) for name in shown]
         if spikes is not None:
-            panels.append(_spikes(spikes, plan.timeline))
+            train, told = spike_train(spikes, 0.0, plan.timeline.duration)
+            panels += [train, _rate(spikes, plan.timeline)]
+            said = f" {told}; rate: 1/ISI, none across a silence."
     return Plot(
         name="preview",
-        caption="The planned force and the model under it. Grey bands: recoveries.",
+        caption="The planned force and the model under it. Grey bands: recoveries."
+        + said,
         x_label="Time",
         x_unit="s",
         x_prefix="",
@@ -86,18 +89,14 @@ def _lane(result: Result, name: str, times: NDArray[np.float64]) -> Panel:
     )
 
 
-def _spikes(spikes: NDArray[np.float64], drive: Timeline) -> Panel:
+def _rate(spikes: NDArray[np.float64], drive: Timeline) -> Panel:
     middles, rates = rates_between(spikes, np.array([s.start for s in drive.steps]))
     return Panel(
         label="Rate",
         unit="Hz",
         prefix="",
-        series=(
-            Series(x=spikes, mark="ticks", colour="V_K"),
-            Series(x=middles, y=rates, mark="dots"),
-        ),
-        limits=(0.0, float(rates.max(initial=0.0)) / 0.78 or 1.0),
-        note=f"{spikes.size} spikes (ticks), instantaneous rate 1/ISI (dots)",
+        series=(Series(x=middles, y=rates, mark="dots"),),
+        limits=(0.0, 1.08 * float(rates.max(initial=0.0)) or 1.0),
         height=HEIGHT,
     )
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
-from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import count, show
+from tactile_lab.plot import Guide, Panel, Plot, Series, spike_train
+from tactile_lab.quantity import show
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.spikes.rate import rates_between
 
@@ -25,10 +25,6 @@ SHARP = {"V_C2", "V_K"}
 """Signals that jump within a bin: their extremes are the trace, not their mean."""
 DRAWN_BINS = 1600
 """More bins than a printed column can show only swell the file."""
-MOST_TICKS = 150
-"""More spikes than that run into one another: their density is drawn."""
-SPIKES_IN_BIN, MOST_BINS = 5, 200
-"""Of that density: spikes in a bin on average, at least, and bins."""
 
 Told = tuple[Panel, str]
 """A panel, and what its caption says of it."""
@@ -243,25 +239,8 @@ def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
         limits=(0.0, 1.08 * float(np.nanmax(rates)) if rates.size else 1.0),
         height=1.5,
     )
-    return [_train(np.concatenate([*spikes, []]), axis), (panel, text)]
-
-
-def _train(spikes: FloatArray, axis: ClosedTime) -> Told:
-    """Ticks, or where they would run into one another how many there are."""
-    told = count(spikes.size, "spike")
-    if spikes.size <= MOST_TICKS:
-        series = Series(x=spikes, mark="ticks", colour="V_K")
-        panel = Panel(
-            label="Spikes", series=(series,), limits=(0, 1), blank=True, height=0.3
-        )
-        return panel, f"{told}, as detected"
-    bins = min(spikes.size // SPIKES_IN_BIN, MOST_BINS)
-    edges = np.linspace(axis.begin, axis.end, bins + 1)
-    density = np.histogram(spikes, edges)[0] / np.diff(edges)
-    middles = (edges[:-1] + edges[1:]) / 2
-    series = Series(x=middles, y=density, mark="filled", colour="V_K")
-    panel = Panel(label="Spikes/s", series=(series,), limits=(0, None), height=0.5)
-    return panel, f"{told}: how many a second, in {bins} bins"
+    together = np.concatenate([*spikes, []])
+    return [spike_train(together, axis.begin, axis.end), (panel, text)]
 
 
 def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
