@@ -188,11 +188,17 @@ def _timed(
                 "it begins and ends at 0 A, and this trial does not "
                 f"({show(current, 'A')})."
             )
-    if isinstance(can, GeneratedCurrent):
-        # its bandwidth is far above the waveform's: it delays, as a short lag does
-        magnet = replace(magnet, coil_lag=magnet.coil_lag + can.input.lag)
     bipolar = coil_capability(coil).bipolar
-    return _nearest(wanted, asked, magnet, coil.limits, bipolar, can)
+    drive = _nearest(wanted, asked, magnet, coil.limits, bipolar, can)
+    if isinstance(can, GeneratedCurrent) and drive.error is not None:
+        return replace(drive, error=drive.error + _blurred(asked, can.input.lag))
+    return drive
+
+
+def _blurred(force: Waveform, lag: float) -> float:
+    """Largest difference that a short lag makes of a force beside a delay by it, N."""
+    late, _ = Lag(lag).follow(force)
+    return _difference(force, late.shifted(-lag))
 
 
 @lru_cache(maxsize=64)  # protocols repeat their presentations

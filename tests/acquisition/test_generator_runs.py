@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from benches import generator_bench
 
 from sim_backend.bench import open_bench
 from sim_backend.picoscope.faults import ScopeFault
@@ -30,13 +29,7 @@ WAVE = (
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    """The built-in bench, its scope's generator wired to the source."""
-    import tactile_lab.scene
-
-    built_in = Path(tactile_lab.scene.__file__).with_name("simulated_bench.toml")
-    file = tmp_path_factory.mktemp("bench") / "generator.toml"
-    file.write_text(built_in.read_text() + "\n[coil.generator]\n")
-    return file
+    return generator_bench(tmp_path_factory.mktemp("bench"))
 
 
 @pytest.fixture(scope="module")
@@ -125,9 +118,8 @@ def test_a_scope_that_is_lost_while_it_plays_ends_with_the_output_off(run_scene,
     assert ended.state is RunState.FAULTED and ended.off.verified
 
 
-def test_a_gain_that_is_not_the_true_one_ends_the_run(run_scene, bench, tmp_path):
-    file = tmp_path / "wrong.toml"
-    file.write_text(bench.read_text() + 'gain = "0.48 A/V"\n')
+def test_a_gain_that_is_not_the_true_one_ends_the_run(run_scene, tmp_path):
+    file = generator_bench(tmp_path, 'gain = "0.48 A/V"')
     ended = run_scene(*WAVE, scene=load("demo", bench=file)).done
     assert ended.state is RunState.FAULTED and ended.off.verified
     assert "[coil.generator]" in ended.reason
@@ -140,11 +132,8 @@ def test_where_it_is_wired_it_is_taken_for_a_smooth_force(bench):
     assert "A/V" in used.why
 
 
-def test_a_gain_that_a_short_touch_hides_is_told_by_the_samples(
-    run_scene, bench, tmp_path
-):
-    file = tmp_path / "off.toml"
-    file.write_text(bench.read_text() + 'gain = "0.6 A/V"\n')
+def test_a_gain_that_a_short_touch_hides_is_told_by_the_samples(run_scene, tmp_path):
+    file = generator_bench(tmp_path, 'gain = "0.6 A/V"')
     keys = {"level": "100 mN", "repeats": 1, "rest": "0.2 s", "hold": "0.1 s"}
     short = [f"protocol.{key}={value}" for key, value in keys.items()]
     touch = *short, 'protocol.onsets=["20 ms"]', "record.sample_rate=100 kS/s"

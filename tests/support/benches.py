@@ -1,5 +1,23 @@
 """Bench files that tests of several rooms use."""
 
+from importlib import resources
+from pathlib import Path
+
+
+def generator_bench(folder: Path, lines: str = "") -> Path:
+    """The built-in bench with its scope's generator wired to the source.
+
+    Args:
+        folder: for the file.
+        lines: of `[coil.generator]`.
+    """
+    built_in = resources.files("tactile_lab.scene").joinpath("simulated_bench.toml")
+    file = folder / "generator.toml"
+    text = built_in.read_text(encoding="utf-8")
+    file.write_text(f"{text}\n[coil.generator]\n{lines}\n", encoding="utf-8")
+    return file
+
+
 SERVED = """
 name = "served"
 simulated = false
