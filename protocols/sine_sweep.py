@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tactile_lab.analysis.response import Gain, gain
-from tactile_lab.conclusion import NOT_STATED, Conclusion
+from tactile_lab.conclusion import NOT_STATED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, QuantityError
 from tactile_lab.measurement import FloatArray, MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
@@ -130,9 +130,8 @@ class SineSweep(ForceProtocol):
         if not found:
             return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
         told = "; ".join(
-            f"{g.frequency:.3g} Hz {g.gain.value:.3g} ± {g.gain.half:.2g} V/N at "
-            f"{_degrees(g.phase.value):.1f} ± {math.degrees(g.phase.half):.2g}°"
-            for g in found
+            f"{frequency} {size} V/N at {phase}°"
+            for frequency, size, phase, *_ in (_row(g, None) for g in found)
         )
         said = [printed(f"V_C1 answers force with {told} (95 %).")]
         if run.force_uncertainty is None:
@@ -150,7 +149,15 @@ class SineSweep(ForceProtocol):
             }
             for g in found
         ]
-        return Conclusion(tuple(said), {"V_C1_over_force": values}, cut)
+        table = Table(
+            title="Gain and phase of V_C1 over force",
+            headings=("Frequency", "Gain, V/N", "Phase, °", "Model", "Model, °"),
+            rows=tuple(_row(g, beside.get(g.frequency)) for g in found),
+            note="± are 95 % intervals; the model's are of the same force.",
+        )
+        return Conclusion(
+            tuple(said), {"V_C1_over_force": values}, cut, tables=(table,)
+        )
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Gain and phase against frequency."""
@@ -186,7 +193,8 @@ class SineSweep(ForceProtocol):
                             y=[g.gain.value for g in expected], name="model", **model
                         ),
                     ),
-                    limits=(0, None),
+                    log=True,
+                    limits=_powers([g.gain.value for g in (*found, *expected)]),
                     height=1.8,
                 ),
                 Panel(
@@ -250,6 +258,27 @@ def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
             continue  # another trial, or one that was cut short
         found.append(answer if model else _known(run, trial, answer))
     return found
+
+
+def _row(found: Gain, model: Gain | None) -> tuple[str, ...]:
+    """One frequency of the table."""
+    cells = [
+        f"{found.frequency:.3g} Hz",
+        f"{found.gain.value:.3g} ± {found.gain.half:.2g}",
+        f"{_degrees(found.phase.value):.1f} ± {math.degrees(found.phase.half):.2g}",
+    ]
+    if model is None:
+        cells += ["—", "—"]
+    else:
+        phase = f"{_degrees(model.phase.value):.1f}"
+        cells += [f"{model.gain.value:.3g}", phase]
+    return tuple(printed(cell) for cell in cells)
+
+
+def _powers(values: list[float]) -> tuple[float, float]:
+    """The powers of ten on either side of all values, as a Bode plot has them."""
+    low, high = np.log10(min(values)), np.log10(max(values))
+    return 10.0 ** math.floor(low), 10.0 ** (math.floor(high) + 1)
 
 
 def _averaged(force: Waveform, time: FloatArray) -> FloatArray:

@@ -335,7 +335,13 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
     wave = Waveform(phase / frequency, 0.005 * np.sin(2 * np.pi * phase))
     run = modelled("sine_sweep", [("0.5 Hz", None, wave, False)], searched=False)
     held = (replace(run.trials[0], hold=(0.0, cycles / frequency)),)
-    (found,) = find(replace(run, trials=held)).conclusion.plain["V_C1_over_force"]
+    told = find(replace(run, trials=held)).conclusion
+    (found,) = told.plain["V_C1_over_force"]
+    ((frequency_, gain, phase_, *model),) = told.tables[0].rows
+    assert frequency_ == "0.5 Hz"
+    assert gain.startswith(f"{found['gain_V_per_N']['value']:.3g} ± ")
+    assert float(model[0]) == pytest.approx(found["gain_V_per_N"]["value"], rel=0.02)
+    assert phase_.startswith("−1") and model[1].startswith("−1")
     # small signal: dV_C1/dF = -k_F g_m R, low-passed by node A at 27 Hz
     circuit = Circuit()
     steep = 24.69e-9 / (circuit.m * circuit.V_T)
