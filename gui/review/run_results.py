@@ -113,6 +113,16 @@ class RunResults(QObject):
         if report:
             self._conclude(source.path)
 
+    def recorded(self, source: RunSource) -> None:
+        """The record of the run on screen is there: with the step that was cut short.
+
+        Live, only what has come to its end is told.
+        """
+        if source.path == self.folder and len(of_run(source)) > len(self.steps):
+            self.steps = of_run(source)
+            self._show(running=False)
+            self._fit(source)
+
     def compare_with_model(self, source: Source) -> None:
         """The run, or the model beside it, has come further."""
         self._fit(source)

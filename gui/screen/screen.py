@@ -315,6 +315,7 @@ class Screen(QObject):
             return
         self._records.shown = source
         self._panels.centre.exchange_source(source, self._lanes())
+        self.results.recorded(source)
         self._show_stored(source)
 
     def _show_stored(self, source: RunSource) -> None:

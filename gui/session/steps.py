@@ -19,7 +19,7 @@ def cells(step: MeasuredTrial) -> tuple[str, ...]:
     """One row of the table of steps."""
     found = step.response
     return (
-        step.label,
+        step.label if step.complete else f"{step.label}, cut short",
         str(found.spikes),
         "—" if found.latency is None else number(found.latency * 1e3, 0),
         "—" if found.peak_rate is None else number(found.peak_rate, 1),
@@ -60,6 +60,7 @@ def of_run(source: RunSource) -> list[MeasuredTrial]:
                 duration=hold.end - hold.start,
                 spike_times=source.spikes[inside] - hold.start,
                 hold=span if span[0] == span[0] else None,
+                complete=bool(row["complete"]),
             )
         )
     return found

@@ -4,6 +4,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
+from gui.state import WindowState
+
 LEFT = Qt.MouseButton.LeftButton
 
 
@@ -11,7 +13,7 @@ def opened(lab):
     (folder,) = lab.runs(1)
     window = lab.window
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.run.name == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
     window.centre.view.show_all()
     return window, [one for one in window.screen_.run.holds if not one.pause]
 
@@ -62,3 +64,18 @@ def test_a_line_of_the_log_on_a_step_shows_it(lab) -> None:
     ]
     log.table.activated.emit(log.filter.mapFromSource(log.model.index(rows[-1], 3)))
     assert shows(view, steps[1])
+
+
+def test_a_step_that_stop_cut_short_has_its_results(lab) -> None:
+    lab.run()
+    window, session = lab.window, lab.session
+    lab.until(lambda: session.source.reach > 2.0)
+    session.stop("enough")
+    lab.until(lambda: session.state is WindowState.READY)
+    folder = session.run.folder
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    table = window.review.results.table
+    assert table.rowCount() == 1
+    assert table.item(0, 0).text() == "120 mN, cut short"
+    assert table.item(0, 1).text() == str(window.screen_.run.spikes.size)
+    assert "partial" in window.review.results.mark.text()
