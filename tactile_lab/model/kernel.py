@@ -54,6 +54,8 @@ ROWS_0, ROWS_1, ROWS_2 = range(6, 9)
 DONE, STUCK, FAST, NOT_FINITE, STRONG = range(5)
 SHARE, SHARE_Q = 0.1, 0.5
 """Of the tolerance: what a step's series of V_C1, V, and of Q, V, may be wrong by."""
+SWING = 0.025
+"""Largest integral of a polynomial's error over part of its step, of its maximum."""
 KNEE = 12.0
 """From so many V_T down exp(-V_C1/V_T) bends V_C1."""
 SHORTEST_SEGMENT = 1e-290
@@ -355,18 +357,20 @@ def _build(stamp: int) -> Callable[..., Any]:
                             for i in range(degree + 1):
                                 piece_rows[n, 6 + i] = P[i]
                             counts[ROWS_2] += 1
-                        # what a series misses changes its sign at every node, and C2
-                        # sums it up; over a whole step that is nothing, as Radau's
-                        # rule integrates twice its degree
-                        inside = min(1.0, 0.04 + 0.06 * r) * (gain * left + left_q)
-                        over = inside
+                        # what a series misses changes its sign at every node of its
+                        # own, so C2 sums up no more than SWING of it over a step, and
+                        # nothing over a whole one, as Radau's rule integrates twice its
+                        # degree
+                        missed = gain * left + left_q
+                        swing = SWING * (gain * left * h / par[TAU_L] + left_q * r)
+                        over = 1.0
                         if width == 1.0:
-                            over *= min(1.0, 0.02 + (0.1 * r) ** 4)
+                            over = min(1.0, 0.02 + (0.1 * r) ** 4)
                         Q_error = gain * Q_error_y + 2.5e-16 * largest_Q
                         spikes = run_piece(
                             t, s + u * h, piece, q, P, degree, piece_fires, Q_error,
-                            inside, over, values[ORDER], par, S, spikes, keep_spikes,
-                            most,
+                            missed, swing, over, values[ORDER], par, S, spikes,
+                            keep_spikes, most,
                         )  # fmt: skip
                         if S[TOO_FAST] != 0.0:
                             status = FAST

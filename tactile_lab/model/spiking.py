@@ -62,6 +62,18 @@ def fire(t: float, error: float, S: FloatArray) -> None:
 
 
 @inner
+def later(
+    error: float, e: float, Q_error: float, missed: float, swing: float, V: float
+) -> float:
+    """What an error of V_C2 = V becomes in a time d with e = expm1(-d/tau_L), V.
+
+    See `run_piece` for what Q is wrong by.
+    """
+    added = min(-missed * e, swing) + EPS * abs(V)
+    return float(error * (1.0 + e) - Q_error * e + added)
+
+
+@inner
 def run_piece(
     t: float,
     s: float,
@@ -71,7 +83,8 @@ def run_piece(
     degree: int,
     fires: FloatArray,
     Q_error: float,
-    inside: float,
+    missed: float,
+    swing: float,
     over: float,
     y: float,
     par: FloatArray,
@@ -83,9 +96,9 @@ def run_piece(
     """Carry V_C2 through a piece that starts s after the segment's start at t.
 
     `fires` holds pairs (from, to) of the intervals with Q > V_fire, s after the piece's
-    start, empty ones with to <= from. Q is wrong by `Q_error` for long, and by what its
-    average over a part of the piece (`inside`) or over all of it (`over`) leaves of the
-    series' own error, V. Returns the array of spikes, grown if need be.
+    start, empty ones with to <= from. Q is wrong by `Q_error` for long, and by `missed`
+    to and fro, of which V_C2 sums up no more than `swing`, V, over the whole piece
+    `over` times that. Returns the array of spikes, grown if need be.
     """
     tau = par[TAU_L]
     to_x = 2.0 / length
@@ -125,7 +138,7 @@ def run_piece(
                     if rise > 0.0:
                         d -= d * drift / rise
                     d = min(max(d, 0.0), left)
-                missed, margin = False, 0.0
+                too_low, margin = False, 0.0
                 for _ in range(100):
                     S[SEARCHES] += 1.0
                     x = (ref + d) * to_x - 1.0
@@ -135,7 +148,7 @@ def run_piece(
                     slope = (Q - V_f - w) / tau
                     if w < 0.0:
                         if d >= left:
-                            missed = True
+                            too_low = True
                             margin = -w
                             break
                         low = d
@@ -165,12 +178,10 @@ def run_piece(
                         P_now += (Q - P_now) / tau * step
                         Q += (Q - Q_ref) / d * step
                         break
-                if missed:
+                if too_low:
                     known = False
                     e = math.expm1(-left / tau)
-                    error = (
-                        S[ERROR] * (1.0 + e) - (Q_error + inside) * e + EPS * abs(V_f)
-                    )
+                    error = later(S[ERROR], e, Q_error, missed, swing, V_f)
                     if margin < error:
                         S[DOUBT] = 1.0
                     break
@@ -184,7 +195,7 @@ def run_piece(
                 Q, P_now = both_at(q, P, degree, v * to_x - 1.0)
             known = True
             slope = (Q - V_f) / tau
-            error = S[ERROR] * (1.0 + e) - (Q_error + inside) * e + EPS * abs(V_f)
+            error = later(S[ERROR], e, Q_error, missed, swing, V_f)
             time_error = error / max(slope, 1e-300)
             time_error += EPS * d
             if b - v < 2.0 * time_error and b < length:
@@ -219,7 +230,8 @@ def run_piece(
         for n in range(1, degree + 1):
             P_end += P[n]
         S[VOLTAGE] = V + (V - P_now) * e + (P_end - P_now)
-        averages = over if S[REF] == 0.0 else inside
-        S[ERROR] = S[ERROR] * (1.0 + e) - (Q_error + averages) * e + EPS * abs(V)
+        if S[REF] == 0.0:
+            swing, missed = over * swing, over * missed
+        S[ERROR] = later(S[ERROR], e, Q_error, missed, swing, V)
     S[REF] = S[REF_LOW] = 0.0
     return spikes

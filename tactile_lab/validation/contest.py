@@ -15,10 +15,12 @@ from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.simulate import simulate
 from tactile_lab.validation import general, rivals, spice
+from tactile_lab.validation.exact_firing import exact_firing
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem, spent
 from tactile_lab.validation.reference import reference
 
 OURS = "tactile_lab"
+EXACT = "exact integrate-and-fire"
 
 
 COMPILED, CALLED, PROCESS = "compiled", "called from Python", "own process"
@@ -121,6 +123,9 @@ def methods(repeats: int, spice_too: bool = True) -> list[Method]:
             solve = partial(rivals.fixed_step, order=order, events=events, dt=dt)
             times = repeats if dt > 1e-5 else 1
             found.append(Method(name, f"dt {dt:g}", solve, times, COMPILED))
+        solve = partial(exact_firing, dt=dt)
+        times = repeats if dt > 1e-6 else 1
+        found.append(Method(EXACT, f"dt {dt:g}", solve, times, COMPILED))
     for tol in (1e-6, 1e-9, 1e-12):
         for name in general.SCIPY:
             solve = partial(general.scipy_solver, method=name, tolerance=tol)
@@ -197,6 +202,7 @@ def contest(
         with suppress(TactileLabError):  # nor is this answer, which may be NaN
             rivals.fixed_step(problem, cap, rivals.EULER, rivals.ON_GRID, 1e-2)
             rivals.stepped(problem, cap, rivals.RODAS, 1e-3)
+            exact_firing(problem, cap, 1e-2)
         rows: dict[int, Row] = {}
         for turn in range(max(m.repeats for m in entrants)):
             for k, method in enumerate(entrants):

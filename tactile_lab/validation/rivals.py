@@ -351,7 +351,7 @@ def stepped(problem: Problem, cap: float, method: int, tolerance: float) -> Answ
     y, v = problem.first
     most = cap * EVALUATIONS_PER_SECOND
     got = adaptive(method, problem.table, y, v, problem.par, tolerance, most)
-    return _answer(got, cap)
+    return answered(got, cap)
 
 
 def fixed_step(
@@ -366,13 +366,19 @@ def fixed_step(
         OutOfTimeError: so many steps need more than `cap` s of CPU time.
         SolverError: the solution is NaN.
     """
-    if problem.until / dt * order > cap * EVALUATIONS_PER_SECOND:
-        raise OutOfTimeError(f"would take more than {cap:g} s")
+    check_steps(problem.until / dt * order, cap)
     y, v = problem.first
-    return _answer(fixed(order, events, problem.table, y, v, problem.par, dt), cap)
+    return answered(fixed(order, events, problem.table, y, v, problem.par, dt), cap)
 
 
-def _answer(got: tuple[int, FloatArray, float, int], cap: float) -> Answer:
+def check_steps(evaluations: float, cap: float) -> None:
+    """Raise OutOfTimeError where so many need more than `cap` s of CPU time."""
+    if evaluations > cap * EVALUATIONS_PER_SECOND:
+        raise OutOfTimeError(f"would take more than {cap:g} s")
+
+
+def answered(got: tuple[int, FloatArray, float, int], cap: float) -> Answer:
+    """What a compiled method returned, or why it has no answer."""
     status, spikes, y, evaluations = got
     if status == OUT_OF_EVALUATIONS:
         raise OutOfTimeError(f"stopped after {evaluations} evaluations, {cap:g} s")

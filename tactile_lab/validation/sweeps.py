@@ -17,6 +17,7 @@ import numpy as np
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.validation.contest import (
     COMPILED,
+    EXACT,
     OURS,
     Method,
     Row,
@@ -33,7 +34,7 @@ from tactile_lab.waveform import Waveform
 SETTINGS = {
     OURS: "tol 1e-09", "Dormand-Prince 5(4)": "tol 1e-09", "Rodas5P": "tol 1e-09",
     "Euler": "dt 1e-05", "RK4": "dt 1e-05", "Euler, interpolated": "dt 1e-05",
-    "RK4, interpolated": "dt 1e-05",
+    "RK4, interpolated": "dt 1e-05", EXACT: "dt 1e-05",
 }  # fmt: skip
 AXES = {
     "stiffness": "force of the jump (N)",
@@ -175,7 +176,7 @@ def _figure(points: Sequence[Point], path: Path) -> None:
             style = {
                 "color": "black" if name == OURS else colours(k),
                 "linewidth": 2.0 if name == OURS else 1.0,
-                "marker": "os^vD<>"[k], "markersize": 4,
+                "marker": "os^vD<>p"[k], "markersize": 4,
             }  # fmt: skip
             axes[0, column].plot(
                 [p.at for p in some], [p.row.run_time for p in some], label=name,

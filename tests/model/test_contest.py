@@ -9,6 +9,7 @@ from tactile_lab.model.state import Start
 from tactile_lab.validation import general, rivals, spice, sweeps
 from tactile_lab.validation.accuracy import fastest, order, table, write_csv
 from tactile_lab.validation.contest import COMPILED, Method, Row, Truth, judge, ours
+from tactile_lab.validation.exact_firing import exact_firing
 from tactile_lab.validation.extremes import formula, grazing
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem
 from tactile_lab.waveform import Waveform
@@ -69,6 +70,20 @@ def test_compiled_rivals_converge(circuit, method):
     assert error(fine, exact) < 1e-9
     assert fine.V_C1 == pytest.approx(exact.V_C1, abs=1e-9)
     assert fine.evaluations > 2 * coarse.evaluations
+
+
+@pytest.mark.parametrize("firing", ["lif", "put"])
+def test_exact_firing_is_of_order_two_and_keeps_resets_off_the_grid(firing):
+    force = Waveform.through([(0, 0), (0.02, 0), (0.03, 0.19)])
+    problem = Problem("ramp", Circuit(firing=firing), force, 0.15)
+    exact = ours(problem, 10.0, 1e-12)
+    assert exact.spike_times.size
+    errors = [
+        error(exact_firing(problem, 30.0, dt), exact) for dt in (4e-4, 4e-5, 4e-6)
+    ]
+    assert errors[0] > 80 * errors[1] > 6400 * errors[2]
+    with pytest.raises(SolverError, match="acts back"):
+        exact_firing(Problem("", Circuit(saturation=True), force, 0.1), 1.0, 1e-3)
 
 
 def test_where_t1_saturates_ours_needs_fewer_evaluations_than_the_rivals():
