@@ -89,7 +89,7 @@ class Residuals:
         )
         parts = []
         if self._trace is not None:
-            parts.append(self._trace.value - found.sample("V_C1", self._trace.time))
+            parts.append(self._trace.value - self._trace.modelled(found))
         if self._grids:
             everywhere = np.concatenate(self._grids)
             current = I_C(circuit, found.sample("V_C1", everywhere)) + circuit.I_bias

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,10 @@ from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
 
+NARROW, WITHIN = 1e-3, 8
+"""A signal hardly bends within bins narrower than this, s; in others the model's mean
+is that of so many points."""
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:
@@ -31,6 +35,7 @@ class Measured:
         resolution: one code of the channel, V; what its mean may be off by.
         offset: half of the 95 % band of its follower's offset, V.
         steps: how far the mean of a bin may be off by the converter's steps, V.
+        width: of a bin, s; 0 for values at an instant.
     """
 
     signal: str
@@ -39,6 +44,17 @@ class Measured:
     resolution: float = 0.0
     offset: float = 0.0
     steps: float = 0.0
+    width: float = 0.0
+
+    def modelled(self, result: Result) -> FloatArray:
+        """The model's mean in each bin, V, shape (n,)."""
+        if self.width < NARROW:
+            return result.sample(self.signal, self.time)
+        within = ((np.arange(WITHIN) + 0.5) / WITHIN - 0.5) * self.width
+        at = np.clip(self.time[:, None] + within, 0.0, result.duration)
+        found = result.sample(self.signal, at.ravel()).reshape(at.shape)
+        mean: FloatArray = found.mean(axis=1)
+        return mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +203,9 @@ def _residual(
     jumps: FloatArray,
 ) -> Residual:
     inside = (trace.time >= 0) & (trace.time <= result.duration)
-    time, value = trace.time[inside], trace.value[inside]
-    predicted = result.sample(trace.signal, time)
-    difference = value - predicted
+    trace = replace(trace, time=trace.time[inside], value=trace.value[inside])
+    time, predicted = trace.time, trace.modelled(result)
+    difference = trace.value - predicted
     if trace.signal == "V_C2" and jumps.size and time.size > 1:
         half = float(np.median(np.diff(time)))
         after = np.searchsorted(jumps, time - half)
@@ -197,8 +213,7 @@ def _residual(
         hit = (after < jumps.size) & (jumps[near] <= time + half)
         difference = np.where(hit, np.nan, difference)
     moved = (
-        (name, (other.sample(trace.signal, time) - predicted) / PART)
-        for name, other in causes
+        (name, (trace.modelled(other) - predicted) / PART) for name, other in causes
     )
     channel = (
         (name, np.full(time.size, volts))

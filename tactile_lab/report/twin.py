@@ -111,6 +111,7 @@ def measured(run: RunData, believed: Belief, trace: RecordedSignal) -> Measured:
         resolution=trace.code or 0.0,
         offset=believed.offset,
         steps=run.step_bias(trace.signal),
+        width=float(np.median(np.diff(trace.time))) if trace.time.size > 1 else 0.0,
     )
 
 

@@ -25,6 +25,24 @@ def measured(circuit, signal="V_C1", noise=0.0, bins=500):
     return Measured(signal, time, value), found.spike_times
 
 
+def test_the_mean_of_a_bin_is_compared_with_the_model_s_mean():
+    """A vibration swings several times within a bin of a long run."""
+    time = np.arange(0, 2, 1e-3)
+    force = Waveform(time, 0.1 + 0.04 * np.sin(2 * np.pi * 60 * time))
+    found = simulate(Circuit(), force, keep=("V_C1",))
+    width = 0.025
+    middles = np.arange(20, 78) * width + width / 2
+    fine = middles[:, None] + (np.arange(200) - 99.5) / 200 * width
+    mean = found.sample("V_C1", fine.ravel()).reshape(fine.shape).mean(axis=1)
+    seen = Measured("V_C1", middles, mean, width=width)
+    beside = twin(Circuit(), force, force.end, voltages=[seen]).residual("V_C1")
+    assert beside.rms < 2e-3
+    at_once = twin(
+        Circuit(), force, force.end, voltages=[replace(seen, width=0.0)]
+    ).residual("V_C1")
+    assert at_once.rms > 10 * beside.rms
+
+
 def test_the_twin_of_the_true_circuit_leaves_the_noise():
     trace, spikes = measured(Circuit(), noise=3e-3)
     found = twin(Circuit(), FORCE, FORCE.end, voltages=[trace], spike_times=spikes)
