@@ -54,7 +54,7 @@ ROWS_0, ROWS_1, ROWS_2 = range(6, 9)
 DONE, STUCK, FAST, NOT_FINITE, STRONG = range(5)
 SHARE, SHARE_Q = 0.1, 0.5
 """Of the tolerance: what a step's series of V_C1, V, and of Q, V, may be wrong by."""
-SWING = 0.025
+SWING = 0.02
 """Largest integral of a polynomial's error over part of its step, of its maximum."""
 KNEE = 12.0
 """From so many V_T down exp(-V_C1/V_T) bends V_C1."""
