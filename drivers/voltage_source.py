@@ -122,6 +122,18 @@ class SourceMeter:
             wire.link.close()
             raise
 
+    def look(self) -> str:
+        """Who answers: asked and closed, nothing is set.
+
+        Raises:
+            InstrumentError: the port or what is behind it, as `open`.
+        """
+        try:
+            self._wire.meet()
+            return self.identity
+        finally:
+            self._wire.link.close()
+
     def step_to(self, volts: float) -> bool:
         """Step towards `volts`, V, as far as slew allows; whether it is there.
 

@@ -91,7 +91,7 @@ class InstrumentView:
     def short(self) -> str:
         """The name where there is little room."""
         known = {"Coil source": "Coil", "Oscilloscope": "Scope", "Teslameter": "Field"}
-        return known.get(self.name, self.name)
+        return known.get(self.name, self.name.removeprefix("Source of "))
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,10 @@ class VoltageLimits(SceneTable):
         """Whether `volts`, V, may be set."""
         return self.lowest <= volts <= self.highest
 
+    def nearest(self, volts: float) -> float:
+        """What may be set and lies nearest to `volts`, V."""
+        return min(max(volts, self.lowest), self.highest)
+
     @property
     def span(self) -> str:
         """The allowed range for a person."""

@@ -71,6 +71,13 @@ def bench_text(choice: BenchChoice) -> str:
     kept = ("notes", "hand_set")
     data: dict[str, Any] = {"name": choice.name, "simulated": False}
     data |= {key: base[key] for key in kept if base.get(key)}
+    sources = {  # those that are simulated stay behind
+        name: one
+        for name, one in base.get("voltage_source", {}).items()
+        if not one["port"].startswith("sim:")
+    }
+    if sources:
+        data["voltage_source"] = sources
     if choice.coil_port:
         same = base.get("coil", {}).get("dialect") == choice.coil_dialect
         data["coil"] = {

@@ -26,6 +26,7 @@ from tactile_lab.instruments.registry import check_scope
 from tactile_lab.quantity import show
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
+from tactile_lab.voltage_source import SOURCED
 
 if TYPE_CHECKING:
     from tactile_lab.engine.manual import FieldReading
@@ -36,7 +37,12 @@ WATCH = 60.0
 STALE = 2 * WATCH
 """Seconds after which an answer no longer says that an instrument is there."""
 
-ROLES = {"coil": "Coil source", "scope": "Oscilloscope", "meter": "Teslameter"}
+ROLES = {
+    "coil": "Coil source",
+    "scope": "Oscilloscope",
+    "meter": "Teslameter",
+    **{name: f"Source of {name}" for name in SOURCED},
+}
 
 
 class ConnectedBench(QObject):

@@ -19,6 +19,7 @@ from gui.state import (
     truth,
 )
 from tactile_lab.quantity import show
+from tactile_lab.voltage_source import SOURCED
 
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
@@ -45,18 +46,22 @@ class Chips:
                 views.append(self._scope(plan))
             elif role == "meter":
                 views.append(self._meter())
+            elif plan is not None:
+                views.append(self._voltage(role, plan.needs.voltages[role]))
         if plan is not None and plan.preview.traces:
             views.append(self._model(plan))
         return tuple(views)
 
     def _roles(self, plan: Expectation | None) -> list[str]:
         if plan is None:
-            return [one.role for one in self._bench.answers] or ["coil", "scope"]
+            found = [one.role for one in self._bench.answers]
+            return [one for one in found if one not in SOURCED] or ["coil", "scope"]
         needs = plan.needs
         wanted = {
             "coil": needs.coil,
             "scope": bool(needs.channels),
             "meter": needs.field_meter or needs.asked_field,
+            **dict.fromkeys(needs.voltages, True),
         }
         return [role for role, used in wanted.items() if used]
 
@@ -120,6 +125,16 @@ class Chips:
             lamp = Lamp.ACTIVE
         short = " ".join(words.split(",")[:2])  # maker and model of an *IDN? answer
         return InstrumentView(ROLES["meter"], lamp, short, value)
+
+    def _voltage(self, name: str, wanted: float) -> InstrumentView:
+        """What the source of a voltage is to hold, V, and what it holds in a run."""
+        lamp, words = self._found(name)
+        value, held = "—", self._run.voltages.get(name)
+        if lamp not in (Lamp.ABSENT, Lamp.WAITING, Lamp.BAD):
+            words = f"to hold {show(wanted, 'V', 5)}"
+        if self._status.state is WindowState.RUNNING and held is not None:
+            lamp, value = Lamp.ACTIVE, show(held, "V", 5)
+        return InstrumentView(ROLES[name], lamp, words, value)
 
     def _model(self, plan: Expectation) -> InstrumentView:
         """What the model expects; beside a run, how well it follows."""

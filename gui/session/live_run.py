@@ -50,6 +50,7 @@ class LiveRun(LiveTask):
         name: for people: the title, then the folder.
         folder: of the last run; None before any.
         trial: number and label of the step in progress.
+        voltages: what source meters were read back to hold, V.
         probes: what the probes touch in this trial: the circuit, or something else.
         asked: what it waits for a person to do; None while nobody is asked.
         elapsed, expected: run time, s.
@@ -84,6 +85,7 @@ class LiveRun(LiveTask):
         self.trial: tuple[int, str] | None = None
         self.probes = "circuit"
         self.asked: PersonAsked | None = None
+        self.voltages: dict[str, float] = {}
         self.elapsed = 0.0
         self.expected: float | None = None
         self.agreement: Agreement | None = None
@@ -103,6 +105,7 @@ class LiveRun(LiveTask):
         """
         self.source, self.trial, self.agreement = None, None, None
         self.elapsed, self.expected, self.asked = 0.0, None, None
+        self.voltages = {}
         self.request, self.expectation = request, expectation
         self.title = self.name = title
         self._begin(begin_run, request, self.out, dict(self.notes))
@@ -170,6 +173,8 @@ class LiveRun(LiveTask):
             case events.FieldRead(time=at, field=field):
                 self._field_read(field)
                 source.add_field(at, field)
+            case events.VoltageRead(name=name, held=held):
+                self.voltages[name] = held.voltage
             case events.TrialStarted():
                 self._trial_started(source, event)
 

@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     from tactile_lab.store.spike_shapes import SpikeShapes
     from tactile_lab.store.statistics import Statistics
     from tactile_lab.trace import FloatArray
+    from tactile_lab.voltage_source import VoltageSource
 
-    Instrument = Coil | Scope | FieldMeter
+    Instrument = Coil | Scope | FieldMeter | VoltageSource
 
 LONGEST = 300.0
 """Seconds a report may take."""
@@ -49,7 +50,7 @@ class InstrumentAnswer:
     """One instrument answered, or did not.
 
     Attributes:
-        role: coil, scope or meter.
+        role: coil, scope, meter, or the voltage that it holds.
         identity: as it answered.
         problem: why it did not, "" if it did.
     """
@@ -163,7 +164,12 @@ def _answers(
 ) -> tuple[InstrumentAnswer, ...]:
     """What each instrument of the bench answers when it is asked."""
     found: list[InstrumentAnswer] = []
-    every = (("coil", bench.coil), ("scope", bench.scope), ("meter", bench.field_meter))
+    every = (
+        ("coil", bench.coil),
+        ("scope", bench.scope),
+        ("meter", bench.field_meter),
+        *bench.voltage_sources.items(),
+    )
     with bench.clock.taking_part("check"):
         for role, instrument in every:
             if instrument is None:

@@ -6,7 +6,9 @@ import json
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
@@ -54,11 +56,19 @@ def bench_request(
     signals = [channel.signal for channel in channels]
     signals += ["force"] if spec.coil is not None else []
     signals += ["field"] if spec.field_meter is not None else []
+    sources = spec.voltage_sources
+    believed = Circuit().at(cast("dict[str, float]", spec.hand_set))
+    allowed = [
+        f"sensor.{name}={one.limits.nearest(getattr(believed, name))!r} V"
+        for name, one in sources.items()
+    ]
     return Request(
         "demo",
         (
             'protocol.levels=["1 mN"]',
             f"record.signals={json.dumps(signals)}",
+            f"sensor.sourced={json.dumps(list(sources))}",
+            *allowed,
             *overrides,
         ),
         bench,

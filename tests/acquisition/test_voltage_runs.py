@@ -2,6 +2,7 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import pytest
 from benches import WITH_A_SOURCE_METER
@@ -11,11 +12,13 @@ from sim_backend.serial_line.faults import SerialFault
 from sim_backend.voltage_source import LoadFault
 from tactile_lab.acquisition.events import RunState, StateChanged, VoltageRead
 from tactile_lab.engine.execution import Execution
+from tactile_lab.engine.jobs import InstrumentAnswer, check
+from tactile_lab.engine.request import bench_request
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.model.equations import rest_V_C1
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
-from tactile_lab.scene.load import load
+from tactile_lab.scene.load import load, load_bench
 from tactile_lab.store.export import csv as to_csv
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
@@ -116,6 +119,42 @@ def test_two_voltages_are_held_side_by_side(scene, execute):
         assert set(run.info["voltages_left"]) == {"V_GS", "V_th"}
         of_threshold = run.voltages[run.voltages["name"] == b"V_th"]
         assert of_threshold["measured"] == pytest.approx(3.213, abs=1e-3)
+
+
+def test_who_is_there_is_asked_of_every_source_and_none_is_switched_on(tmp_path):
+    file = tmp_path / "bench.toml"
+    text = WITH_A_SOURCE_METER.replace('lowest = "1 V"', 'lowest = "1.5 V"')
+    file.write_text(text)  # Table 1's V_GS is below that
+    asked = bench_request(str(file), load_bench(file)).load()
+    bench = open_bench(asked, needs(asked))
+    found = check(bench)
+    assert found.sound
+    told = {one.role: one.identity for one in found.found}
+    assert told["V_GS"].startswith("KEITHLEY") and "V_th" in told
+    source = bench.voltage_sources["V_GS"]
+    assert source.go_to_rest().text == "The source of V_GS was never switched on."
+
+
+def test_the_chip_of_a_source_tells_what_it_is_to_hold_and_what_it_holds(scene):
+    from gui.session.chips import Chips
+    from gui.session.expectation import expect
+    from gui.state import Lamp, WindowState
+
+    status = SimpleNamespace(state=WindowState.READY)
+    answers = (InstrumentAnswer("V_GS", "KEITHLEY", ""),)
+    bench = SimpleNamespace(answers=answers, age=0.0, known=True, field=None)
+    run = SimpleNamespace(voltages={}, agreement=None)
+    chips = Chips(status, bench, run, SimpleNamespace(alive=False))
+    plan = expect(scene(*HELD))
+
+    def chip():
+        found = {view.name: view for view in chips.views(plan, None)}
+        return found["Source of V_GS"]
+
+    assert (chip().detail, chip().value) == ("to hold 1.4 V", "—")
+    status.state, run.voltages = WindowState.RUNNING, {"V_GS": 1.40012}
+    assert (chip().lamp, chip().value) == (Lamp.ACTIVE, "1.4001 V")
+    assert chip().short == "V_GS"
 
 
 @pytest.mark.parametrize(
