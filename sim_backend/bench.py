@@ -74,6 +74,8 @@ def options(scene: Scene) -> PlantOptions:
         eddy_lag=bench.magnet.eddy_lag + deviation.lag,
         force=1 + deviation.force,
         drift=simulated.clock_error,
+        warming=simulated.warming,
+        warming_time=simulated.warming_time,
     )
 
 

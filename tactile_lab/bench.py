@@ -266,9 +266,11 @@ class Channel(SceneTable):
         offset: analogue offset added before digitising, V.
         coupling: "DC" or "AC".
         scale: signal unit per volt at the input: 10 for a 10:1 probe; what follows
-            from `shunt` or `tesla_per_volt` where one of them is given.
+            from `shunt`, `tesla_per_volt` or `kelvin_per_volt` where one is given.
         shunt: of coil_current: the shunt's resistance, Ohm.
         tesla_per_volt: of field: what the analogue output of a teslameter means, T/V.
+        kelvin_per_volt: of temperature: what a sensor's output means, K/V.
+        zero_at: of temperature: what 0 V means, K; 273.15 K where it is 0 °C.
         zero: what lies at the input where the signal is 0, V.
         auto_range: of V_C1 and V_C2: whether a run may take a wider range where the
             model expects more than this one sees.
@@ -285,6 +287,8 @@ class Channel(SceneTable):
     scale: float = 1.0
     shunt: Annotated[float, Unit("Ohm", above=0.0)] | None = None
     tesla_per_volt: Annotated[float, Unit("T/V")] | None = None
+    kelvin_per_volt: Annotated[float, Unit("K/V")] | None = None
+    zero_at: Annotated[float, Unit("K", least=0.0)] | None = None
     zero: Annotated[float, Unit("V")] = 0.0
     auto_range: bool = False
 
@@ -292,6 +296,12 @@ class Channel(SceneTable):
         for key, belongs_to, given, scale in (
             ("shunt", "coil_current", self.shunt, 1 / (self.shunt or 1.0)),
             ("tesla_per_volt", "field", self.tesla_per_volt, self.tesla_per_volt),
+            (
+                "kelvin_per_volt",
+                "temperature",
+                self.kelvin_per_volt,
+                self.kelvin_per_volt,
+            ),
         ):
             if not given or not scale:
                 continue
@@ -300,6 +310,11 @@ class Channel(SceneTable):
             if self.scale not in (1.0, scale):
                 raise ValueError(f"give either {key} or scale, not both")
             object.__setattr__(self, "scale", scale)
+        if self.zero_at is not None:
+            zero = -self.zero_at / self.scale
+            if self.signal != "temperature" or self.zero not in (0.0, zero):
+                raise ValueError("zero_at belongs to temperature, instead of zero")
+            object.__setattr__(self, "zero", zero)
         if self.scale == 0:
             raise ValueError("scale must not be 0")
 

@@ -155,6 +155,7 @@ class Measurement:
         field_per_ampere: B2 over current as assumed or calibrated, T/A, or None.
         newtons_per_tesla: force over B2 by Eq. (2), N/T, or None.
         field: teslameter readings, shape (m, 2), s and T, or None.
+        temperature: of the sensor as it was read, shape (m, 2), s and K, or None.
         voltages: what source meters were read back to hold, by the circuit's voltage,
             shape (m, 2), s and V.
         traces: decimated signals, the derived I_DS and the model's V_C1 among them.
@@ -180,6 +181,7 @@ class Measurement:
     field_per_ampere: float | None = None
     newtons_per_tesla: float | None = None
     field: FloatArray | None = None
+    temperature: FloatArray | None = None
     voltages: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
@@ -310,10 +312,11 @@ class Measurement:
 
     def source_read(self, name: str, trial: MeasuredTrial) -> float | None:
         """Mean of what the source of a voltage read in a trial, V; None if nothing."""
-        rows = self.voltages.get(name, np.empty((0, 2)))
-        since = rows[:, 0] - trial.start
-        inside = (since >= 0) & (since < trial.duration)
-        return float(rows[inside, 1].mean()) if inside.any() else None
+        return _mean_in(trial, self.voltages.get(name))
+
+    def temperature_in(self, trial: MeasuredTrial) -> float | None:
+        """Mean temperature read in a trial, K; None where none was."""
+        return _mean_in(trial, self.temperature)
 
     def source_error(self, name: str, volts: float) -> float | None:
         """Bound on the error of what the source of `name` reads, V; None: not known."""
@@ -335,3 +338,12 @@ class Measurement:
         if force is None or self.force_uncertainty is None:
             return None
         return float(self.force_uncertainty.of(force))
+
+
+def _mean_in(trial: MeasuredTrial, readings: FloatArray | None) -> float | None:
+    """Mean of readings, shape (n, 2), s and SI, within a trial; None without any."""
+    if readings is None:
+        return None
+    since = readings[:, 0] - trial.start
+    inside = (since >= 0) & (since < trial.duration)
+    return float(readings[inside, 1].mean()) if inside.any() else None

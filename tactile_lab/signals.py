@@ -31,6 +31,7 @@ SIGNALS = {
         Signal("force", "N", "derived", "Force"),
         Signal("coil_current", "A", "measured", "Coil current"),
         Signal("field", "T", "measured", "Field"),
+        Signal("temperature", "K", "measured", "Temperature"),
         Signal("V_P", "V", "model", "V_P"),
         Signal("I_DS", "A", "derived", "I_DS"),
         Signal("V_C1", "V", "measured", "V_C1"),
@@ -42,8 +43,11 @@ SIGNALS = {
     )
 }
 
-BENCH_ONLY = frozenset({"coil_current", "field"})
+BENCH_ONLY = frozenset({"coil_current", "field", "temperature"})
 """Signals the model alone knows nothing of."""
+
+AVERAGED = ("field", "temperature")
+"""Kept as readings, one for many samples, where a scope channel carries them."""
 
 FIELD_AVERAGING = 0.2
 """Time one reading is averaged over, s: whole periods of 50 Hz and of 60 Hz mains."""

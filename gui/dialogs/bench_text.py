@@ -74,7 +74,7 @@ def bench_text(choice: BenchChoice) -> str:
     sources = {  # those that are simulated stay behind
         name: one
         for name, one in base.get("voltage_source", {}).items()
-        if not one["port"].startswith("sim:")
+        if not one.get("port", "sim:").startswith("sim:")
     }
     if sources:
         data["voltage_source"] = sources

@@ -77,6 +77,7 @@ _LANES = (
         averaged=True,
     ),
     Lane("field", "Field", "Field", "mT", 1e3, 2, 0.7, 1.0),
+    Lane("temperature", "Temperature", "Temperature", "K", 1.0, 2, 0.7, 0.1),
     Lane("spikes", "Spikes", "Spikes", "", 1.0, 0, 0.66, raster=True),
     Lane("rate", "Rate", "Rate", "Hz", 1.0, 2, 1.0, 2.0, zero=True),
 )

@@ -18,6 +18,7 @@ from gui.lanes.phase import Phase, phase
 from gui.lanes.rate import rate_of
 from gui.lanes.twin import TwinTraces
 from tactile_lab.pyramid import Pyramid
+from tactile_lab.signals import AVERAGED
 from tactile_lab.trace import FloatArray, Trace
 
 if TYPE_CHECKING:
@@ -233,7 +234,7 @@ class LiveSource(Source):
         self._loop: list[tuple[float, float, float]] = []
         self._new = False
         self._pyramids: dict[str, Pyramid] = {}
-        self._slow = {name: Readings() for name in ("force", "field")}
+        self._slow = {name: Readings() for name in ("force", *AVERAGED)}
         self._spikes = np.empty(1024)
         self._spike_count = 0
 
@@ -304,6 +305,10 @@ class LiveSource(Source):
     def add_current(self, time: float, amperes: float) -> None:
         """A read-back of the coil."""
         self._slow["force"].add(time, amperes * self._gain)
+
+    def add_temperature(self, time: float, kelvin: float) -> None:
+        """A reading of the sensor's temperature."""
+        self._slow["temperature"].add(time, kelvin)
 
     def add_field(self, time: float, tesla: float) -> None:
         """A reading of the teslameter."""

@@ -14,6 +14,7 @@ from gui.lanes.twin import MARGIN, Look, TwinTraces
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
+from tactile_lab.signals import AVERAGED
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.overrange import overrange
 from tactile_lab.store.remarks import read_remarks
@@ -73,7 +74,7 @@ class RunSource(Source):
         self.signals: tuple[str, ...] = (*slow, *self._pyramids, *searched)
         self._lines = {
             "force": Trace.steps(*self._slow["force"], self.length),
-            "field": Trace.line(*self._slow["field"]),
+            **{name: Trace.line(*self._slow[name]) for name in AVERAGED},
         }
         self._wanted: dict[str, tuple[float, float, int]] = {}
         self._lock = threading.Lock()
@@ -204,12 +205,13 @@ def _pyramid(signal: StoredSignal) -> Pyramid:
 
 
 def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Force from the applied current, and the field, as (times, values)."""
+    """Force from the applied current, field, temperature, as (times, values)."""
     time, current = run.read_back.T
-    field = run.field
+    field, warm = run.field, run.temperature
     return {
         "force": (time, current * gain),
         "field": (field["time"].copy(), field["field"].copy()),
+        "temperature": (warm["time"].copy(), warm["temperature"].copy()),
     }
 
 

@@ -74,6 +74,7 @@ class Tokens:
             "spikes": self.spikes,
             "coil_current": self.current,
             "field": self.current,
+            "temperature": self.current,
             "residual": self.residual,
         }
         return known.get(signal, self.twin)

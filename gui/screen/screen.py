@@ -20,6 +20,7 @@ from gui.state import WindowState
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.quantity import count
+from tactile_lab.signals import AVERAGED
 from tactile_lab.store.catalogue import RunSummary, catalogue
 from tactile_lab.store.folder import DATA
 from tactile_lab.trial import Outcome
@@ -277,7 +278,8 @@ class Screen(QObject):
         if expectation is None:
             return None
         needs, record = expectation.needs, expectation.record
-        signals = {"force", *needs.stored} | (set(record.signals) & {"spikes", "field"})
+        signals = {"force", *needs.stored}
+        signals |= set(record.signals) & {"spikes", *AVERAGED}
         if needs.detect_on is not None:
             signals.add("spikes")
         if "coil_current" not in record.signals:

@@ -173,6 +173,8 @@ class LiveRun(LiveTask):
             case events.FieldRead(time=at, field=field):
                 self._field_read(field)
                 source.add_field(at, field)
+            case events.TemperatureRead(time=at, kelvin=kelvin):
+                source.add_temperature(at, kelvin)
             case events.VoltageRead(name=name, held=held):
                 self.voltages[name] = held.voltage
             case events.TrialStarted():

@@ -13,10 +13,10 @@ from sim_backend.plant.winding import Winding
 from tactile_lab.errors import ParameterError
 from tactile_lab.scene.tables import NOISE
 
-SCOPE_NOISE = {**NOISE, "field": 1e-3}
+SCOPE_NOISE = {**NOISE, "field": 1e-3, "temperature": 0.5e-3}
 """Standard deviation at the scope's input, V."""
 
-_POSITIVE = ("follower_pole", "slew", "mains", "force")
+_POSITIVE = ("follower_pole", "slew", "mains", "force", "warming_time")
 _NOT_NEGATIVE = ("hum", "coil_lag", "eddy_lag", "hysteresis", "attraction", "pickup")
 
 
@@ -46,6 +46,8 @@ class PlantOptions:
         drift: relative error of the scope's sample clock, so 50e-6 is 50 ppm; above 0
             each interval lasts longer than the scope says, and whoever asks for
             samples must count them by that longer interval, or he is early.
+        warming: by which the sensor becomes warmer, K.
+        warming_time: time constant with which it does, s.
         wired: fault: signal that really lies at an input, by input name.
         open_inputs: fault: inputs whose probe is not connected.
         pickup: amplitude of the hum at an open input, V.
@@ -70,6 +72,8 @@ class PlantOptions:
     attraction: float = 0.0
     winding: Winding = field(default_factory=Winding)
     drift: float = 0.0
+    warming: float = 0.0
+    warming_time: float = 600.0
     wired: Mapping[str, str] = field(default_factory=dict)
     open_inputs: tuple[str, ...] = ()
     pickup: float = 20e-3
@@ -115,6 +119,10 @@ class PlantOptions:
         if not self.follower:
             return Follower(0.0, math.inf)
         return Follower(1 / (2 * math.pi * self.follower_pole), self.slew)
+
+    def warmer(self, time: float) -> float:
+        """By how much the sensor is warmer at `time` s than at 0 s, K."""
+        return -self.warming * math.expm1(-max(time, 0.0) / self.warming_time)
 
     def noise_at(self, signal: str) -> float:
         """Standard deviation of an input that carries `signal`, V."""

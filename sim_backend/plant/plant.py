@@ -26,6 +26,7 @@ from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.temperature import temperature
 from tactile_lab.waveform import Waveform
 
 MEMORY = 0.2
@@ -35,7 +36,7 @@ BACKLOG = 4096
 UNPOWERED = 0.1
 """Least supply and threshold the circuit is computed with, V."""
 Coupled = tuple[ScopeInput, Capacitor | None]
-SIGNALS = (*NEEDS, "coil_current", "field", *PLACED)
+SIGNALS = (*NEEDS, "coil_current", "field", "temperature", *PLACED)
 """What may lie at a scope input."""
 
 
@@ -98,7 +99,9 @@ class Plant(DrivenCoil):
         acting = noise if irregular.of_force else None
         self._drive = _Drive(self._electromagnet, magnet, options, acting)
         fire = noise.V_fire if noise is not None and irregular.V_fire > 0 else None
-        self._sensor = SimulatedSensor(self.circuit, self._drive, fire)
+        self._kelvin = temperature(self.circuit)
+        warmer = options.warmer if options.warming else None
+        self._sensor = SimulatedSensor(self.circuit, self._drive, fire, warmer)
         self._noise = noise_table(seed)
         swing = self.circuit.fire_voltage - self.circuit.reset_voltage
         self._spike = options.speed.spike(swing, self.circuit.tau_K)
@@ -257,6 +260,10 @@ class Plant(DrivenCoil):
             return Pieces.constant(0.0, start)
         if signal == "coil_current":
             return self._electromagnet.currents(start, end)
+        if signal == "temperature":
+            knots = np.linspace(start, max(end, start + 1e-9), 3)
+            kelvin = [self._kelvin + self.options.warmer(at) for at in knots]
+            return Pieces.through(knots, np.array(kelvin))
         if signal == "field":
             return self._field_pieces(start, end)
         return self._sensor.pieces(signal, start, end)

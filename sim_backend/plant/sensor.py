@@ -20,12 +20,14 @@ from tactile_lab.errors import ParameterError
 from tactile_lab.model.advance import Outputs, State, advance, rest
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_V_C2
+from tactile_lab.model.temperature import at_temperature, temperature
 from tactile_lab.waveform import Waveform
 
 SHORTEST, LONGEST = 10e-3, 60.0
 """Length of a chunk just after a command, and long after one, s; it doubles between."""
 LONGEST_NOISY = 0.5
-"""The same where each spike has a V_fire of its own, and ends its chunk, s."""
+"""The same where each spike has a V_fire of its own, and ends its chunk, or where the
+temperature changes, s."""
 JUST = 1e-9
 """After a spike, s: its chunk ends there."""
 WINDOW = 0.5
@@ -88,6 +90,8 @@ class SimulatedSensor:
         drive: force on it.
         V_fire: where V_fire is not the same at each spike: V_fire of spike number n,
             from V_fire without noise and V_reset, V.
+        warmer: where its temperature changes: by how much at a time, s, it is warmer
+            than `circuit` says, K.
 
     Attributes:
         error_spike_time, error_V_C1: largest estimated error so far, s and V.
@@ -98,7 +102,9 @@ class SimulatedSensor:
         circuit: Circuit,
         drive: Drive,
         V_fire: Callable[[int, float, float], float] | None = None,
+        warmer: Callable[[float], float] | None = None,
     ) -> None:
+        self._warmer = warmer
         self.circuit = circuit
         self._circuits = [(-math.inf, circuit)]
         self._drive = drive
@@ -212,7 +218,7 @@ class SimulatedSensor:
         circuit = self._next_circuit(state.time)
         if not state.left_out and state.V_C2 >= circuit.fire_voltage:
             state = replace(state, V_C2=circuit.reset_voltage, resume=None)
-        if self._V_fire is not None:
+        if self._V_fire is not None or self._warmer is not None:
             end = min(end, state.time + LONGEST_NOISY)
         after, outputs = self._advance(circuit, state, end)
         spacing = FINE if calm < LIVELY else COARSE
@@ -240,6 +246,9 @@ class SimulatedSensor:
     def _next_circuit(self, time: float) -> Circuit:
         """The circuit from `time` s on, with the V_fire of the next spike."""
         circuit = self._changed(time)[1]
+        if self._warmer is not None:
+            kelvin = temperature(circuit) + self._warmer(time)
+            circuit = at_temperature(circuit, kelvin)
         if self._V_fire is None:
             return circuit
         fire, reset = circuit.fire_voltage, circuit.reset_voltage

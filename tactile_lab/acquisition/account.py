@@ -203,6 +203,12 @@ class Account:
             self.journal.field(time, tesla)
         self.emit(events.FieldRead(time, tesla))
 
+    def temperature(self, time: float, kelvin: float) -> None:
+        """The sensor's temperature was read at run time `time` s, K."""
+        if self.journal is not None:
+            self.journal.temperature(time, kelvin)
+        self.emit(events.TemperatureRead(time, kelvin))
+
     def _held(self, name: str, held: HeldVoltage) -> None:
         """A source was read back; what was before the run began is not kept."""
         if held.time < 0:

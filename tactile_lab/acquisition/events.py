@@ -94,6 +94,14 @@ class FieldRead:
 
 
 @dataclass(frozen=True)
+class TemperatureRead:
+    """Temperature of the sensor, K, at a time on the run's axis, s."""
+
+    time: float
+    kelvin: float
+
+
+@dataclass(frozen=True)
 class VoltageRead:
     """The source of the circuit's voltage `name` was read back, on the run's axis."""
 
@@ -138,6 +146,7 @@ Event = (
     | Progress
     | CoilCurrent
     | FieldRead
+    | TemperatureRead
     | VoltageRead
     | SpikesSeen
     | Message

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.field_mean import FieldMean
+from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
 from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import SamplesLostError
+from tactile_lab.signals import AVERAGED
 
 if TYPE_CHECKING:  # compiled code, which a run without spikes does not load
     from tactile_lab.spikes.detector import Detector, ResetDetector
@@ -32,8 +33,8 @@ class Intake:
         self._journal: Journal | None = None
         self._detector: Detector | ResetDetector | None = None
         self._stream: Stream | None = None
-        self._field: FieldMean | None = None
-        self._field_readings: list[Reading] = []
+        self._means: dict[str, ChannelMean] = {}
+        self._readings: list[tuple[str, Reading]] = []
         self._start = 0.0
         self._expected = 0
         self.spikes = 0
@@ -72,7 +73,11 @@ class Intake:
         self._row = row
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._journal = detector, journal
-        self._field = FieldMean(stream, start)
+        self._means = {
+            channel.signal: ChannelMean(stream, start, channel.signal)
+            for channel in stream.channels
+            if channel.signal in AVERAGED
+        }
         self._live.begin(stream, start)
         journal.segment(stream, start)
 
@@ -98,15 +103,15 @@ class Intake:
                 self.overrange.add(channel.signal)
         self._journal.append(block)
         self._live.add(block)
-        if self._field is not None:
-            self._field_readings += self._field.feed(block)
+        for signal, mean in self._means.items():
+            self._readings += [(signal, reading) for reading in mean.feed(block)]
         if self._detector is None:
             return ()
         return self._keep(self._detector.feed(block.first, block.codes[self._row]))
 
-    def take_field(self) -> list[Reading]:
-        """Readings of a field channel since last asked; times on the run's axis."""
-        taken, self._field_readings = self._field_readings, []
+    def take_readings(self) -> list[tuple[str, Reading]]:
+        """Readings of slow channels since last asked; times on the run's axis."""
+        taken, self._readings = self._readings, []
         return taken
 
     def spikes_between(self, start: float, end: float) -> NDArray[np.float64]:

@@ -51,6 +51,10 @@ class Journal(Protocol):
         """A teslameter reading, T."""
         ...
 
+    def temperature(self, time: float, kelvin: float) -> None:
+        """A reading of the sensor's temperature, K."""
+        return
+
     def voltage(self, name: str, held: HeldVoltage) -> None:
         """What the source of the circuit's voltage `name` was read back to hold."""
         return

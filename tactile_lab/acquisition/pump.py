@@ -211,8 +211,11 @@ class Pump:
             return
         while scope is not None and (block := scope.take()) is not None:
             self._account.spikes(self._intake.add(block))
-            for reading in self._intake.take_field():
-                self._account.field(reading.time, reading.value)
+            for signal, reading in self._intake.take_readings():
+                if signal == "field":
+                    self._account.field(reading.time, reading.value)
+                else:
+                    self._account.temperature(reading.time, reading.value)
             self._lease.renew()
 
     def _tell_progress(self) -> None:

@@ -94,6 +94,8 @@ class StatusServer:
                 self.tell("spikes", times_s=list(times), rates_Hz=list(rates))
             case events.FieldRead():
                 self.tell("field", time_s=event.time, field_T=event.field)
+            case events.TemperatureRead(time=at, kelvin=kelvin):
+                self.tell("temperature", time_s=at, temperature_K=kelvin)
             case events.VoltageRead(name=name, held=held):
                 told = {"time_s": held.time, "V": held.voltage, "A": held.current}
                 self.tell("voltage", name=name, setpoint_V=held.setpoint, **told)

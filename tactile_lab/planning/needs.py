@@ -20,14 +20,11 @@ from tactile_lab.instruments.registry import (
 from tactile_lab.planning.ranges import Extremes, expected, fitted, widened
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
-from tactile_lab.signals import SIGNALS
+from tactile_lab.signals import AVERAGED, SIGNALS
 from tactile_lab.voltage_source import why_not
 
-SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
-"""Signals that exist as samples of a scope channel and in no other way."""
-
-AVERAGED = "field"
-"""Kept as readings, one for many samples, where a scope channel carries it."""
+SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current", "temperature")
+"""Signals that come from a scope channel and in no other way."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +85,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
     if detect_on == "V_K":
         _check_threshold(scene, wired["V_K"])
     channels = tuple(c for name, c in wired.items() if name in streamed)
-    metered = AVERAGED in asked and AVERAGED not in wired
+    metered = "field" in asked and "field" not in wired
     if metered and meter is None:
         raise SceneError(
             f"{scene.name} records the field, but bench {scene.bench.name} has "
@@ -106,7 +103,7 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
         stored=tuple(
             name
             for name in wired
-            if (name in recorded and name != AVERAGED)
+            if (name in recorded and name not in AVERAGED)
             or (name == "V_C1" and "I_DS" in recorded and derives_I_DS)
         ),
         detect_on=detect_on,
@@ -163,8 +160,8 @@ def _streamed(scene: Scene, asked: Set[str], wired: Mapping[str, Channel]) -> se
     names = {name for name in SAMPLED if name in asked}
     if "I_DS" in asked:
         names.add("I_DS" if "I_DS" in wired else "V_C1")
-    if AVERAGED in asked and AVERAGED in wired:
-        names.add(AVERAGED)
+    if "field" in asked and "field" in wired:
+        names.add("field")
     return names
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tactile_lab.instruments.registry import voltage_capability
-from tactile_lab.planning.needs import AVERAGED, Needs
+from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.warn import threshold_of
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
-from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
+from tactile_lab.signals import AVERAGED, FIELD_AVERAGING, SIGNALS
 from tactile_lab.voltage_source import VoltageLimits
 
 NOT_RECORDED = "field is not recorded, so it is not compared with the current"
@@ -31,7 +31,7 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
     for channel in needed.channels:
         name = channel.signal
         why = "stored" if name in stored else "streamed, not stored"
-        if name == AVERAGED:
+        if name in AVERAGED:
             why = f"kept as means of {show(FIELD_AVERAGING, 's')}"
         if name == needed.detect_on:
             why += f"; spikes are detected on it{_threshold(scene, name)}"
@@ -86,7 +86,7 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
     if needed.asked_field:
         found.append(("port of a teslameter", "a person reads it"))
     elif not needed.field_meter:
-        why = "a scope channel has the field" if AVERAGED in enabled else NOT_RECORDED
+        why = "a scope channel has the field" if "field" in enabled else NOT_RECORDED
         found.append(("teslameter", why))
     found += [
         (f"source of {name}", "neither [sensor] sourced nor the protocol names it")
@@ -98,7 +98,7 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
             found.append(
                 (f"channel {channel.input}: {channel.signal}", "nothing needs it")
             )
-        elif channel.signal not in (*needed.stored, AVERAGED):
+        elif channel.signal not in (*needed.stored, *AVERAGED):
             found.append(
                 (f"samples of {channel.signal}", "needed as they stream, not recorded")
             )

@@ -67,6 +67,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             current=current,
             warming=_warming(run),
             field=_field(run),
+            temperature=_temperature(run),
             voltages=_voltages(run),
             force_uncertainty=scene.bench.magnet.force_uncertainty,
             field_per_ampere=_field_per_ampere(scene),
@@ -265,6 +266,12 @@ def _field_per_ampere(scene: Scene) -> float:
     """Slope of the assumed or calibrated field around 0 A, T/A."""
     low, high = scene.bench.magnet.field([-1e-3, 1e-3])
     return float(high - low) / 2e-3
+
+
+def _temperature(run: Run) -> NDArray[np.float64]:
+    """Readings of the temperature, shape (n, 2), s and K."""
+    rows = run.temperature
+    return np.column_stack([rows["time"], rows["temperature"]])
 
 
 def _voltages(run: Run) -> dict[str, NDArray[np.float64]]:

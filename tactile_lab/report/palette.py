@@ -39,6 +39,7 @@ ALL = (
 )  # fmt: skip
 BY_NAME = {
     "force": FORCE, "V_C1": V_C1, "V_C2": V_C2, "V_K": V_K, "rate": RATE, "I_DS": I_DS,
-    "coil_current": FORCE, "field": FORCE, "model": TWIN, "ink": INK, "quiet": QUIET,
+    "coil_current": FORCE, "field": FORCE, "temperature": FORCE, "model": TWIN,
+    "ink": INK, "quiet": QUIET,
 }  # fmt: skip
 """By the names that descriptions of plots use."""

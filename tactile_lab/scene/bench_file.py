@@ -24,10 +24,11 @@ from tactile_lab.instruments.registry import (
 )
 from tactile_lab.magnetics import Magnet
 from tactile_lab.quantity import Unit, Voltage
+from tactile_lab.signals import AVERAGED
 from tactile_lab.table import INTERNAL, SceneTable
 from tactile_lab.voltage_source import SOURCED, VoltageLimits
 
-WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field")
+WIRED = ("V_C1", "V_C2", "V_K", "coil_current", "I_DS", "field", "temperature")
 """Signals a scope channel can carry."""
 
 
@@ -98,8 +99,14 @@ def _wired(channel: Channel) -> Channel:
                 'means at the range its knob shows, such as "0.02 T/V"; compare two '
                 "fields with its display"
             )
-        if channel.coupling != "DC":
-            raise ValueError('field needs coupling = "DC"')
+    if channel.signal == "temperature" and not channel.kelvin_per_volt:
+        raise ValueError(
+            'temperature needs kelvin_per_volt, such as "100 K/V" of a sensor with 10 '
+            'mV/K, and zero_at where 0 V is not 0 K, such as "273.15 K" of one with '
+            "0 V at 0 °C"
+        )
+    if channel.signal in AVERAGED and channel.coupling != "DC":
+        raise ValueError(f'{channel.signal} needs coupling = "DC"')
     return channel
 
 

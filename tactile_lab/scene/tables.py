@@ -201,6 +201,8 @@ class Simulated(SceneTable):
         V_GS_noise: standard deviation of the gate's source, white up to 250 Hz, V.
         current_noise: standard deviation of the coil's source, the same, A.
         V_GS_hum: amplitude of 50 Hz mains hum on the gate, V.
+        warming: of the sensor, K: it comes to be so much warmer than at the begin.
+        warming_time: time constant with which it does, s.
         specimen: number of a specimen whose parts lie within their tolerances; 0: all
             are as marked.
         hum: amplitude of 50 Hz mains hum on every channel, V.
@@ -226,6 +228,8 @@ class Simulated(SceneTable):
     V_GS_noise: Noise = 0.0
     current_noise: HalfWidth = 0.0
     V_GS_hum: Noise = 0.0
+    warming: Annotated[float, Unit("K", least=-50.0, most=50.0)] = 0.0
+    warming_time: Duration = 600.0
     specimen: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
     hum: Noise = 0.0
     hysteresis: HalfWidth = 0.0

@@ -7,6 +7,7 @@
     /gaps /overrange    samples that never came; blocks in which an input left its range
     /spikes             found on line
     /current /field     applied current, teslameter readings
+    /temperature        of the sensor, where a scope channel carries it
     /voltages           what source meters hold, read back
     /trials /pauses /events
 
@@ -47,6 +48,7 @@ TABLES = {
     "current": "time f8 s, setpoint f8 A, measured f8 A, resistance_ratio f8 1, "
     "listed u1",
     "field": "time f8 s, field f8 T",
+    "temperature": "time f8 s, temperature f8 K",
     "voltages": "time f8 s, name S8, setpoint f8 V, measured f8 V, current f8 A",
     "trials": "index u4, start f8 s, end f8 s, level f8 N, hold_start f8 s, "
     "hold_end f8 s, spikes u4, skipped u4, pause u1, label S48, rest_V_C1 f8 V, "
@@ -62,7 +64,7 @@ RECORDS = {
 }
 """Type of each table's rows."""
 
-NEWER = ("voltages",)
+NEWER = ("temperature", "voltages")
 """Tables that runs of former versions lack."""
 
 PYRAMID_CHUNK = 8192

@@ -145,6 +145,10 @@ class Recorder:
         """Store a teslameter reading, T."""
         self._add("field", time, field)
 
+    def temperature(self, time: float, kelvin: float) -> None:
+        """Store a reading of the temperature, K."""
+        self._add("temperature", time, kelvin)
+
     def voltage(self, name: str, held: HeldVoltage) -> None:
         """Store what the source of the circuit's voltage `name` holds."""
         row = held.time, _fixed(name, 8), held.setpoint, held.voltage, held.current

@@ -113,7 +113,8 @@ class Run(StoredRun):
 
         Args:
             what: "signals", or a table of records: spikes, trials, current, field,
-                voltages, events, rate, gaps, segments, pauses or overrange.
+                temperature, voltages, events, rate, gaps, segments, pauses or
+                overrange.
             start: of the signals, s on the run's axis.
             end: the same; None for the last sample.
             signals: as for `to_xarray`.

@@ -366,6 +366,11 @@ class StoredRun:
         return self.records("field")
 
     @property
+    def temperature(self) -> Records:
+        """Readings of the sensor's temperature: time (s), temperature (K)."""
+        return self.records("temperature")
+
+    @property
     def voltages(self) -> Records:
         """Held by source meters: time, s, name, setpoint, measured, V, current, A."""
         return self.records("voltages")

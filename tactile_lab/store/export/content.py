@@ -20,6 +20,7 @@ UNITS = {
     "spikes": {"time": "s", "amplitude": "V", "width": "s"},
     "current": {"time": "s", "setpoint": "A", "measured": "A"},
     "field": {"time": "s", "field": "T"},
+    "temperature": {"time": "s", "temperature": "K"},
     "voltages": {
         "time": "s",
         "name": "",

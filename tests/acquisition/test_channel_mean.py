@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim_backend.bench import open_bench
+from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.acquisition.field_mean import FieldMean
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
@@ -114,7 +114,7 @@ def test_blocks_of_any_size_give_the_same_means(cuts):
         started=0.0, uncertainty=0.0,
     )  # fmt: skip
     codes = (np.arange(1000) % 120 * 256).astype(np.int16)
-    mean = FieldMean(stream, 5.0)
+    mean = ChannelMean(stream, 5.0, "field")
     found = [r for block in blocks(codes, cuts) for r in mean.feed(block)]
     volts = codes.reshape(5, 200).mean(axis=1) / 32512 * 0.5
     assert [r.value for r in found] == pytest.approx((volts - 0.03) * 0.05)
@@ -130,4 +130,4 @@ def test_a_clipped_input_is_no_reading():
     )  # fmt: skip
     full = Block(0, np.full((1, 200), 32000, np.int16), (False,), 0.0)
     with pytest.raises(LimitError, match=r"input B, .26.5 mT to 23.5 mT"):
-        FieldMean(stream, 0.0).feed(full)
+        ChannelMean(stream, 0.0, "field").feed(full)

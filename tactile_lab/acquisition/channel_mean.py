@@ -1,4 +1,4 @@
-"""Readings of a teslameter whose analogue output is wired to a scope channel."""
+"""Readings of a slow signal that is wired to a scope channel: field or temperature."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ import numpy as np
 from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import show
-from tactile_lab.signals import FIELD_AVERAGING
+from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
 
 FULL = 0.95
 """Part of the channel's range beyond which a mean is no reading any more."""
 
 
-class FieldMean:
-    """Means of the field channel of one stream, each over `FIELD_AVERAGING`.
+class ChannelMean:
+    """Means of one channel of a stream, each over `FIELD_AVERAGING`.
 
     A reading ends with its record where a scope has gaps between records.
 
     Args:
         stream: as it runs.
         start: of its first sample on the run's axis, s.
+        signal: that the channel carries.
     """
 
-    def __init__(self, stream: Stream, start: float) -> None:
-        signals = [channel.signal for channel in stream.channels]
-        self._row = signals.index("field") if "field" in signals else None
+    def __init__(self, stream: Stream, start: float, signal: str) -> None:
+        self._row = [channel.signal for channel in stream.channels].index(signal)
         self._stream = stream
         self._start = start
         self._span = max(1, round(FIELD_AVERAGING / stream.interval))
@@ -34,13 +34,11 @@ class FieldMean:
         self._first = 0
 
     def feed(self, block: Block) -> list[Reading]:
-        """Readings completed by `block`, each at the middle of its time, T.
+        """Readings completed by `block`, each at the middle of its time, SI.
 
         Raises:
-            LimitError: the teslameter's output leaves, or nearly fills, the range.
+            LimitError: the signal leaves, or nearly fills, its channel's range.
         """
-        if self._row is None:
-            return []
         if block.overrange[self._row]:
             raise self._beyond()
         readings = []
@@ -65,16 +63,21 @@ class FieldMean:
         self._sum = self._count = 0
         if abs(code) > FULL * self._stream.full_scale:
             raise self._beyond()
-        gain, offset = self._stream.volts_per_code(self._row or 0)
+        gain, offset = self._stream.volts_per_code(self._row)
         time = self._start + middle * self._stream.interval
         return Reading(time, gain * code + offset)
 
     def _beyond(self) -> LimitError:
-        channel = self._stream.channels[self._row or 0]
-        low, high = channel.span
+        channel = self._stream.channels[self._row]
+        unit = SIGNALS[channel.signal].unit
+        low, high = (show(end, unit) for end in channel.span)
+        more = (
+            ", or of the teslameter; the latter changes tesla_per_volt"
+            if channel.signal == "field"
+            else ""
+        )
         return LimitError(
-            f"The teslameter's analogue output fills the range of scope input "
-            f"{channel.input}, {show(low, 'T')} to {show(high, 'T')}. Choose a larger "
-            "range of the channel in the bench file, or of the teslameter; the latter "
-            "changes tesla_per_volt."
+            f"The {channel.signal} fills the range of scope input {channel.input}, "
+            f"{low} to {high}. Choose a larger range of the channel in the bench "
+            f"file{more}."
         )

@@ -1,0 +1,130 @@
+"""The sensor's temperature: an analogue thermometer on a scope channel."""
+
+import numpy as np
+import pytest
+from benches import WITH_A_SOURCE_METER
+
+from sim_backend.plant.options import PlantOptions
+from sim_backend.plant.plant import Plant
+from tactile_lab.acquisition.events import RunState, TemperatureRead
+from tactile_lab.bench import Channel
+from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import SceneError
+from tactile_lab.magnetics import Magnet
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest_V_C1
+from tactile_lab.model.temperature import at_temperature, temperature
+from tactile_lab.planning.needs import needs
+from tactile_lab.planning.plan import plan
+from tactile_lab.report.from_run import read
+from tactile_lab.scene.load import load
+from tactile_lab.store.run import Run
+
+THERMOMETER = """
+[[scope.channels]]
+signal = "temperature"
+input = "B"
+range = "500 mV"
+kelvin_per_volt = "100 K/V"
+zero_at = "273.15 K"
+[magnet]
+"""
+QUIET = (
+    "protocol.duration=4 s",
+    "record.sample_rate=20 kS/s",
+    'record.signals=["V_C1", "temperature"]',
+)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    file = tmp_path / "bench.toml"
+    file.write_text(WITH_A_SOURCE_METER.replace("[magnet]", THERMOMETER))
+    return lambda *overrides: load("monitor", (*QUIET, *overrides), file)
+
+
+def test_volts_become_kelvin():
+    channel = Channel(
+        signal="temperature", input="B", kelvin_per_volt=100.0, zero_at=273.15
+    )
+    assert channel.scale == 100.0
+    assert (0.25 - channel.zero) * channel.scale == pytest.approx(298.15)
+    low, high = channel.span
+    assert low < 273.15 < high
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('kelvin_per_volt = "100 K/V"', "temperature needs kelvin_per_volt"),
+        ('signal = "temperature"', "belongs to"),
+    ],
+)
+def test_a_channel_without_its_conversion_is_refused(tmp_path, line, said):
+    file = tmp_path / "bench.toml"
+    text = WITH_A_SOURCE_METER.replace("[magnet]", THERMOMETER)
+    file.write_text(text.replace(line, 'signal = "I_DS"' if "signal" in line else ""))
+    with pytest.raises(SceneError, match=said):
+        load("monitor", (), file)
+
+
+def test_it_is_read_kept_and_exported_and_its_samples_are_not_stored(scene, tmp_path):
+    seen = []
+    made = scene()
+    done = Execution(made, tmp_path / "runs", emit=seen.append).run()
+    assert done.state is RunState.COMPLETE, done.reason
+    believed = temperature(made.circuit)
+    with Run.load(done.folder) as run:
+        assert "temperature" not in run.signals
+        rows = run.temperature
+        assert len(rows) >= 15
+        # one code is 0.4 K: a mean over 200 ms is finer where noise smooths it
+        assert rows["temperature"] == pytest.approx(believed, abs=0.4)
+        assert len(run.to_pandas("temperature")) == len(rows)
+    assert sum(isinstance(one, TemperatureRead) for one in seen) == len(rows)
+    measured = read(done.folder)
+    assert measured.temperature.shape == (len(rows), 2)
+    told = dict(plan(made).uses)
+    assert told["channel B: temperature"] == "kept as means of 200 ms"
+
+
+def test_it_is_left_out_where_the_scene_does_not_record_it(scene):
+    quiet = scene('record.signals=["V_C1"]')
+    assert [c.signal for c in needs(quiet).channels] == ["V_C1"]
+
+
+def test_a_bench_without_a_thermometer_is_told_so(tmp_path):
+    with pytest.raises(SceneError, match="needs temperature, but bench"):
+        needs(load("monitor", QUIET))
+
+
+def test_the_simulated_sensor_warms_and_its_voltages_follow(scene, tmp_path):
+    warm = scene("simulated.warming=45 K", "simulated.warming_time=1 s")
+    done = Execution(warm, tmp_path / "runs").run()
+    with Run.load(done.folder) as run:
+        rows = run.temperature["temperature"]
+        assert rows[-1] - rows[0] > 1.0
+        last = run.signal("V_C1")[-2000:].mean()
+    believed = warm.circuit
+    hot = at_temperature(believed, temperature(believed) + 45 * 0.98)
+    assert abs(rest_V_C1(hot) - rest_V_C1(believed)) > 0.03
+    assert last == pytest.approx(rest_V_C1(hot), abs=0.015)
+
+
+def test_slices_of_any_size_show_the_same_warming_world():
+    wiring = (
+        Channel(signal="V_C1", input="A", range=5.0),
+        Channel(signal="temperature", input="B", range=5.0, kelvin_per_volt=100.0),
+    )
+
+    def rendered(size):
+        options = PlantOptions(warming=5.0, warming_time=0.5)
+        plant = Plant(Circuit(), Magnet(r=6e-3), options)
+        parts = [
+            plant.render(i, size, 1e-4, 0.0, wiring, 32512, 8)[0]
+            for i in range(0, 20_000, size)
+        ]
+        return np.concatenate(parts, axis=1)
+
+    one, other = rendered(20_000).astype(int), rendered(2_500).astype(int)
+    assert np.abs(one - other)[0].max() <= 256  # a code
