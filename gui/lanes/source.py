@@ -306,9 +306,9 @@ class LiveSource(Source):
         """A read-back of the coil."""
         self._slow["force"].add(time, amperes * self._gain)
 
-    def add_temperature(self, time: float, kelvin: float) -> None:
-        """A reading of the sensor's temperature."""
-        self._slow["temperature"].add(time, kelvin)
+    def add_reading(self, signal: str, time: float, value: float) -> None:
+        """A reading of a signal that comes now and then, SI."""
+        self._slow.setdefault(signal, Readings()).add(time, value)
 
     def add_field(self, time: float, tesla: float) -> None:
         """A reading of the teslameter."""

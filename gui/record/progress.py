@@ -113,8 +113,10 @@ class ProgressStrip(QWidget):
         reach: float,
         trial: tuple[int, str] | None,
         ending: str,
+        *,
+        kept: bool = True,
     ) -> None:
-        """Show where the run is, or how the last one ended."""
+        """Show where the run is, or how the last one ended; `kept`: it is on disk."""
         state = snapshot.state
         colour = {WindowState.FAULT: "red", WindowState.ABORTING: "amber"}.get(
             state, "accent"
@@ -127,7 +129,8 @@ class ProgressStrip(QWidget):
             elif ending.startswith("Aborted"):
                 colour = "amber"
             self._left.setText(ending or "No run yet")
-            self._right.setText("" if not ending else f"{reach:.1f} s kept")
+            shown = ending and kept
+            self._right.setText(f"{reach:.1f} s kept" if shown else "")
         self.blocks.show_steps(list(holds), length, reach, colour)
         self.setAccessibleName(self.text)
 

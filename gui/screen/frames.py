@@ -80,12 +80,22 @@ class Frames(QObject):
                 panels.centre.stack.show_values()
             planned = source.preview.holds if source.preview else []
             holds = planned if source.running and planned else source.holds
-            ending = self._screen.ending
+            ending, kept = self._screen.ending, False
             if session.monitor.alive:
                 ending = "Monitor: only Record keeps what is seen"
+            elif source is session.manual.source:
+                ending = "By hand: nothing of it is kept"
+            else:
+                kept = True
             trial = session.run.trial
             panels.centre.progress.show_run(
-                snapshot, holds, source.length, source.reach, trial, ending
+                snapshot,
+                holds,
+                source.length,
+                source.reach,
+                trial,
+                ending,
+                kept=kept,
             )
             panels.setup.show_head(source.reach if session.state.in_run else None)
 

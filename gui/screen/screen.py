@@ -36,6 +36,9 @@ LATER = 1000
 COMPARED = 2000
 """Milliseconds after which a run in progress is compared with the model anew."""
 
+BY_HAND = ("force", "coil_current")
+"""What is seen while the coil is driven by hand."""
+
 WATCHED = ("V_C1", "V_C2", "V_K", "spikes")
 """What the monitor shows."""
 
@@ -214,7 +217,7 @@ class Screen(QObject):
         self._ended = None
         centre, session = self._panels.centre, self._panels.session
         centre.follow_source(source, self._lanes())
-        if not session.monitor.alive:
+        if source is session.run.source:
             self.ending = ""
             expectation = session.run.expectation
             steps = expectation.estimate.trials if expectation else 0
@@ -272,6 +275,8 @@ class Screen(QObject):
         session = self._panels.session
         if session.monitor.alive:
             return lanes_for(WATCHED, twin=False)
+        if self.live is not None and self.live is session.manual.source:
+            return lanes_for(BY_HAND, twin=False)
         if self.run is not None:
             return lanes_for(self.run.signals, twin=self.run.has_model)
         expectation = session.plan_on_screen

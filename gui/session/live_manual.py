@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import Signal
+
+from gui.lanes.source import LiveSource
 from gui.session.live_task import LiveTask
 from gui.session.log import Log, Severity
 from gui.session.status import Status
@@ -19,16 +22,22 @@ class LiveManual(LiveTask):
     Attributes:
         current: that it was asked to hold last, A.
         opened: the source has answered.
+        source: what is seen of the coil since; nothing of it is kept.
     """
+
+    begun = Signal(object)
 
     def __init__(self, link: Link, status: Status, log: Log) -> None:
         super().__init__(link, status, log)
         self.current = 0.0
         self.opened = False
+        self.source: LiveSource | None = None
+        self._zero: float | None = None
 
-    def start(self, request: Request) -> None:
+    def start(self, request: Request, newtons_per_ampere: float) -> None:
         """Open the coil source of a request's bench; the output stays off."""
         self.current, self.opened = 0.0, False
+        self.source, self._zero = LiveSource(None, newtons_per_ampere), None
         self._begin(begin_manual, request)
         self._log.add(Severity.WARNING, "coil", "Manual control on", safety=True)
 
@@ -45,13 +54,29 @@ class LiveManual(LiveTask):
         elif isinstance(event, CoilCurrent):
             read = event.measured is not None
             self._status.coil.sign_of_life(read_back=read)
+            self._see(event)
         elif isinstance(event, Samples):
             self.say(renew)
+
+    def _see(self, event: CoilCurrent) -> None:
+        """Put a current into the lanes, which are shown with the first one."""
+        source = self.source
+        if source is None:
+            return
+        if self._zero is None:
+            self._zero = event.time
+            self.begun.emit(source)
+        at = event.time - self._zero
+        current = event.setpoint if event.measured is None else event.measured
+        source.add_current(at, current)
+        source.add_reading("coil_current", at, current)
 
     def has_ended(self, ending: Ending) -> None:
         """Tell how the coil was left."""
         status, off, reason = self._status, ending.off, ending.reason or ""
         self.current = 0.0
+        if self.source is not None:
+            self.source.running = False
         if ending.state is RunState.REFUSED:
             status.set_fault("The coil cannot be driven by hand.", reason)
             return

@@ -174,7 +174,7 @@ class LiveRun(LiveTask):
                 self._field_read(field)
                 source.add_field(at, field)
             case events.TemperatureRead(time=at, kelvin=kelvin):
-                source.add_temperature(at, kelvin)
+                source.add_reading("temperature", at, kelvin)
             case events.VoltageRead(name=name, held=held):
                 self.voltages[name] = held.voltage
             case events.TrialStarted():

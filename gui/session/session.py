@@ -90,6 +90,7 @@ class Session(QObject):
         self.run.begun.connect(self._show_live)
         self.run.ended.connect(self.bench.confirm)
         self.monitor.begun.connect(self._show_live)
+        self.manual.begun.connect(self._show_live)
         self.monitor.ended.connect(self._start_after_monitor)
 
     # --- what the window asks for
@@ -158,9 +159,10 @@ class Session(QObject):
 
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""
-        if self._free and self.bench.request is not None:
+        if self._free and self.bench.request and self.bench.spec:
             self.monitor.stop("manual control begins")
-            self.manual.start(self.bench.request)
+            gain = self.bench.spec.magnet.newtons_per_ampere
+            self.manual.start(self.bench.request, gain)
             self.status.changed.emit()
 
     def show_monitor(self, on: bool) -> None:

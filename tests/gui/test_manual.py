@@ -1,5 +1,6 @@
 """The bench by hand: scope inputs between runs, the field on request."""
 
+import pytest
 from PySide6.QtTest import QTest
 
 from gui.state import CoilKnowledge, WindowState, truth
@@ -172,3 +173,26 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
     window.header.stop.click()
     lab.until(lambda: not session.manual.alive)
     assert session.coil_view().verified_off
+
+
+def test_the_lanes_show_the_coil_while_it_is_driven_by_hand(lab) -> None:
+    session, window = lab.session, lab.window
+    session.begin_manual()
+    lab.until(lambda: session.manual.opened)
+    session.manual.hold(0.1)
+    lab.until(lambda: (c := session.coil_view()) is not None and c.current == 0.1)
+    source = session.manual.source
+    lab.until(lambda: source.reach > 0 and source.mean("coil_current") == 0.1)
+    assert window.centre.stack.source is source and source.running
+    keys = [row.lane.key for row in window.centre.stack.rows]
+    assert keys == ["force", "coil_current"]
+    gain = session.bench.spec.magnet.newtons_per_ampere
+    assert source.mean("force") == pytest.approx(0.1 * gain)
+    progress = window.centre.progress
+    lab.until(lambda: "By hand" in progress.text)
+    assert "kept" not in progress.text.partition("|")[2], "nothing is"
+    session.stop("enough")
+    lab.until(lambda: not session.manual.alive)
+    assert not source.running
+    lab.complete_run()
+    assert session.source is session.run.source, "the next run takes the lanes"
