@@ -23,6 +23,7 @@ from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import shapes_of_run
 from tactile_lab.quantity import show
+from tactile_lab.spikes.rate import begins
 from tactile_lab.store.spike_shapes import SpikeShapes
 from tactile_lab.trace import FloatArray
 
@@ -166,8 +167,11 @@ class SpikeTools(QObject):
         said = f"Spike {at + 1} of {spikes.size} at {chosen:.6f} s"
         if at:
             isi = chosen - float(spikes[at - 1])
-            said += f"\n{show(isi, 's', 4)} after the one before"
-            said += f" ({number(1 / isi, 2)} Hz)" if isi > 0 else ""
+            if begins(spikes, starts(self._source.holds))[at]:
+                said += f"\nafter {show(isi, 's', 4)} of silence"
+            else:
+                said += f"\n{show(isi, 's', 4)} after the one before"
+                said += f" ({number(1 / isi, 2)} Hz)"
         if shapes is not None:
             near = int(np.argmin(np.abs(shapes.times - chosen)))
             peak, width = shapes.peaks[near], shapes.widths[near]
