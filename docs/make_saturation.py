@@ -7,6 +7,7 @@ tests/model/saturation.csv, against which the tests hold the model.
 from __future__ import annotations
 
 import csv
+import math
 import re
 import subprocess
 import tempfile
@@ -18,7 +19,7 @@ import numpy as np
 
 from tactile_lab.model.circuit import Circuit, FloatArray
 from tactile_lab.model.simulate import simulate
-from tactile_lab.validation.table import provenance
+from tactile_lab.validation.table import markdown, provenance
 from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent
@@ -121,6 +122,43 @@ def model(point: Point, saturation: bool = True) -> Found:
     spikes = simulate(circuit, force, until=point.until).spike_times
     assert spikes is not None
     return _found(spikes)
+
+
+def silent_from(netlist: str, tau: float, hold: float) -> float:
+    """The least force above the firing ones that fires no spike in `hold` s, N.
+
+    It is reached from 0 in 10 ms and found by halving to 0.01 mN; NaN where even 1 N
+    fires.
+    """
+
+    def fires(force: float) -> bool:
+        return model(Point(netlist, 1.4, force, tau, 0.11 + hold)).spikes > 0
+
+    low, high = 0.16, 1.0
+    if fires(high):
+        return math.nan
+    while high - low > 1e-5:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if fires(middle) else (low, middle)
+    return high
+
+
+def silences() -> str:
+    """Where each netlist falls silent, as a table."""
+    cells = {
+        netlist: [
+            f"{silent_from(netlist, *how) * 1e3:.0f} mN"
+            for how in ((STEADY, 2.0), (8.69, 1.0), (8.69, 10.0))
+        ]
+        for netlist in FIRING
+    }
+    return markdown(
+        ("circuit", "held, V_P does not decay", "1 s hold, adapts", "10 s, adapts"),
+        [
+            ("T1 a transistor, ideal firing stage", *cells["t1"]),
+            ("complete", *cells["complete"]),
+        ],
+    )
 
 
 def _capacitance(point: Point) -> float:
@@ -239,6 +277,14 @@ ends some five spikes earlier. Its peak voltage moves by 30 mV with the current,
 
 {HEAD}
 {chr(10).join(lines["complete"])}
+
+## When more force silences it
+
+The least force, reached from 0 within 10 ms, under which the model fires no spike until
+the hold ends. In a longer hold V_P decays by the leakage of the film, V_C1 rises, and
+what was silent fires late: there it takes far more force to silence all of the hold.
+
+{silences()}
 """
     _draw(results)
     (DOCS / "saturation.md").write_text(text, encoding="utf-8")

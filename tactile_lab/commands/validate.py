@@ -53,8 +53,9 @@ def cap_option(default: float) -> Callable[..., Any]:
     show_default=True,
     help="Timings; least counts.",
 )
+@click.option("--compiled", is_flag=True, help="Leave out those called from Python.")
 def accuracy(
-    out: Path | None, names: tuple[str, ...], cap: float, repeats: int
+    out: Path | None, names: tuple[str, ...], cap: float, repeats: int, compiled: bool
 ) -> None:
     """Error against run time: ours and other solvers, nine scenes easy to stiff.
 
@@ -65,7 +66,7 @@ def accuracy(
     with refusing():
         from tactile_lab.validation.accuracy import compete, figure, report, write_csv
 
-        scenes, rows = compete(names, repeats, cap, _say)
+        scenes, rows = compete(names, repeats, cap, _say, called=not compiled)
         _write(report(scenes, rows, cap), out, "accuracy.md")
         if out is not None:
             write_csv(rows, out / "accuracy.csv")

@@ -55,7 +55,8 @@ DONE, STUCK, FAST, NOT_FINITE, STRONG = range(5)
 SHARE, SHARE_Q = 0.1, 0.5
 """Of the tolerance: what a step's series of V_C1, V, and of Q, V, may be wrong by."""
 SWING = 0.02
-"""Largest integral of a polynomial's error over part of its step, of its maximum."""
+"""What the error of a series between its nodes comes to when summed up over part of its
+step, of what that is estimated at: 0.04 of its true maximum, which is a third of it."""
 KNEE = 12.0
 """From so many V_T down exp(-V_C1/V_T) bends V_C1."""
 SHORTEST_SEGMENT = 1e-290

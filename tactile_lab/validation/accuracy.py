@@ -92,9 +92,16 @@ def accuracy_scenes() -> tuple[Problem, ...]:
 
 
 def compete(
-    names: Sequence[str], repeats: int, cap: float, say: Callable[[str], None]
+    names: Sequence[str],
+    repeats: int,
+    cap: float,
+    say: Callable[[str], None],
+    *,
+    called: bool = True,
 ) -> tuple[list[Problem], list[Row]]:
     """Every method on the scenes of those names, on all where none is named.
+
+    Without `called`, those called from Python stay out.
 
     Raises:
         ParameterError: there is no such scene.
@@ -107,23 +114,27 @@ def compete(
             f"{', '.join(s.name for s in scenes)}."
         )
     chosen = [s for s in scenes if not names or s.name in names]
-    return chosen, list(contest(chosen, methods(repeats), cap, say))
+    return chosen, list(contest(chosen, methods(repeats, called=called), cap, say))
 
 
 def report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
     """accuracy.md."""
     by_scene = {s.name: [row for row in rows if row.scene == s.name] for s in scenes}
+    called = any(row.runs == CALLED for row in rows)
     parts = [
         "# Error against run time\n",
-        f"{provenance()} Written by `tactile-lab validate accuracy --out docs`.\n",
+        f"{provenance()} Written by `tactile-lab validate accuracy"
+        f"{'' if called else ' --compiled'} --out docs`.\n",
         "Errors are the largest true error of any spike time and that of V_C1 at the "
         "end, against a 40-digit reference. Times are CPU time of a call from a "
         "script, the least of several, interleaved in one process (ngspice in its "
-        f"own); the cap is {cap:g} s. A wrong count, NaN, failure or time-out is shown "
-        "as such.\n",
+        "own), so that other work on the machine, which the load average tells of, "
+        "lengthens all of them alike: trust ratios more than times. The cap is "
+        f"{cap:g} s. A wrong count, NaN, failure or time-out is shown as such.\n",
         '"Compiled" methods are machine code from end to end, as ours is: Dormand and '
         "Prince's 5(4) and the Rosenbrock method Rodas5P, both with spikes located on "
-        "their dense output, Euler and RK4 with spikes on the grid and interpolated. "
+        "their dense output, Euler and RK4 with spikes on the grid and interpolated, "
+        "and exact integrate-and-fire as simulators with precise spike times have it. "
         'Those "called from Python" spend about 99 % of their time in calls of the '
         "right-hand side, itself compiled: their times say what a script pays, not "
         "what the method costs.\n",

@@ -11,15 +11,16 @@ from pathlib import Path
 
 
 def provenance() -> str:
-    """Commit, date and machine, for the head of a report."""
+    """Commit, date, machine and how busy it is, for the head of a report."""
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True,
         check=False, cwd=Path(__file__).parent,
     ).stdout.strip()  # fmt: skip
+    busy = f", load average {os.getloadavg()[0]:.0f}" if os.name == "posix" else ""
     return (
         f"Commit {commit or 'unknown'}, {date.today().isoformat()}, "
         f"{platform.machine()}, {os.cpu_count()} cores, "
-        f"Python {platform.python_version()}, one thread."
+        f"Python {platform.python_version()}, one thread{busy}."
     )
 
 
