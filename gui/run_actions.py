@@ -16,9 +16,9 @@ from gui.session.log import Severity
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import recover_run
 from tactile_lab.errors import TactileLabError
-from tactile_lab.store.catalogue import RunSummary
 from tactile_lab.store.folder import is_live
 from tactile_lab.store.remarks import add_note, read_remarks, write_remarks
+from tactile_lab.store.summary import RunSummary
 
 
 class RunActions(QObject):

@@ -16,8 +16,9 @@ from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 from tactile_lab.scene.overrides import Overrides
 from tactile_lab.scene.scene import Scene
-from tactile_lab.store.catalogue import RunSummary, catalogue
+from tactile_lab.store.catalogue import catalogue
 from tactile_lab.store.run import Run
+from tactile_lab.store.summary import RunSummary
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:

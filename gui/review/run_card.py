@@ -14,7 +14,7 @@ from gui.look.theme import Theme
 from gui.parts import Elided, bar, label, lines, row, set_role
 from gui.review.thumbnails import ThumbnailView
 from gui.state import minutes
-from tactile_lab.store.catalogue import RunSummary
+from tactile_lab.store.summary import RunSummary
 
 PILLS = {
     "complete": ("Complete", "pill-ok"),

@@ -30,7 +30,7 @@ from gui.parts import (
 from gui.review.run_card import RunCard
 from gui.review.thumbnails import Thumbnails
 from tactile_lab.quantity import count
-from tactile_lab.store.catalogue import RunSummary
+from tactile_lab.store.summary import RunSummary
 
 PAGE = 60
 """Runs listed at once; a button lists as many more."""

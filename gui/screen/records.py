@@ -17,7 +17,7 @@ from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.jobs import model_of_run
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
-from tactile_lab.store.catalogue import RunSummary
+from tactile_lab.store.summary import RunSummary
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource

@@ -21,8 +21,9 @@ from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.quantity import count
 from tactile_lab.signals import AVERAGED
-from tactile_lab.store.catalogue import RunSummary, catalogue
+from tactile_lab.store.catalogue import catalogue
 from tactile_lab.store.folder import DATA
+from tactile_lab.store.summary import RunSummary
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:

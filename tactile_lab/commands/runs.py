@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 import sys
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from tactile_lab.commands.options import json_option, runs_folder
 from tactile_lab.commands.terminal import print_json, refusing, say
+from tactile_lab.errors import SceneError, choices
+
+if TYPE_CHECKING:
+    from tactile_lab.store.facts import Fact
+    from tactile_lab.store.summary import RunSummary
+
+    Known = dict[str, list[Fact]]
 
 DAY = click.DateTime(["%Y-%m-%d"])
 
@@ -24,6 +34,22 @@ DAY = click.DateTime(["%Y-%m-%d"])
     "--search", default="", metavar="WORDS",
     help="Only runs with these words in names, notes, tags or parameters.",
 )  # fmt: skip
+@click.option(
+    "--where",
+    default="",
+    metavar="CONDITION",
+    help="Only runs for which this holds: 'protocol.level > 100 mN and note ~ cal'.",
+)
+@click.option(
+    "--sort",
+    "sort",
+    metavar="KEY",
+    help="By this key, such as critical_force or -started; - for the largest first.",
+)
+@click.option(
+    "--keys", is_flag=True, help="List the keys that --where and --sort know."
+)
+@click.option("--csv", "as_csv", is_flag=True, help="Print a table with every key.")
 @json_option
 def command(
     root: Path,
@@ -32,12 +58,19 @@ def command(
     since: datetime | None,
     until: datetime | None,
     search: str,
+    where: str,
+    sort: str | None,
+    keys: bool,
+    as_csv: bool,
     as_json: bool,
 ) -> None:
-    """List the runs in folder ROOT (./runs, or as lab.toml says), oldest first."""
+    """List the runs in folder ROOT (./runs, or as lab.toml says), oldest first.
+
+    CONDITION is KEY SIGN VALUE, joined by and, or, not and brackets; signs are
+    = != > >= < <= and ~ (contains). Values may have units.
+    """
     with refusing():
-        from tactile_lab.quantity import count
-        from tactile_lab.store.catalogue import catalogue
+        from tactile_lab.store.catalogue import catalogue, known
 
         entries = catalogue(
             root,
@@ -46,17 +79,104 @@ def command(
             since=since.date() if since else None,
             until=until.date() if until else None,
             words=search,
+            where=where,
         )
-    if as_json:
+        facts = known(root, entries) if sort or keys or as_csv else []
+        if sort:
+            order = ordered(facts, sort)
+            entries, facts = [entries[i] for i in order], [facts[i] for i in order]
+    if keys:
+        for key, example in sorted(examples(facts).items()):
+            say(f"{key:<34} {example}")
+    elif as_csv:
+        print_csv(facts)
+    elif as_json:
         print_json({"runs": [entry.to_dict() for entry in entries]})
-        return
-    for entry in entries:
+    else:
+        print_list(entries, sort, facts)
+    if not entries:
+        say(f"No run in {root} matches.", sys.stderr)
+
+
+def ordered(facts: Sequence[Known], sort: str) -> list[int]:
+    """The order of runs by a key, those without it last.
+
+    Raises:
+        SceneError: no run has the key.
+    """
+    key, backwards = sort.removeprefix("-"), sort.startswith("-")
+    if facts and not any(key in table for table in facts):
+        told = choices(key, sorted(examples(facts)), "Keys")
+        raise SceneError(f'--sort: no run has "{key}"; {told}')
+
+    def place(i: int) -> tuple[float, str]:
+        first = facts[i][key][0]
+        return (
+            first.number if first.number is not None else 0.0,
+            first.text.casefold(),
+        )
+
+    having = [i for i in range(len(facts)) if key in facts[i]]
+    rest = [i for i in range(len(facts)) if key not in facts[i]]
+    return [*sorted(having, key=place, reverse=backwards), *rest]
+
+
+def examples(facts: Sequence[Known]) -> dict[str, str]:
+    """Of each key what the newest run that has it says."""
+    return {key: shown(found) for table in facts for key, found in table.items()}
+
+
+def shown(found: Sequence[Fact]) -> str:
+    """The values of one key for a person."""
+    from tactile_lab.quantity import show
+
+    return ", ".join(
+        one.text if one.number is None else show(one.number, one.unit) for one in found
+    )
+
+
+def print_list(
+    entries: Sequence[RunSummary], sort: str | None, facts: Sequence[Known]
+) -> None:
+    """One line a run, under headings."""
+    from tactile_lab.quantity import count
+
+    rows = [("run", "status", "", "length", "spikes", "")]
+    for i, entry in enumerate(entries):
         kind = {True: "sim", False: "real", None: "?"}[entry.simulated]
         length = "" if entry.duration is None else f"{entry.duration:.1f} s"
         spikes = "" if entry.spikes is None else count(entry.spikes, "spike")
-        say(
-            f"{entry.name:<44} {entry.status:<10} {kind:<4} {length:>9} {spikes:>12}"
-            f"  {entry.trouble or entry.loss}".rstrip()
+        told = entry.trouble or entry.loss
+        if sort:
+            told = shown(facts[i].get(sort.removeprefix("-"), ()))
+        elif not entry.trouble:
+            star = "* " if entry.starred else ""
+            told = f"{star}{' '.join(f'#{tag}' for tag in entry.tags)} {told}".strip()
+        rows.append((entry.name, entry.status, kind, length, spikes, told))
+    if len(rows) == 1:
+        return
+    rows[0] = (*rows[0][:-1], sort.removeprefix("-") if sort else "samples")
+    wide = max(len(row[0]) for row in rows)
+    for name, status, kind, length, spikes, told in rows:
+        line = f"{name:<{wide}} {status:<10} {kind:<4} {length:>9} {spikes:>12}  {told}"
+        say(line.rstrip())
+
+
+def print_csv(facts: Sequence[Known]) -> None:
+    """A table for other programs: a column a key, numbers in SI, lists with spaces."""
+    columns: dict[str, str] = {}
+    for table in facts:
+        for key, found in table.items():
+            columns.setdefault(key, next((one.unit for one in found if one.unit), ""))
+    table_of = csv.writer(sys.stdout, lineterminator="\n")
+    table_of.writerow(
+        f"{key} ({unit})" if unit else key for key, unit in columns.items()
+    )
+    for table in facts:
+        table_of.writerow(
+            " ".join(
+                one.text if one.number is None else repr(one.number)
+                for one in table.get(key, ())
+            )
+            for key in columns
         )
-    if not entries:
-        say(f"No run in {root} matches.", sys.stderr)

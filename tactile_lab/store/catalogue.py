@@ -1,27 +1,23 @@
-"""All runs under a folder, found again quickly; the index may be deleted any time."""
+"""All runs under a folder, found again quickly."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from contextlib import closing
+from dataclasses import replace
 from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tactile_lab.errors import RecordingError, RunFolderError
-from tactile_lab.store.folder import is_live, read_info, write_json
-from tactile_lab.store.remarks import REMARKS, read_remarks
+from tactile_lab.errors import RunFolderError
+from tactile_lab.store.facts import Fact, facts, grouped
+from tactile_lab.store.folder import is_live, read_info
+from tactile_lab.store.index import Index
+from tactile_lab.store.remarks import read_remarks
+from tactile_lab.store.summary import RunSummary
 from tactile_lab.trust import INFO
-
-if TYPE_CHECKING:
-    from tactile_lab.store.run import Run
-
-INDEX = ".index.json"
-VERSION = 3
-"""Of the index; another one is thrown away and rebuilt."""
 
 KINDS: Mapping[str, type | tuple[type, ...]] = {
     "status": str,
@@ -36,73 +32,6 @@ SENSOR_KEYS = ("sensor", "sample")
 """Notes that name the sensor measured on."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunSummary:
-    """One run in the catalogue, without its samples.
-
-    Attributes:
-        folder: of the run.
-        name: of the folder.
-        started: ISO time with zone.
-        status: as in `run.json`; "cut short" where a running run has no writer.
-        title: that somebody gave it, else that of its protocol.
-        protocol, scene, sensor, operator, bench: names; empty where not known.
-        tags, notes: what people said of it.
-        starred: it matters to somebody.
-        parameters: of the protocol, as a file holds them; empty for older runs.
-        simulated: whether physics was computed.
-        duration: of the experiment, s; None if not known.
-        spikes: found on line; None if not known.
-        loss: the certificate's line; empty if there is none.
-        trouble: why the run cannot be read; empty where it can.
-    """
-
-    folder: Path
-    name: str
-    started: str = ""
-    status: str = "unreadable"
-    title: str = ""
-    protocol: str = ""
-    scene: str = ""
-    sensor: str = ""
-    operator: str = ""
-    bench: str = ""
-    tags: Sequence[str] = ()
-    notes: Sequence[str] = ()
-    starred: bool = False
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    simulated: bool | None = None
-    duration: float | None = None
-    spikes: int | None = None
-    loss: str = ""
-    trouble: str = ""
-
-    def load(self) -> Run:
-        """The run itself, opened for reading.
-
-        Raises:
-            RunFolderError: it cannot be read, or ended before its first sample.
-        """
-        from tactile_lab.store.run import Run
-
-        return Run.load(self.folder)
-
-    def says(self, words: str) -> bool:
-        """Whether each of `words`, in any case, stands in a name, note or parameter."""
-        texts = (
-            *(self.name, self.status, self.title, self.protocol, self.scene),
-            *(self.sensor, self.operator, self.bench, *self.tags, *self.notes),
-            *(f"{key}={value}" for key, value in self.parameters.items()),
-        )
-        text = " ".join(texts).casefold()
-        return all(word in text for word in words.casefold().split())
-
-    def to_dict(self) -> dict[str, Any]:
-        """All but the folder, for the index and for JSON."""
-        names = (field.name for field in fields(self))
-        return {name: getattr(self, name) for name in names if name != "folder"}
-
-
 def catalogue(
     root: Path,
     *,
@@ -111,6 +40,7 @@ def catalogue(
     since: date | None = None,
     until: date | None = None,
     words: str = "",
+    where: str = "",
 ) -> list[RunSummary]:
     """Runs in folder `root` that match, oldest first.
 
@@ -121,12 +51,14 @@ def catalogue(
         since: first day on which the run started.
         until: last day.
         words: each stands somewhere in its names, notes or parameters.
+        where: a condition on keys, see `where`.
 
     Raises:
         RunFolderError: `root` is no folder.
+        SceneError: `where` cannot be read.
     """
     chosen = []
-    for entry in _all(root):
+    for entry in _all(root, where):
         day = datetime.fromisoformat(entry.started).date() if entry.started else None
         if protocol is not None and entry.protocol != protocol:
             continue
@@ -142,67 +74,69 @@ def catalogue(
     return sorted(chosen, key=lambda entry: (entry.started, entry.name))
 
 
-def _all(root: Path) -> list[RunSummary]:
-    """Every run, from the index where `run.json` has not changed since."""
-    known = _read_index(root)
-    index: dict[str, Any] = {}
+def known(root: Path, entries: Sequence[RunSummary]) -> list[dict[str, list[Fact]]]:
+    """All that is known of these runs, by key; of a key with a list each item.
+
+    Raises:
+        RunFolderError: `root` is no folder.
+    """
+    with closing(_index(root)) as index:
+        found = index.facts([entry.name for entry in entries])
+    return [grouped(found[entry.name]) for entry in entries]
+
+
+def _all(root: Path, where: str) -> list[RunSummary]:
+    """Every run that fits, from the index where its folder has not changed since."""
+    with closing(_index(root)) as index:
+        found = index.entries(where)
     entries = []
-    for path, stamp in _folders(root):
-        old = known.get(path.name)
-        if old is not None and old["stamp"] == stamp:
-            entry = RunSummary(folder=path, **old["entry"])
-        else:
-            entry = _entry(path)
-        index[path.name] = {"stamp": stamp, "entry": entry.to_dict()}
-        if entry.status == "running" and not is_live(path):
+    for name, told in found:
+        entry = RunSummary(folder=root / name, **told)
+        if entry.status == "running" and not is_live(entry.folder):
             entry = replace(entry, status="cut short")
         entries.append(entry)
-    if index != known:
-        try:
-            write_json(root / INDEX, {"version": VERSION, "runs": index})
-        except RecordingError:
-            # an archive one may only read is listed without an index
-            return entries
     return entries
 
 
-def _folders(root: Path) -> Iterator[tuple[Path, list[int]]]:
-    """Run folders and what tells whether what is said of them has changed."""
+def _index(root: Path) -> Index:
+    """The index of a folder, up to date."""
+
+    def read(name: str) -> tuple[dict[str, Any], list[Fact]]:
+        entry = summary(root / name)
+        return entry.to_dict(), facts(entry)
+
+    stamps = dict(_folders(root))
+    index = Index(root, keep=bool(stamps))
+    index.update(stamps, read)
+    return index
+
+
+def _folders(root: Path) -> Iterator[tuple[str, list[int]]]:
+    """Run folders and what tells whether what is said of them has changed.
+
+    Every file in a folder but one is replaced, not written into, so that the folder's
+    own time changes with them; the one that people might edit is looked at, too.
+    """
     try:
         with os.scandir(root) as found:
-            names = [item.name for item in found if item.is_dir()]
+            for item in found:
+                if not item.is_dir():
+                    continue
+                try:
+                    state = os.stat(os.path.join(item.path, INFO))
+                    changed = item.stat().st_mtime_ns
+                except OSError:
+                    continue  # some other folder
+                yield item.name, [changed, state.st_mtime_ns, state.st_size]
     except OSError as error:
         raise RunFolderError(
             f"{root} cannot be listed: {error.strerror}. Give the folder that holds "
             "the runs."
         ) from error
-    for name in sorted(names):
-        try:
-            state = (root / name / INFO).stat()
-        except OSError:
-            continue  # some other folder
-        stamp = [state.st_mtime_ns, state.st_size]
-        with suppress(OSError):  # few runs have remarks
-            state = (root / name / REMARKS).stat()
-            stamp += [state.st_mtime_ns, state.st_size]
-        yield root / name, stamp
 
 
-def _read_index(root: Path) -> dict[str, Any]:
-    """The index as last written; empty where there is none that can be used."""
-    try:
-        content = json.loads((root / INDEX).read_text(encoding="utf-8"))
-        if content["version"] != VERSION:
-            return {}
-        for item in content["runs"].values():
-            RunSummary(folder=root, **item["entry"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return {}
-    runs: dict[str, Any] = content["runs"]
-    return runs
-
-
-def _entry(path: Path) -> RunSummary:
+def summary(path: Path) -> RunSummary:
+    """What the run in folder `path` says of itself, or why it cannot be read."""
     try:
         info, remarks = read_info(path), read_remarks(path)
         _check(path, info)

@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 from gui.lanes.compare import MARKS
 from gui.look.theme import Theme
 from gui.review.runs import PAGE, RunsView
-from tactile_lab.store.catalogue import RunSummary, catalogue
+from tactile_lab.store.catalogue import catalogue
 from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.summary import RunSummary
 
 
 def summary(name: str, title: str, status: str, **more: object) -> RunSummary:

@@ -1,13 +1,21 @@
 """The catalogue lists what is there, and its index is never trusted too far."""
 
-import json
+import csv
+import re
+import shutil
+import sqlite3
+from contextlib import closing
 from datetime import date, timedelta
 
 import pytest
+from click.testing import CliRunner
 
-from tactile_lab.errors import RunFolderError
-from tactile_lab.store.catalogue import INDEX, catalogue
+from tactile_lab.cli import cli
+from tactile_lab.errors import RunFolderError, SceneError
+from tactile_lab.store.catalogue import catalogue, known
 from tactile_lab.store.folder import RunFolder, read_info, write_json
+from tactile_lab.store.index import FILE as INDEX
+from tactile_lab.store.remarks import add_note
 
 
 @pytest.fixture
@@ -39,12 +47,110 @@ def test_index_follows_what_changes(root):
     assert catalogue(root, sensor="S7")[0].spikes == 1234
 
 
-@pytest.mark.parametrize("rubbish", ["", "{", "[]", '{"version": 2, "runs": 5}'])
+@pytest.mark.parametrize("rubbish", [b"", b"{", b"SQLite format 3\0" + bytes(99)])
 def test_a_broken_index_is_rebuilt(root, rubbish):
     catalogue(root)
-    (root / INDEX).write_text(rubbish)
+    (root / INDEX).write_bytes(rubbish)
     assert len(catalogue(root)) == 3
-    assert json.loads((root / INDEX).read_text())["runs"]
+    with closing(sqlite3.connect(root / INDEX)) as base:
+        assert base.execute("SELECT count(*) FROM runs").fetchone() == (3,)
+
+
+def test_an_index_of_another_version_is_thrown_away(root):
+    with closing(sqlite3.connect(root / INDEX)) as base:
+        base.executescript("PRAGMA user_version = 99; CREATE TABLE runs (x);")
+    assert len(catalogue(root)) == 3
+
+
+def test_an_index_that_another_program_holds_is_not_waited_for_long(root, monkeypatch):
+    monkeypatch.setattr("tactile_lab.store.index.PATIENCE", 0.01)
+    with closing(sqlite3.connect(root / INDEX, isolation_level=None)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        assert len(catalogue(root)) == 3
+    assert len(catalogue(root)) == 3
+
+
+def test_a_run_that_is_gone_is_forgotten(root):
+    name = catalogue(root)[0].name
+    shutil.rmtree(root / name)
+    assert name not in [entry.name for entry in catalogue(root)]
+    assert catalogue(root, where=f"name = {name}") == []
+
+
+@pytest.fixture
+def levels(tmp_path):
+    for force, tau, note in (("0.05 N", 2.0, "calibrated"), ("0.2 N", 9.5, "CAL 50%")):
+        parameters = {"level": force, "levels": "0.1 N, 0.3 N", "order": "given"}
+        told = {"protocol": "hold", "parameters": parameters, "title": "A hold"}
+        folder = RunFolder.create(tmp_path, "hold", told)
+        folder.finish("complete", spikes_online=int(tau))
+        add_note(folder.path, note)
+        conclusion = {"critical_force_N": {"value": 0.09 + tau / 1000}, "fine": True}
+        trial = {"rest_V_C1_V": 4.3, "adaptation": {"time_constant_s": tau}}
+        results = {"conclusion": conclusion, "trials": [trial, {"rest_V_C1_V": None}]}
+        write_json(folder.path / "results.json", results)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("where", "taus"),
+    [
+        ("protocol.level > 100 mN", [9.5]),
+        ("protocol.level >= 0.05", [2.0, 9.5]),
+        ("protocol.level = 50 mN or tau > 9 s", [2.0, 9.5]),
+        ("protocol.levels > 250 mN", [2.0, 9.5]),
+        ("protocol.levels > 350 mN", []),
+        ("note ~ cal and not protocol.level < 100 mN", [9.5]),
+        ("note ~ 50%", [9.5]),
+        ("note ~ 5_%", []),
+        ('title = "a hold" and spikes = 2', [2.0]),
+        ("(spikes = 2 or spikes = 9) and protocol != pulses", [2.0, 9.5]),
+        ("critical_force < 95 mN", [2.0]),
+        ("rest_V_C1 and starred = no", [2.0, 9.5]),
+    ],
+)
+def test_runs_are_found_by_what_they_are(levels, where, taus):
+    found = catalogue(levels, where=where)
+    assert [table["tau"][0].number for table in known(levels, found)] == taus
+
+
+@pytest.mark.parametrize(
+    ("where", "why"),
+    [
+        ("protocol.levl > 1 N", 'did you mean "protocol.level"'),
+        ("protocol.level > 1 V", "N is needed"),
+        ("protocol.level >", "a value is missing"),
+        ("> 3", "a key is missing"),
+        ("(spikes = 2", "a bracket is not closed"),
+        ("spikes = 2)", "stands where it ends"),
+        ("spikes = many", "is no number"),
+        ('note ~ "half', "cannot be read"),
+        ("   ", "it is empty"),
+    ],
+)
+def test_a_condition_that_cannot_be_read_says_why(levels, where, why):
+    with pytest.raises(SceneError, match=re.escape(why)):
+        catalogue(levels, where=where)
+
+
+def test_the_list_the_table_and_the_keys(levels):
+    def said(*words):
+        done = CliRunner().invoke(cli, ["runs", str(levels), *words])
+        assert done.exit_code == 0, done.output
+        return done.output.splitlines()
+
+    assert said()[0].split() == ["run", "status", "length", "spikes", "samples"]
+    listed = said("--sort", "-tau")
+    assert listed[0].endswith("tau") and [x.split()[-2] for x in listed[1:]] == [
+        "9.5",
+        "2",
+    ]
+    rows = list(csv.DictReader(said("--csv", "--sort", "tau")))
+    assert [row["tau (s)"] for row in rows] == ["2.0", "9.5"]
+    assert rows[0]["protocol.levels (N)"] == "0.1 0.3"
+    assert any(x.split() == ["critical_force", "99.5", "mN"] for x in said("--keys"))
+    wrong = CliRunner().invoke(cli, ["runs", str(levels), "--sort", "taw"])
+    assert wrong.exit_code == 2 and 'did you mean "tau"' in wrong.output
 
 
 def test_a_run_that_cannot_be_read_is_listed_as_such(root):
@@ -59,6 +165,11 @@ def test_running_and_cut_short_are_told_apart(tmp_path):
     assert catalogue(tmp_path)[0].status == "running"
     folder._log.close()  # what the kernel does when the process dies
     assert catalogue(tmp_path)[0].status == "cut short"
+
+
+def test_a_folder_without_runs_gets_no_index(tmp_path):
+    assert catalogue(tmp_path) == []
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_is_none_is_refused(tmp_path):

@@ -1,9 +1,11 @@
 """Two runs are compared by what they ran on, with, and what came out."""
 
 import pytest
+from click.testing import CliRunner
 
+from tactile_lab.cli import cli
 from tactile_lab.store.compare import differences
-from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.folder import RunFolder, write_json
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
 
@@ -11,7 +13,11 @@ from tactile_lab.store.recorder import Recorder
 @pytest.fixture
 def make(bench, tmp_path):
     def made(*, seed=1, environment=None, gain=0.2, hold="2 s"):
-        info = {"environment": environment or {"numpy": "2.0"}, "seed": seed}
+        info = {
+            "environment": environment or {"numpy": "2.0"},
+            "seed": seed,
+            "parameters": {"hold": hold},
+        }
         folder = RunFolder.create(tmp_path, "pulses", info)
         folder.write_text("scene.toml", f'[protocol]\nhold = "{hold}"\n')
         layout = Layout(
@@ -43,3 +49,16 @@ def test_each_kind_of_difference_is_named(make):
     assert 'scene +hold = "3 s"' in found.calibration
     assert "the samples of V_K are not identical" in found.results
     assert any("spike times differ by up to" in line for line in found.results)
+
+
+def test_on_the_command_line_values_stand_side_by_side(make, tmp_path):
+    old, new = make(), make(hold="3 s")
+    write_json(new / "results.json", {"conclusion": {"critical_force_N": 0.0926}})
+    done = CliRunner().invoke(cli, ["compare", str(old), str(new)])
+    assert done.exit_code == 0, done.output
+    lines = [line.split() for line in done.output.splitlines()]
+    assert ["protocol.hold", "2", "s", "3", "s"] in lines
+    assert ["critical_force", "92.6", "mN"] in lines
+    assert "results: the same" in done.output
+    none = CliRunner().invoke(cli, ["compare", str(old), str(tmp_path / "none")])
+    assert none.exit_code == 2 and "none" in none.output

@@ -1,0 +1,146 @@
+"""What a run can be found by: its names, parameters and results as key and value."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from tactile_lab.errors import QuantityError
+from tactile_lab.quantity import parse
+
+if TYPE_CHECKING:
+    from tactile_lab.store.summary import RunSummary
+
+RESULTS = "results.json"
+TEXTS = (
+    "name", "status", "title", "protocol", "scene", "sensor", "operator", "bench",
+    "started",
+)  # fmt: skip
+_QUANTITY = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?) (\S.*)")
+_UNITS = ("N", "s", "V", "A", "T", "Hz", "K", "Ohm", "m")
+"""Units that end the name of a result, such as critical_force_N."""
+
+
+class Fact(NamedTuple):
+    """One thing that is known of a run.
+
+    Attributes:
+        key: such as "protocol.level" or "critical_force".
+        number: SI; None for a text.
+        text: as a person wrote it; "" for a number.
+        unit: SI; "" without.
+    """
+
+    key: str
+    number: float | None
+    text: str = ""
+    unit: str = ""
+
+
+def facts(entry: RunSummary) -> list[Fact]:
+    """All that is known of a run, from its summary and its results; lists item by item.
+
+    Results that cannot be read are left out: they can be written again.
+    """
+    found = [Fact(key, None, getattr(entry, key)) for key in TEXTS]
+    found += [Fact("tag", None, tag) for tag in entry.tags]
+    found += [Fact("note", None, note) for note in entry.notes]
+    found.append(Fact("starred", float(entry.starred)))
+    if entry.simulated is not None:
+        found.append(Fact("simulated", float(entry.simulated)))
+    if entry.duration is not None:
+        found.append(Fact("duration", entry.duration, unit="s"))
+    if entry.spikes is not None:
+        found.append(Fact("spikes", float(entry.spikes)))
+    for key, value in entry.parameters.items():
+        if key != "name":
+            found += _parameter(f"protocol.{key}", value)
+    try:
+        results = json.loads((entry.folder / RESULTS).read_text(encoding="utf-8"))
+        found += _results(results)
+    except (OSError, ValueError, TypeError, AttributeError):
+        return found
+    return found
+
+
+def grouped(found: Iterable[Fact]) -> dict[str, list[Fact]]:
+    """The facts of one run by key."""
+    table: dict[str, list[Fact]] = {}
+    for fact in found:
+        table.setdefault(fact.key, []).append(fact)
+    return table
+
+
+def quantity(text: str, unit: str) -> float:
+    """A value to compare with: a number, SI, or a quantity in any prefix.
+
+    Raises:
+        QuantityError: it is in another unit.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        return parse(text, unit) if unit else _bare(text)
+
+
+def _bare(text: str) -> float:
+    if text in ("true", "false", "yes", "no"):
+        return float(text in ("true", "yes"))
+    raise QuantityError(f'"{text}" is no number; this has no unit.')
+
+
+def _parameter(key: str, value: Any) -> Iterator[Fact]:
+    # lists stand as texts of their items with commas between
+    for item in str(value).split(", ") if isinstance(value, str) else [value]:
+        if isinstance(item, bool):
+            yield Fact(key, float(item))
+        elif isinstance(item, int | float):
+            yield Fact(key, float(item))
+        elif isinstance(item, str):
+            match = _QUANTITY.fullmatch(item)
+            if match is None:
+                yield Fact(key, None, item)
+            else:
+                yield Fact(key, float(match[1]), unit=match[2])
+
+
+def _results(results: Mapping[str, Any]) -> Iterator[Fact]:
+    yield from _numbers(results.get("conclusion") or {})
+    trials = results.get("trials") or []
+    for key, name in (
+        ("rest_V_C1", "rest_V_C1_V"),
+        ("peak_rate", "peak_rate_Hz"),
+        ("first_spike", "latency_s"),
+    ):
+        for trial in trials:
+            yield from _number(key, trial.get(name), name)
+    for trial in trials:
+        law = trial.get("circuit_adaptation") or trial.get("adaptation") or {}
+        yield from _number("tau", law.get("time_constant_s"), "tau_s")
+
+
+def _numbers(values: Mapping[str, Any]) -> Iterator[Fact]:
+    for name, value in values.items():
+        if isinstance(value, dict) and "value" not in value:
+            yield from _numbers(value)
+        elif isinstance(value, list):
+            for one in value:
+                yield from _number(name, one, name)
+        else:
+            yield from _number(name, value, name)
+
+
+def _number(key: str, value: Any, name: str) -> Iterator[Fact]:
+    """A result without the unit in its name; nothing where it is no number."""
+    if isinstance(value, dict):
+        value = value.get("value")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return
+    if not math.isfinite(value):
+        return
+    unit = name.rpartition("_")[2]
+    known = unit if unit in _UNITS else ""
+    yield Fact(key.removesuffix(f"_{known}") if known else key, float(value), "", known)
