@@ -9,6 +9,7 @@ SHIPPED = (
     "hold_10s", "fig5b", "rate_force", "staircase", "repeat", "bipolar", "sine_sweep",
     "threshold_search", "calibrate_field", "force_check", "wiring_check", "monitor",
     "waveform", "vibration", "texture", "touch", "threshold_trim",
+    "threshold_drift",
 )  # fmt: skip
 
 

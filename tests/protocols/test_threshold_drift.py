@@ -1,0 +1,101 @@
+"""The critical force is followed, and its slope against temperature told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.threshold_drift import ThresholdDrift, brackets
+from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.trial import Outcome
+from tactile_lab.waveform import Waveform
+
+
+def followed(protocol, critical, kelvin=None):
+    """A run on a sensor whose critical force is `critical(i)` N at press i."""
+    trials, done, pressed = protocol.presentations(), [], 0
+    trial, time = next(trials), 0.0
+    while True:
+        spikes = np.empty(0)
+        if not trial.pause:
+            if trial.level > critical(pressed):
+                spikes = np.array([0.5])
+            done.append(
+                MeasuredTrial(
+                    label=trial.label,
+                    level=trial.level,
+                    start=time,
+                    duration=trial.length,
+                    spike_times=spikes,
+                    hold=trial.hold,
+                )
+            )
+            pressed += 1
+        time += trial.length
+        outcome = Outcome(
+            trial=trial, index=0, start=0, spike_times=spikes, current=np.empty((0, 2))
+        )
+        try:
+            trial = trials.send(outcome)
+        except StopIteration:
+            break
+    warm = None
+    if kelvin is not None:
+        warm = np.array([(t.start + 0.1, kelvin(i)) for i, t in enumerate(done)])
+    return Measurement(
+        simulated=True,
+        bench="made up",
+        duration=time,
+        trials=tuple(done),
+        force=Waveform.constant(0.0),
+        temperature=warm,
+    )
+
+
+def test_it_holds_a_steady_critical_force_between_two_presses():
+    protocol = ThresholdDrift(begin=0.11, presses=30)
+    run = followed(protocol, lambda i: 0.1004)
+    for one in brackets(run):
+        assert abs(one.middle - 0.1004) <= one.half
+    found = protocol.conclude(run)
+    slope = found.values["drift_N_per_h"]
+    assert slope.low < 0 < slope.high
+    assert found.values["drift_N_per_K"] is None
+    assert "No temperature was read" in found.text
+
+
+@pytest.mark.parametrize("slope", [-4e-4, 3e-4, 8e-4])
+@pytest.mark.parametrize("begin", [0.1, 0.105])
+def test_a_slope_against_temperature_lies_in_its_interval(slope, begin):
+    protocol = ThresholdDrift(begin=begin, presses=80)
+    run = followed(
+        protocol, lambda i: 0.1 + slope * i / 4, kelvin=lambda i: 290 + i / 4
+    )
+    found = protocol.conclude(run).values["drift_N_per_K"]
+    assert found.low <= slope <= found.high
+    assert found.half < 3e-4
+    (plot,) = protocol.plots(run)
+    assert plot.x_label == "Temperature" and len(plot.panels[0].series) == 2
+
+
+def test_too_few_values_give_no_slope():
+    protocol = ThresholdDrift(presses=8)
+    found = protocol.conclude(followed(protocol, lambda i: 0.2))
+    assert "are needed" in found.missing[0]
+    assert "drift_N_per_K" not in found.values
+
+
+def test_a_temperature_that_stands_still_is_said():
+    protocol = ThresholdDrift(presses=20)
+    run = followed(protocol, lambda i: 0.1004, kelvin=lambda i: 290.0)
+    found = protocol.conclude(run)
+    assert "The temperature did not change." in found.text
+    assert not protocol.conclude(replace(run, searched=False)).sentences
+
+
+def test_it_asks_for_the_temperature_and_never_for_no_force():
+    assert "temperature" in ThresholdDrift().wishes()
+    run = followed(ThresholdDrift(begin=3e-3, presses=12), lambda i: -1.0)
+    assert min(t.level for t in run.trials) == 1e-3
+    with pytest.raises(ValueError, match="step must be below begin"):
+        ThresholdDrift(begin=1e-3, step=1e-3)
