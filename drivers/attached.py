@@ -29,6 +29,9 @@ from tactile_lab.instruments.dialects import (
 from tactile_lab.instruments.serial_dialect import SerialDialect, SerialSettings
 from tactile_lab.voltage_source import VoltageLimits
 
+NO_USB = "usb"
+"""Address that stands for all of USB where it cannot be looked at."""
+
 DIALOUT = (
     "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
 )
@@ -193,7 +196,8 @@ def _usb() -> list[Found]:
     try:
         devices = present()
     except InstrumentError as reason:
-        return [Found(address="usb", kind="usb", title="USB", problem=str(reason))]
+        told = "USB cannot be looked at; only USBTMC scopes need that"
+        return [Found(address=NO_USB, kind="usb", title=told, problem=str(reason))]
     return [
         Found(
             address=f"bus {one.bus} device {one.address}",

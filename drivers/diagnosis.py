@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
-from drivers.attached import attached
+from drivers.attached import NO_USB, attached
 from drivers.coil.guard import Guard
 from drivers.picoscope.sdk import load
 from tactile_lab.errors import InstrumentError
@@ -45,17 +45,20 @@ class Diagnosis:
     remedy: str | None = None
 
 
-def diagnose(folder: Path, needed_rate: float) -> list[dict[str, Any]]:
+def diagnose(
+    folder: Path, needed_rate: float, library: str | None = None
+) -> list[dict[str, Any]]:
     """Look at everything, as plain data; opens no port and no instrument.
 
     Args:
         folder: where runs are stored.
         needed_rate: what a run must be able to store, bytes/s.
+        library: PicoSDK's, as a bench file names it; the usual places unless given.
     """
     looks: tuple[Callable[[], Diagnosis], ...] = (
         python,
         packages,
-        picosdk,
+        lambda: picosdk(library),
         guard,
         wake_up,
         lambda: disk(folder, needed_rate),
@@ -102,18 +105,21 @@ def packages() -> Diagnosis:
     return Diagnosis(topic="packages", state="ok", text=", ".join(versions))
 
 
-def picosdk() -> Diagnosis:
+def picosdk(library: str | None = None) -> Diagnosis:
     """Whether PicoScope's library is where it is looked for."""
     try:
-        library = load()
-    except InstrumentError as reason:
+        found = load(library)
+    except InstrumentError:
+        where = library or "any of the usual places"
         return Diagnosis(
             topic="picosdk",
             state="note",
-            text="PicoScope's library ps3000a cannot be used",
-            remedy=" ".join(str(reason).split()),
+            text=f"no library ps3000a that can be used in {where}; only a PicoScope "
+            "needs it",
+            remedy='install PicoSDK, or name its file: library = "..." in the bench '
+            "file, or the environment variable TACTILE_LAB_PS3000A",
         )
-    return Diagnosis(topic="picosdk", state="ok", text=str(library))
+    return Diagnosis(topic="picosdk", state="ok", text=str(found))
 
 
 def guard() -> Diagnosis:
@@ -191,7 +197,11 @@ def ports() -> list[Diagnosis]:
     found = attached(ask=False)
     findings = [
         Diagnosis(
-            topic="port", state="problem", text=one["title"], remedy=one["problem"]
+            topic="port",
+            # without libusb nothing of USB is seen, and only USBTMC scopes need it
+            state="note" if one["address"] == NO_USB else "problem",
+            text=one["title"],
+            remedy=one["problem"],
         )
         for one in found
         if one["problem"]

@@ -18,6 +18,7 @@ from tactile_lab.errors import nearest
 VERBS = {
     "gui": "Open the bench window.",
     "run": "Run a scene on its bench and store every sample; the demo unless given.",
+    "day-one": "A first hour with a bench: computer, wiring, field, force, sensor.",
     "sequence": "Several runs, one after the other; goes on after a fault.",
     "monitor": "Watch the sensor, coil off; keep the last minute on demand.",
     "plan": "What a scene needs and leaves out, its cost and limits; opens nothing.",

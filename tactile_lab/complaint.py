@@ -19,6 +19,7 @@ Blame = Callable[[tuple[str, ...]], str]
 
 _NEEDED = {
     "string_type": "a text in quotes is needed",
+    "string_too_short": "a text that is not empty is needed",
     "bool_type": "true or false is needed",
     "int_type": "a whole number is needed",
     "int_from_float": "a whole number is needed",

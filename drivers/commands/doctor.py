@@ -23,16 +23,25 @@ BYTES_PER_SAMPLE = 2
     metavar="SAMPLES/S",
     help="Samples a second over all channels that a run must store.",
 )
+@click.option(
+    "--bench",
+    metavar="FILE",
+    help="Look for PicoSDK where this bench file says; the lab's unless given.",
+)
 @json_option
-def command(out: Path, rate: float, as_json: bool) -> None:
+def command(out: Path, rate: float, bench: str | None, as_json: bool) -> None:
     """Look at environment, drivers, permissions, timing and disk.
 
     Opens no port and no instrument. Exit code 1 if there is a problem.
     """
     from drivers.diagnosis import diagnose
+    from tactile_lab.lab import lab
+    from tactile_lab.scene.load import load_bench
 
     with refusing():
-        findings = diagnose(out, rate * BYTES_PER_SAMPLE)
+        scope = load_bench(bench or lab().bench).scope
+        library = None if scope is None else scope.library
+        findings = diagnose(out, rate * BYTES_PER_SAMPLE, library)
     problems = sum(one["state"] == "problem" for one in findings)
     if as_json:
         print_json({"problems": problems, "findings": findings})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -10,11 +11,20 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from tactile_lab.commands.attended import Signals, interrupted, run_attended
-from tactile_lab.commands.terminal import ProgressLine, fail, progress, say, warn
+from tactile_lab.commands.read_off import field_reader
+from tactile_lab.commands.terminal import (
+    ProgressLine,
+    fail,
+    progress,
+    say,
+    somebody,
+    warn,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from contextlib import ExitStack
+    from pathlib import Path
 
     from tactile_lab.acquisition.ending import Executed
     from tactile_lab.acquisition.events import Event
@@ -22,6 +32,7 @@ if TYPE_CHECKING:
     from tactile_lab.commands.status_server import StatusServer
     from tactile_lab.engine.execution import Execution
     from tactile_lab.report.write import Report
+    from tactile_lab.scene.scene import Scene
     from tactile_lab.store.compare import Differences
 
 
@@ -139,6 +150,43 @@ def serve_status(address: str | None, until: ExitStack) -> StatusServer | None:
     if not server.local:
         warn(f"every computer that reaches {server.address} can read it and stop runs.")
     return server
+
+
+def prepared(
+    scene: Scene,
+    out: Path,
+    notes: Mapping[str, str],
+    server: StatusServer | None = None,
+    *,
+    realtime: bool = False,
+    field: Path | None = None,
+) -> tuple[Execution, Watchers]:
+    """A run about to begin, and who is told of it; its folder is there.
+
+    Args:
+        scene: what to run.
+        out: folder for run folders.
+        notes: kept with it.
+        server: tells other programs of it.
+        realtime: pace a simulated bench by the clock.
+        field: file of what a manual teslameter showed.
+
+    Raises:
+        TactileLabError: it is refused.
+    """
+    from tactile_lab.engine.execution import Execution
+
+    watchers, person = Watchers(Narrator(scene.name), server), somebody()
+    execution = Execution(
+        scene,
+        out,
+        realtime=realtime,
+        emit=watchers,
+        notes=notes,
+        ask=person,
+        asked_field=field_reader(scene, person, field),
+    )
+    return execution, watchers
 
 
 def finished(execution: Execution, signals: Signals, watchers: Watchers) -> Executed:
@@ -271,6 +319,17 @@ def _unreported(done: Executed, failure: BaseException) -> None:
         f"the report was cut short ({text}). The run is kept in {done.folder}; "
         f"`tactile-lab report {done.folder}` writes it again."
     )
+
+
+def tell_of(done: Executed, watchers: Watchers, *, no_report: bool) -> None:
+    """Tell of a run that ended, as text and to other programs; see `concluded`."""
+    began = time.monotonic() - done.took
+
+    def tell(done: Executed, report: Report | None) -> None:
+        watchers.end(answer(done, report))
+        print_run(done, report, time.monotonic() - began)
+
+    concluded(done, no_report=no_report, tell=tell)
 
 
 def leave(done: Executed) -> NoReturn:

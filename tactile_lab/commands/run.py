@@ -12,12 +12,11 @@ import click
 
 from tactile_lab.commands.attended import Signals, interrupted
 from tactile_lab.commands.one_run import (
-    Narrator,
-    Watchers,
     answer,
     concluded,
     finished,
     leave,
+    prepared,
     print_run,
     serve_status,
 )
@@ -30,8 +29,7 @@ from tactile_lab.commands.options import (
     scene_options,
     status_option,
 )
-from tactile_lab.commands.read_off import field_reader
-from tactile_lab.commands.terminal import print_json, refusing, say, somebody, warn
+from tactile_lab.commands.terminal import print_json, refusing, say, warn
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
@@ -113,8 +111,6 @@ def command(
     began = time.monotonic()
     with Signals() as signals, ExitStack() as served:
         with refusing():
-            from tactile_lab.engine.execution import Execution
-
             if temperature is not None:
                 overrides = (*overrides, f"conditions.temperature={temperature}")
             loaded = _scene(scene, overrides, bench, again)
@@ -132,16 +128,13 @@ def command(
                     _sweep(loaded, sweeps, repeat, out, as_json=as_json)
                 return
             signals.look()
-            watchers = Watchers(Narrator(loaded.name), serve_status(status, served))
-            person = somebody()
-            execution = Execution(
+            execution, watchers = prepared(
                 loaded,
                 out,
+                noted(notes),
+                serve_status(status, served),
                 realtime=realtime,
-                emit=watchers,
-                notes=noted(notes),
-                ask=person,
-                asked_field=field_reader(loaded, person, field),
+                field=field,
             )
             if transcripts is not None:
                 record(execution.bench, transcripts)

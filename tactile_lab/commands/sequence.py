@@ -16,13 +16,10 @@ import click
 
 from tactile_lab.commands.attended import Signals
 from tactile_lab.commands.one_run import (
-    Narrator,
-    Watchers,
-    answer,
-    concluded,
     finished,
-    print_run,
+    prepared,
     serve_status,
+    tell_of,
 )
 from tactile_lab.commands.options import (
     noted,
@@ -31,12 +28,10 @@ from tactile_lab.commands.options import (
     scene_asked,
     status_option,
 )
-from tactile_lab.commands.terminal import StatusLine, refusing, say, somebody, warn
+from tactile_lab.commands.terminal import StatusLine, refusing, say, warn
 from tactile_lab.errors import SceneError, choices
 
 if TYPE_CHECKING:
-    from tactile_lab.acquisition.ending import Executed
-    from tactile_lab.report.write import Report
     from tactile_lab.scene.scene import Scene
 
 STATE = "sequence.json"
@@ -126,54 +121,21 @@ def command(
                 continue
             say(f"{number + 1} of {len(steps)}: {step.scene}", sys.stderr)
             with refusing():
-                watchers = Watchers(Narrator(step.scene), server)
-                done = _run(step, out, watchers, signals, kept_notes, realtime=realtime)
+                execution, watchers = prepared(
+                    step.load(), out, kept_notes, server, realtime=realtime
+                )
+            done = finished(execution, signals, watchers)
             signals.opened = False
             steps[number] = Step(
                 step.scene, step.changes, step.bench, str(done.state), str(done.folder)
             )
             _keep(state, steps)
-            _tell(done, watchers, no_report=no_report)
+            tell_of(done, watchers, no_report=no_report)
             code = done.exit_code
             if code and not (go_on and code == 3):
                 break
     _summary(steps, state)
     raise click.exceptions.Exit(code)
-
-
-def _run(
-    step: Step,
-    out: Path,
-    watchers: Watchers,
-    signals: Signals,
-    notes: dict[str, str],
-    *,
-    realtime: bool,
-) -> Executed:
-    from tactile_lab.commands.read_off import field_reader
-    from tactile_lab.engine.execution import Execution
-
-    scene, person = step.load(), somebody()
-    execution = Execution(
-        scene,
-        out,
-        realtime=realtime,
-        emit=watchers,
-        notes=notes,
-        ask=person,
-        asked_field=field_reader(scene, person, None),
-    )
-    return finished(execution, signals, watchers)
-
-
-def _tell(done: Executed, watchers: Watchers, *, no_report: bool) -> None:
-    began = time.monotonic() - done.took
-
-    def tell(done: Executed, report: Report | None) -> None:
-        watchers.end(answer(done, report))
-        print_run(done, report, time.monotonic() - began)
-
-    concluded(done, no_report=no_report, tell=tell)
 
 
 def _asked(scenes: tuple[str, ...], bench: str | None) -> list[Step]:

@@ -45,6 +45,7 @@ def _located(name: str, info: ValidationInfo) -> str:
 Located = AfterValidator(_located)
 """Of a name that may be a file's: its path is relative to the bench file."""
 
+Port = Annotated[str, Field(min_length=1)]
 Baud = Annotated[int, Field(ge=50, le=4_000_000)]
 
 
@@ -78,7 +79,7 @@ class CoilSpec(SceneTable):
 
     driver: Annotated[CoilDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "kepco-bop"
-    port: str = "sim://coil"
+    port: Port = "sim://coil"
     baud: Baud | None = None
     options: dict[str, Any] = field(default_factory=dict)
     limits: CoilLimits = field(default_factory=CoilLimits)
@@ -162,7 +163,7 @@ class FieldMeterSpec(SceneTable):
 
     driver: Annotated[MeterDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "lakeshore-425"
-    port: str = "sim://field_meter"
+    port: Port = "sim://field_meter"
     baud: Baud | None = None
     options: dict[str, Any] = field(default_factory=dict)
 
@@ -184,7 +185,7 @@ class VoltageSourceSpec(SceneTable):
     name: str = field(default="", metadata=INTERNAL)
     driver: Annotated[VoltageDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "keithley-2400-voltage"
-    port: str = "sim://voltage_source"
+    port: Port = "sim://voltage_source"
     baud: Baud | None = None
     options: dict[str, Any] = field(default_factory=dict)
     limits: VoltageLimits

@@ -9,7 +9,7 @@ run      the folder opens, is recovered, verifies without a finding, and holds a
          of what the same run gives to its end, no less than could be read right after
          the kill less a block
 report   what lies there under its final name is whole (JSON parses, HTML and SVG are
-         closed, PNG opens), and a second report writes the same numbers
+         closed, PNG opens); every fourth time a second one writes the same numbers
 export   the file is there whole or not at all, and a second export writes it
 recover  a second one gives what an undisturbed one gives, sample for sample
 
@@ -19,6 +19,7 @@ What is done is kept in `build/kills.jsonl`; a campaign goes on where it was sto
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
 import random
@@ -29,7 +30,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ def only(folder: Path) -> Path | None:
 
 def killed_run(place: Path, known: dict[str, Any], after: float) -> str:
     """What became of a killed run."""
-    forked(("run", "demo", "--out", str(place), *SHORT), after)
+    forked(("run", "demo", "--no-report", "--out", str(place), *SHORT), after)
     path = only(place)
     if path is None or not (path / "run.json").exists():
         return "nothing begun"
@@ -142,7 +143,7 @@ def killed_run(place: Path, known: dict[str, Any], after: float) -> str:
 
 def killed_report(place: Path, known: dict[str, Any], after: float) -> str:
     """What became of a run whose report was killed."""
-    path = Path(shutil.copytree(known["whole"], place / "run"))
+    path = Path(shutil.copytree(known["whole"], place / known["whole"].name))
     for file in path.iterdir():
         if file.suffix in (".html", ".png", ".svg") or file.name == "results.json":
             file.unlink()
@@ -153,6 +154,8 @@ def killed_report(place: Path, known: dict[str, Any], after: float) -> str:
     if not verify(path).sound:
         return "UNSOUND"
     there = (path / "report.html").exists()
+    if known["number"] % 4:
+        return "report whole" if there else "no report yet"
     forked(("report", str(path)))
     if (path / "results.json").read_bytes() != known["results"]:
         return "OTHER NUMBERS in the second report"
@@ -217,12 +220,60 @@ JUDGES: dict[str, Callable[[Path, dict[str, Any], float], str]] = {
 }
 
 
+def here(*arguments: str) -> None:
+    """One call of the command line in this process, silently.
+
+    Raises:
+        RuntimeError: it failed.
+    """
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        try:
+            command_line(arguments)
+        except SystemExit as end:
+            if end.code not in (0, None):
+                raise RuntimeError(f"{arguments} ended with {end.code}") from end
+
+
+def cut_while_recording(place: Path) -> Path:
+    """A long run that was killed once it had `LEAST` samples on disk."""
+    child = os.fork()
+    if child == 0:
+        try:
+            long = (
+                "--set",
+                'protocol.levels=["100 mN"]',
+                "--set",
+                "protocol.hold=300 s",
+            )
+            call("run", "demo", "--no-report", "--out", str(place), *SHORT, *long)
+        finally:
+            os._exit(70)
+    kept = 0
+    while kept < LEAST:
+        time.sleep(0.02)
+        if os.waitpid(child, os.WNOHANG)[0]:
+            raise RuntimeError("the run to be killed ended by itself")
+        with suppress(RunFolderError), Run.load(only(place) or place) as run:
+            kept = run.samples
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    path = only(place)
+    if path is None:
+        raise RuntimeError("there is no run")
+    return path
+
+
 def prepared(place: Path) -> tuple[dict[str, Any], dict[str, float]]:
     """What undisturbed calls give, and how long each takes, s."""
     took = {}
-    first = ("run", "demo", "--out", str(place / "warm"), *SHORT)
-    forked(first)  # compile
-    took["run"] = forked(("run", "demo", "--out", str(place / "whole"), *SHORT))
+    # what this process has imported and compiled, no fork does again
+    here("run", "demo", "--out", str(place / "warm"), *SHORT)
+    warm = str(only(place / "warm"))
+    for form in FORMATS:
+        here("export", warm, "--to", form)
+    here("verify", warm)
+    whole_run = ("run", "demo", "--no-report", "--out", str(place / "whole"), *SHORT)
+    took["run"] = forked(whole_run)
     whole = only(place / "whole")
     if whole is None:
         raise RuntimeError("there is no run")
@@ -240,15 +291,7 @@ def prepared(place: Path) -> tuple[dict[str, Any], dict[str, float]]:
             if file.name not in there
         }
     took["export"] = max(times)
-    cut_short, part = None, 0.5
-    while cut_short is None:
-        shutil.rmtree(place / "cut", ignore_errors=True)
-        forked(("run", "demo", "--out", str(place / "cut"), *SHORT), part * took["run"])
-        path = only(place / "cut")
-        with suppress(RunFolderError), Run.load(path or place) as run:
-            if run.status == "running" and run.samples > LEAST:
-                cut_short = path
-        part = 0.3 + 0.6 * random.random()
+    cut_short = cut_while_recording(place / "cut")
     mended = Path(shutil.copytree(cut_short, place / "mended"))
     took["recover"] = forked(("recover", str(mended)))
     known = {
@@ -286,7 +329,9 @@ def main() -> int:
                 place = Path(folder) / f"{verb}{number}"
                 place.mkdir()
                 after = chance.uniform(0.0, 1.1 * took[verb])
-                told = JUDGES[verb](place, {**known, "chance": chance}, after)
+                told = JUDGES[verb](
+                    place, {**known, "chance": chance, "number": number}, after
+                )
                 shutil.rmtree(place)
                 entry = {
                     "seed": chosen.seed, "verb": verb, "number": number,

@@ -111,3 +111,36 @@ def test_who_asks_whether_a_run_is_live_never_stops_its_writer(tmp_path):
     with (folder.path / "log.jsonl").open() as other:
         fcntl.flock(other, fcntl.LOCK_SH)
         assert not is_live(folder.path)
+
+
+@pytest.mark.parametrize("table", ["coil", "field_meter"])
+def test_an_empty_port_is_refused_before_anything_is_opened(tactile_lab, table):
+    answer = tactile_lab("plan", "demo", "--set", f'bench.{table}.port=""')
+    assert answer.code == 2
+    assert "a text that is not empty is needed" in answer.err
+
+
+def test_what_only_hardware_needs_is_no_problem_of_a_simulating_computer(
+    tactile_lab, tmp_path, monkeypatch
+):
+    from drivers import attached
+    from tactile_lab.errors import NotFoundError
+
+    def missing():
+        raise NotFoundError("The libusb library was not found. Install libusb 1.0.")
+
+    monkeypatch.setattr(attached, "present", missing)
+    answer = tactile_lab("doctor", "--json", "--out", tmp_path)
+    found = {one["text"]: one for one in answer.json["findings"]}
+    (usb,) = (one for text, one in found.items() if text.startswith("USB cannot"))
+    assert usb["state"] == "note"
+    assert all(len(one["remedy"] or "") < 200 for one in found.values())
+
+
+def test_doctor_looks_where_the_bench_file_says(tactile_lab, tmp_path):
+    bench = '[magnet]\nr = "6 mm"\n[scope]\nlibrary = "/opt/own/ps3000a.so"\n'
+    (tmp_path / "bench.toml").write_text(bench)
+    asked = ("--bench", tmp_path / "bench.toml", "--out", tmp_path)
+    findings = tactile_lab("doctor", "--json", *asked).json["findings"]
+    (pico,) = (one for one in findings if one["topic"] == "picosdk")
+    assert "/opt/own/ps3000a.so" in pico["text"]

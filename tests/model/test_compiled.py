@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 CODE = """
 import numba
 from tactile_lab.model.compiled import entry
@@ -17,3 +19,43 @@ def test_compiling_is_said_once():
     )
     (line,) = done.stderr.splitlines()
     assert line.startswith("Compiling for this computer, about 20 s")
+
+
+KEPT = """
+import sys
+from pathlib import Path
+from numba.core import caching
+from tactile_lab.model import compiled
+if "unwritable" in sys.argv:
+    caching.CacheImpl._locator_classes = []
+
+def twice(x):
+    return 2 * x
+
+print(compiled.entry(twice)(3.0))
+"""
+
+
+@pytest.mark.parametrize("spoil", ["nothing", "unwritable", "index", "code"])
+def test_a_cache_that_cannot_be_used_costs_only_time(tmp_path, monkeypatch, spoil):
+    """An empty file of it made every verb end with 130, as EOFError means Ctrl-C."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "own.py").write_text(KEPT)
+
+    def run():
+        done = subprocess.run(
+            [sys.executable, tmp_path / "own.py", spoil],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert done.stdout == "6.0\n"
+        return done.stderr
+
+    assert "Compiling" in run()
+    for file in tmp_path.glob("cache/**/*.nb[ic]"):
+        if file.suffix == {"index": ".nbi", "code": ".nbc"}.get(spoil):
+            file.write_bytes(b"")
+    again = run()
+    assert ("Compiling" in again) == (spoil != "nothing")
+    assert ("cannot be kept" in again) == (spoil == "unwritable")
+    if spoil in ("index", "code"):
+        assert "Compiling" not in run(), "what was spoilt was not mended"

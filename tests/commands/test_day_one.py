@@ -1,0 +1,97 @@
+"""The first day works whole on the simulated bench, and goes on where it was."""
+
+import json
+
+import pytest
+
+from tactile_lab.commands import day_one
+from tactile_lab.scene.load import load_bench
+
+SHORT = {
+    "wiring_check": ("protocol.hold=0.5 s",),
+    "calibrate_field": (
+        "protocol.points=5",
+        "protocol.dwell=0.2 s",
+        "protocol.loops=1",
+        "record.sample_rate=1 kS/s",
+    ),
+    "force_check": (
+        'protocol.levels=["40 mN"]',
+        "protocol.hold=0.5 s",
+        "record.sample_rate=1 kS/s",
+    ),
+    "threshold_search": (
+        "protocol.hold=0.5 s",
+        "protocol.resolution=30 mN",
+        'record.signals=["spikes"]',
+        "record.sample_rate=100 kS/s",
+    ),
+    "demo": (
+        'protocol.levels=["150 mN"]',
+        "protocol.hold=0.5 s",
+        'record.signals=["spikes"]',
+        "record.sample_rate=100 kS/s",
+    ),
+}
+ASKED = tuple(
+    word
+    for step, changes in SHORT.items()
+    for change in changes
+    for word in ("--set", f"{step}:{change}")
+)
+
+
+@pytest.fixture
+def first_day(tactile_lab, tmp_path, monkeypatch):
+    monkeypatch.setattr(day_one, "_verb", lambda name: "")  # they have tests of theirs
+
+    def run(*arguments):
+        return tactile_lab("day-one", "--out", tmp_path / "day", *ASKED, *arguments)
+
+    return run
+
+
+def test_the_first_day_ends_with_bench_calibration_and_page(first_day, tmp_path):
+    swapped = 'wiring_check:simulated.swapped=["V_C1", "V_C2"]'
+    stopped = first_day("--bench", "sim", "--set", swapped)
+    assert stopped.code == 1, stopped.err
+    assert "WRONG: not as wired: V_C1" in stopped.out
+    assert "what to do: the report names" in stopped.out
+    held = json.loads((tmp_path / "day" / "day-one.json").read_text())
+    assert list(held["done"]) == ["doctor", "devices"]
+
+    done = first_day("--note", "operator=Ada")
+    assert done.code == 0, done.err
+    assert "Can this computer run an experiment?  done before" in done.out
+    held = json.loads((tmp_path / "day" / "day-one.json").read_text())
+    assert list(held["done"]) == [step.name for step in day_one.STEPS]
+    spec = load_bench(tmp_path / "day" / "bench.toml")
+    assert spec.magnet.calibration is not None
+    demo = held["done"]["demo"]["run"]
+    with open(f"{demo}/run.json") as file:
+        info = json.load(file)
+    assert info["notes"]["operator"] == "Ada"
+    page = (tmp_path / "day" / "day-one.html").read_text()
+    for step in day_one.STEPS:
+        assert step.title.replace("'", "&#x27;") in page
+    assert "Critical force: between" in page
+
+    runs = sorted((tmp_path / "day" / "runs").iterdir())
+    assert first_day().code == 0
+    assert sorted((tmp_path / "day" / "runs").iterdir()) == runs
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((), "Name your bench file with --bench"),
+        (("--bench", "sim", "--redo", "dmeo"), 'did you mean "demo"'),
+        (("--bench", "sim", "--set", "demo"), "write STEP:KEY=VALUE"),
+        (("--bench", "none.toml"), "none.toml does not exist"),
+    ],
+)
+def test_a_day_that_cannot_begin_is_refused(first_day, tmp_path, arguments, told):
+    answer = first_day(*arguments)
+    assert answer.code == 2
+    assert told in answer.err
+    assert not (tmp_path / "day").exists()
