@@ -15,7 +15,7 @@ from tactile_lab.planning.ranges import beyond
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, cheaper, warnings
-from tactile_lab.planning.ways import WayUsed, ways_used
+from tactile_lab.planning.ways import WayInstead, WayUsed, ways_instead, ways_used
 from tactile_lab.quantity import bytes_text, count, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY, SIGNALS
@@ -63,6 +63,11 @@ class Plan:
         """By which ways the coil plays the trials, and how near the force comes."""
         magnet = self.scene.bench.magnet
         return ways_used(self.timeline.steps, magnet.lag_uncertainty)
+
+    @cached_property
+    def ways_instead(self) -> tuple[WayInstead, ...]:
+        """What the other ways would make of the trial that set-points follow worst."""
+        return ways_instead(self.scene, self.timeline.steps)
 
     @cached_property
     def computing(self) -> Computing:
@@ -150,6 +155,7 @@ class Plan:
             "heat_A2s": {"used": cost.heat, "budget": cost.heat_budget},
             "coil_update": self._coil_update(),
             "ways": [used.to_dict() for used in self.ways],
+            "ways_instead": [one.to_dict() for one in self.ways_instead],
             "resolution": dict(cost.resolution),
             "preview": self._preview(),
             "assumptions": list(self.assumptions),
@@ -302,6 +308,8 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         )
     for used in plan.ways:
         yield BY_WAY[used.way], str(used)
+    for one in plan.ways_instead:
+        yield f"{BY_WAY[one.way]} instead", str(one)
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
     if plan.preview is not None:

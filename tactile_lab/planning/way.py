@@ -1,8 +1,8 @@
 """By which way the coil gives a trial's force: one rule, for the plan and for the run.
 
-Set-points need nothing but a slow line, and the force goes in stairs. The scope's
-generator, where it is wired to the source's analogue input, has short steps and loads
-at once. A list that the source plays by its own clock has steps as short as its dwell,
+The scope's generator, where it is wired to the source's analogue input, has short
+steps and loads at once. Set-points need nothing but a slow line, and the force goes in
+stairs. A list that the source plays by its own clock has steps as short as its dwell,
 and takes time to load.
 The first of these whose force is as near as the scene wants is taken, else the nearest.
 """
@@ -73,12 +73,14 @@ def drive_for(
     if asked is None or asked.peak == 0 or way == "set-points":
         return steps
     near = enough * float(np.ptp(np.append(asked.value, 0.0)))
-    if way == "auto" and _error(steps) <= near:
-        return steps
     found, reasons = [steps], []
     for name, can in (("generator", _generated), ("list", _lists)):
         if way not in ("auto", name):
             continue
+        if way == "auto" and name == "generator" and coil.generator is None:
+            continue
+        if way == "auto" and name == "list" and _error(steps) <= near:
+            break  # loading one takes longer than its trial
         try:
             drive = _timed(trial, scene, wanted, asked, before, can(scene))
         except LimitError as reason:
@@ -191,7 +193,9 @@ def _timed(
     bipolar = coil_capability(coil).bipolar
     drive = _nearest(wanted, asked, magnet, coil.limits, bipolar, can)
     if isinstance(can, GeneratedCurrent) and drive.error is not None:
-        return replace(drive, error=drive.error + _blurred(asked, can.input.lag))
+        converter = abs(float(magnet.force(can.step / 2)))  # its codes lie anywhere
+        blurred = _blurred(asked, can.input.lag)
+        return replace(drive, error=drive.error + blurred + converter)
     return drive
 
 

@@ -263,7 +263,7 @@ class CoilUse(SceneTable):
         strict: refuse a waveform faster than slew or update grid, do not limit it.
         way: "set-points" sent one by one, a "list" that the source plays by its own
             clock, the scope's "generator" into the source's analogue input; "auto"
-            takes the first of set-points, generator, list that is accurate enough.
+            takes the first of generator, set-points, list that is accurate enough.
         accuracy: largest error of the force, as a part of its range, that is accurate
             enough; what the protocol needs unless given.
     """

@@ -19,6 +19,7 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
+from shutil import which
 
 from provenance import provenance
 
@@ -103,7 +104,7 @@ def times_to_off(
     chance, found = random.Random(1), []
     with tempfile.TemporaryDirectory() as state:
         owners = subprocess.Popen(
-            [sys.executable, "-c", OWNER],
+            [*unprivileged(), sys.executable, "-c", OWNER],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -138,6 +139,13 @@ def times_to_off(
         owners.wait()
         owners.stdout.close()
     return found
+
+
+def unprivileged() -> tuple[str, ...]:
+    """What starts a program as a lab's user does: it may not raise its priority."""
+    if os.geteuid() != 0 or which("setpriv") is None:
+        return ()
+    return "setpriv", "--bounding-set=-sys_nice", "nice", "-n", "20"
 
 
 def logged(state: Path, times: int) -> None:
@@ -178,6 +186,8 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=2.0)
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
+    with suppress(OSError):
+        os.nice(-20)  # the source is an instrument: no computer's load slows it
     lines = [
         "# Serial instruments in figures",
         "",

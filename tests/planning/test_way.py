@@ -87,3 +87,19 @@ def test_a_generator_leads_by_coil_and_core_alone(tmp_path):
     error = np.abs(magnet.force(field.at(time)) - asked.at(time)).max()
     assert drive.way == "generator"
     assert error <= drive.error < 2e-3 * 0.12
+
+
+def test_the_plan_says_what_the_other_ways_would_leave(tmp_path):
+    planned = plan(load("demo", SHORT), preview=False)
+    generator, points = planned.ways_instead
+    assert (generator.way, points.way) == ("generator", "list")
+    assert "[coil.generator]" in generator.why_not
+    assert points.part is not None and points.part < 0.006 and points.load > 1
+    told = text(planned)
+    assert "by lists instead" in told and '[coil] way = "list"' in told
+    assert planned.to_dict()["ways_instead"][1]["load_s"] == points.load
+    # who wired the generator wants it used: it costs no time
+    wired = plan(load("demo", SHORT, generator_bench(tmp_path)), preview=False)
+    assert [used.way for used in wired.ways] == ["generator"]
+    assert wired.ways_instead == () and wired.timeline.loading < 0.1
+    assert plan(load("demo", (*SHORT, "coil.way=list"))).ways_instead == ()
