@@ -69,7 +69,7 @@ def main(
     session.run.notes = lab.notes if lab else {}
     session.run.reports = wishes.reports
     window = Window(session, chosen, settings)
-    window.resize(window.size().boundedTo(window.screen().availableSize() - FRAME))
+    fit(window, window.screen().availableSize())
     window.show()
     _close_on_signals(window)
     wanted = bench or wishes.bench
@@ -79,6 +79,16 @@ def main(
     session.close()
     left = session.coil_view()
     return 4 if left is not None and left.verified_off is False else 0
+
+
+def fit(window: Window, available: QSize) -> None:
+    """Make a window as small as the room on a screen, with its frame, needs it to be.
+
+    Args:
+        window: not yet shown.
+        available: room on the screen, px as the window counts them.
+    """
+    window.resize(window.size().boundedTo(available - FRAME))
 
 
 def begin(window: Window, target: str | None, bench: str | None) -> None:

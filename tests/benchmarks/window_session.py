@@ -38,7 +38,15 @@ KEYS = (
     "Up Prior Next 5 9 Delete ctrl+a ctrl+Return ctrl+shift+Return ctrl+r Escape"
 ).split()
 FAULTS = ("missing", "late", "unplug")
-LEFT_ALONE = ("STOP", "Menu", "Open report", "Open folder", "Quit", "Delete")
+LEFT_ALONE = (
+    "STOP",
+    "COIL",
+    "Menu",
+    "Open the report",
+    "Open the run",
+    "Quit",
+    "Delete",
+)
 """Buttons that are pressed on purpose, lead out of the window, or move what is kept."""
 
 
@@ -168,7 +176,10 @@ class Session:
                 return True
             if self.now["state"] == "disconnected":
                 self.tell("connect")
-            if not self.press("Acknowledge") and self.now["state"] != "connecting":
+            if (
+                not self.press("Acknowledge and reset")
+                and self.now["state"] != "connecting"
+            ):
                 self.key("Escape")
             time.sleep(0.5)
             return False

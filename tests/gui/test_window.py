@@ -4,6 +4,7 @@ import gc
 import sys
 from itertools import product
 
+import pytest
 from PySide6.QtCore import QPoint, QPointF, QSize, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
@@ -13,6 +14,8 @@ from PySide6.QtWidgets import (
     QPushButton,
     QToolButton,
 )
+
+from gui.app import FRAME, fit
 
 
 def test_letters_are_shortcuts_only_outside_text_fields(lab) -> None:
@@ -69,15 +72,24 @@ def too_small(window) -> list[str]:
     return found
 
 
-def test_fits_the_smallest_screen_and_elides_no_button(lab) -> None:
-    window = lab.window
-    window.resize(1180, 720)
-    assert window.size() == QSize(1180, 720)
+@pytest.mark.parametrize(
+    "screen", [(1188, 760), (1280, 800), (1366, 768), (1720, 1080)], ids=str
+)
+def test_fits_its_screen_and_elides_no_button(lab, screen: tuple[int, int]) -> None:
+    """The last is 3440 x 2160 at 200 %, too: the window counts px of its own."""
+    window, room = lab.window, QSize(*screen)
+    fit(window, room)
+    assert window.size() == room - FRAME, "as large as there is room for it"
     try:
         lab.until(lambda: not too_small(window), 30.0)
     finally:
         assert not too_small(window)
-        assert window.header.stop.width() == 228
+        stop = window.header.stop
+        assert stop.width() == 228
+        corner = stop.mapTo(window, stop.rect().bottomRight())
+        assert window.rect().contains(corner) and stop.isVisible()
+        run = window.setup.run
+        assert window.rect().contains(run.mapTo(window, run.rect().bottomRight()))
         window.resize(1720, 1080)
 
 
