@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSettings, QSize, QTimer
 from PySide6.QtWidgets import QApplication
@@ -17,8 +18,10 @@ from gui.plots import on_demand as _before_pyqtgraph  # noqa: F401
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips
-from gui.window import Window
 from tactile_lab.engine.threads import start
+
+if TYPE_CHECKING:
+    from gui.window import Window
 from tactile_lab.lab import Lab
 
 FRAME = QSize(8, 40)
@@ -66,6 +69,9 @@ def main(
     settings = QSettings()
     wishes = Preferences(settings, lab)
     session = Session(out or wishes.folder)
+    session.link.open()  # on the other core, while the window is loaded and built
+    from gui.window import Window
+
     session.run.notes = lab.notes if lab else {}
     session.run.reports = wishes.reports
     window = Window(session, chosen, settings)

@@ -59,7 +59,7 @@ class RunActions(QObject):
         if self._panels.session.state.in_run:
             return "Note on the run in progress …  (N)"
         if self._folder is not None:
-            return f"Note on {self._folder.name} …  (N)"
+            return "Note on the run on screen …  (N)"
         return "Note for the next run …  (N)"
 
     def note(self, text: str) -> None:

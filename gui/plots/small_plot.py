@@ -168,8 +168,9 @@ class _Heading(pg.LabelItem):  # type: ignore[misc]
 
     def resizeEvent(self, event: Any) -> None:
         """Break the text where the width ends."""
-        self.item.setTextWidth(max(self.width(), 50))
-        self.setFixedHeight(self.item.boundingRect().height())
+        if self.width() > 50:  # before it has its place, every word is a line
+            self.item.setTextWidth(self.width())
+            self.setFixedHeight(self.item.boundingRect().height())
         super().resizeEvent(event)
 
     def updateMin(self) -> None:

@@ -202,6 +202,11 @@ class Link:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def open(self) -> None:
+        """Start the engine, which else what is asked first does."""
+        with self._lock:
+            self._number()
+
     def _number(self) -> int:
         """A number for what is asked next, and an engine to ask."""
         if self._pipe is None:

@@ -176,12 +176,13 @@ class Session:
                 return True
             if self.now["state"] == "disconnected":
                 self.tell("connect")
-            if (
-                not self.press("Acknowledge and reset")
-                and self.now["state"] != "connecting"
-            ):
+            if time.monotonic() - self.now["at"] > 0.5:
+                return False  # keys would pile up, and Esc in Ready asks all anew
+            if self.press("Acknowledge and reset"):
+                time.sleep(1)
+            elif self.now["open"] or self.now["state"] == "running":
                 self.key("Escape")
-            time.sleep(0.5)
+                time.sleep(1)
             return False
 
         self.wait(ready, 120, "ready again")

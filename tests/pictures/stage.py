@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+import numpy as np
 from PIL import Image
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
@@ -114,9 +115,10 @@ class Stage:
 
     def film(self, name: str, ended: Callable[[], object]) -> None:
         """Save an animated picture of all until `ended()`, twice as fast as it was."""
-        frames = []
+        frames, times = [], [time.monotonic()]
         while not ended():
             self.live(STEP)
+            times.append(time.monotonic())
             image = self.window.grab().toImage().convertToFormat(FORMAT)
             image = image.scaledToWidth(
                 FILM, Qt.TransformationMode.SmoothTransformation
@@ -127,7 +129,7 @@ class Stage:
         file = self.folder / f"{name}.webp"
         frames[0].save(
             file, save_all=True, append_images=frames[1:], quality=60, method=4,
-            duration=[*[int(500 * STEP)] * (len(frames) - 1), 3000], loop=0,
+            duration=[*(int(500 * s) for s in np.diff(times[1:])), 3000], loop=0,
         )  # fmt: skip
         print(file, flush=True)
 
