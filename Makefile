@@ -68,6 +68,10 @@ reports: $(DEV_STAMP)
 	$(BIN)/python tests/benchmarks/scope_stream.py --out docs/scope-figures.md
 	$(BIN)/python tests/benchmarks/fault_table.py --out docs/fault-figures.md
 	$(BIN)/python tests/benchmarks/fuzz.py --out docs/fuzz-figures.md
+	$(BIN)/python tests/benchmarks/study_speed.py --out docs/study-figures.md
+	$(BIN)/python tests/benchmarks/study_answers.py --out docs/study-answers.md
+	$(BIN)/python tests/benchmarks/study_kills.py --out docs/study-kills.md
+	$(BIN)/python tests/benchmarks/design_table.py --out docs/design-figures.md
 	$(BIN)/python tests/benchmarks/window_figures.py --out docs/window-figures.md
 
 screenshots: $(DEV_STAMP)

@@ -60,7 +60,7 @@ def conclude(found: Gathered) -> Conclusion:
         )
         values["yield"] = share
     if design.method == "indices" and design.drawn:
-        tables += _indices(found, values)
+        tables += _indices(found, values, missing)
     if design.method == "tornado" and design.drawn:
         tables += _tornado(found)
     return Conclusion(tuple(sentences), values, tuple(missing), tuple(tables))
@@ -188,49 +188,77 @@ def _yield(found: Gathered) -> tuple[int, Estimate]:
     return number, Estimate.share(number, size)
 
 
-def _indices(found: Gathered, values: dict[str, Any]) -> Iterator[Table]:
+def _indices(
+    found: Gathered, values: dict[str, Any], missing: list[str]
+) -> Iterator[Table]:
     """Sobol indices of each number, with bootstrapped 95 % intervals."""
-    from scipy.stats import sobol_indices
-
     design = found.study.design
     k, n = len(design.drawn), design.draws
     along = design.dimensions.index("draw")
     for name, column in found.numbers().items():
         flat = np.moveaxis(column, along, -1).reshape(-1, n * (k + 2)).mean(axis=0)
-        if not np.all(np.isfinite(flat)) or np.ptp(flat) == 0:
+        if not np.all(np.isfinite(flat)):
+            missing.append(
+                f"Sobol indices of {name}: {np.count_nonzero(~np.isfinite(flat))} "
+                "points have no number; narrow the axes, or keep what every point has."
+            )
             continue
-        parts: Any = {  # the stubs know no function of one output
-            "f_A": flat[:n].reshape(1, n),
-            "f_B": flat[n : 2 * n].reshape(1, n),
-            "f_AB": flat[2 * n :].reshape(k, 1, n),
-        }
-        index = sobol_indices(func=parts, n=n, rng=design.seed)
-        with warnings.catch_warnings():  # an axis that does nothing has no spread
-            warnings.simplefilter("ignore", RuntimeWarning)
-            spread = index.bootstrap(n_resamples=RESAMPLES)
+        if np.ptp(flat) == 0:
+            missing.append(f"Sobol indices of {name}: it is the same at every point.")
+            continue
+        pairs = (flat - flat[: 2 * n].mean()).reshape(k + 2, n)
         rows = []
-        for i, axis in enumerate(design.drawn):
-            one = _index(index.first_order, spread.first_order, i)
-            whole = _index(index.total_order, spread.total_order, i)
-            values[f"sobol_{name}_{axis.key}"] = {"first": one, "total": whole}
-            rows.append((axis.key, _shown(one), _shown(whole)))
+        orders = _with_intervals(pairs, design.seed)
+        for axis, first, total in zip(design.drawn, *orders, strict=True):
+            values[f"sobol_{name}_{axis.key}"] = {"first": first, "total": total}
+            rows.append((axis.key, _shown(first), _shown(total)))
         yield Table(
             title=f"Sobol indices of {name}",
             headings=("axis", "first order", "total"),
             rows=tuple(rows),
-            note=f"Saltelli's estimator on {n} pairs; 95 % intervals by bootstrap over "
-            f"{RESAMPLES} resamples.",
+            note=f"Saltelli's estimator on {n} pairs; 95 % intervals by bootstrap "
+            f"(BCa) over {RESAMPLES} resamples, its draws fixed by the seed.",
         )
 
 
-def _index(values: FloatArray, spread: Any, number: int) -> Estimate:
-    interval = spread.confidence_interval
-    value, low, high = (
-        float(one[number]) for one in (values, interval.low, interval.high)
-    )
-    if math.isnan(low):  # the same in every resample
-        low = high = value
-    return Estimate(value, float(spread.standard_error[number]), low, high)
+def _with_intervals(pairs: FloatArray, seed: int) -> list[list[Estimate]]:
+    """First-order and total index of each axis, with 95 % intervals.
+
+    Args:
+        pairs: centred values, shape (axes + 2, n), see `Design`.
+        seed: of the resamples.
+    """
+    from scipy.stats import bootstrap
+
+    def indices(rows: NDArray[np.intp]) -> FloatArray:
+        return _saltelli(pairs[:, rows])
+
+    every = np.arange(pairs.shape[1])
+    resample: Any = bootstrap  # the stubs know statistics of one number alone
+    with warnings.catch_warnings():  # an axis that does nothing has no spread
+        warnings.simplefilter("ignore")
+        spread = resample(
+            [every], indices, vectorized=False, n_resamples=RESAMPLES, rng=seed
+        )
+    index, interval = indices(every), spread.confidence_interval
+    same = np.isnan(interval.low)  # in every resample
+    low, high = (np.where(same, index, x) for x in (interval.low, interval.high))
+    return [
+        [Estimate(*map(float, one)) for one in zip(*order, strict=True)]
+        for order in zip(index, spread.standard_error, low, high, strict=True)
+    ]
+
+
+def _saltelli(pairs: FloatArray) -> FloatArray:
+    """First-order and total indices, shape (2, axes), of centred values at n pairs.
+
+    Saltelli et al., Comput. Phys. Commun. 181, 2010, Table 2 (b) and (f).
+    """
+    f_A, f_B, f_AB = pairs[0], pairs[1], pairs[2:]
+    first = (f_B * (f_AB - f_A)).mean(axis=-1)
+    total = ((f_A - f_AB) ** 2).mean(axis=-1) / 2
+    indices: FloatArray = np.array([first, total]) / pairs[:2].var()
+    return indices
 
 
 def _shown(one: Estimate) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import plan
 from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
@@ -134,7 +135,13 @@ def carry_out(
                 tell(Progress(done, study.design.size, there, failed, crew.count))
     found = gathered(study, shelf, shelf.find(named))
     if missing.size or not is_written(study, out / study.name):
-        write(found, out / study.name)
+        try:
+            write(found, out / study.name)
+        except OSError as reason:
+            raise RecordingError(
+                f"The data set cannot be written into {out / study.name}: {reason}. "
+                "All points are kept; make room and start the study again."
+            ) from reason
     return found
 
 

@@ -17,6 +17,8 @@ from tactile_lab.studies.axes import Axis
 Method = Literal["random", "latin hypercube", "sobol", "indices", "tornado"]
 MOST_POINTS = 50_000_000
 """Their addresses and results are held in memory when the data set is gathered."""
+BYTES, LEAST_TIME = 48, 30e-6
+"""Memory of a point with three numbers; time of one in the batch kernel, s."""
 TORNADO = (0.1586552539314571, 0.8413447460685429)
 """Low and high of a tornado: one standard deviation of a normal spread."""
 
@@ -210,7 +212,11 @@ def checked(design: Design) -> Design:
         sizes = " × ".join(map(str, design.shape))
         raise SceneError(
             f"The study has {sizes} = {design.size:.3g} points; at most "
-            f"{MOST_POINTS:,} can be carried out. Take fewer values or draws."
+            f"{MOST_POINTS:,} can be carried out. These would take "
+            f"{design.size * BYTES / 1e9:.3g} GB of memory, and "
+            f"{design.size * LEAST_TIME / 3600:.3g} h of a core where a point takes "
+            f"{LEAST_TIME * 1e6:g} µs, as little as any does. Take fewer values or "
+            "draws."
         )
     powers = design.method in ("sobol", "indices") and design.drawn
     if powers and design.draws & (design.draws - 1):

@@ -174,6 +174,11 @@ def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
                 f"{origin}: axis {one.key} has {' and '.join(given) or 'no values'}; "
                 "write one of values, normal, uniform."
             )
+        if one.zip is not None and one.values is None:
+            raise SceneError(
+                f"{origin}: axis {one.key} is drawn and cannot go through values with "
+                f'others; leave zip = "{one.zip}" out, or give values.'
+            )
         axes.append(axis(one.key, {**given, "zip": one.zip}, scene))
     axes.sort(key=lambda one: one.spread is not None)
     if table.on == "model" and table.repeat > 1:

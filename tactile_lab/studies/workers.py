@@ -31,6 +31,8 @@ from tactile_lab.studies.study import Study
 
 AHEAD = 2
 """Batches that wait at each worker, so that none stands idle."""
+ANSWER = 60.0
+"""For which a Dask worker is waited for to tell its version, s."""
 MOST_ENDED = 3
 """So often in a row workers may be ended from outside before a batch is finished."""
 
@@ -197,6 +199,10 @@ def _client(address: str) -> Iterator[Any]:
         raise NotFoundError(
             "--scheduler needs Dask: pip install 'tactile-lab[cluster]'."
         ) from reason
+    if "://" not in address:
+        raise NotFoundError(
+            f"--scheduler {address}: write its address, such as tcp://HOST:8786."
+        )
     try:
         open_client: Any = distributed.Client  # untyped
         client = open_client(address, timeout="5s", set_as_default=False)
@@ -217,7 +223,16 @@ def _check_versions(client: Any, address: str) -> None:
     if not client.nthreads():
         raise NotFoundError(f"The scheduler {address} has no workers; start some.")
     try:
-        theirs = client.run(code_digests)
+        asked = {
+            where: client.submit(code_digests, workers=[where], pure=False)
+            for where in client.nthreads()
+        }
+        theirs = {where: one.result(timeout=ANSWER) for where, one in asked.items()}
+    except OSError as reason:  # a timeout, too
+        raise LinkLostError(
+            f"The scheduler {address} or one of its workers went silent: {reason}. "
+            "Nothing is lost; start the study again."
+        ) from reason
     except ImportError as reason:
         raise SceneError(
             f"Workers of {address} lack this program ({reason}); install the same "

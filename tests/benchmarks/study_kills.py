@@ -81,9 +81,18 @@ def answer(folder: Path) -> str:
 
 
 def children(of: int) -> list[int]:
-    """Processes that another began."""
-    listed = Path(f"/proc/{of}/task/{of}/children")
-    return [int(one) for one in listed.read_text().split()] if listed.exists() else []
+    """Python processes that another's threads began."""
+    found = []
+    for listed in Path("/proc").glob(f"{of}/task/*/children"):
+        found += [int(one) for one in listed.read_text().split()]
+    return [one for one in found if b"resource_tracker" not in _command(one)]
+
+
+def _command(pid: int) -> bytes:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
 
 
 def lives(pid: int) -> bool:

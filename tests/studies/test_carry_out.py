@@ -1,9 +1,12 @@
 """A study on disk: the same whoever computes it, and never twice."""
 
+import multiprocessing
+import os
 import signal
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +15,17 @@ from click.testing import CliRunner
 
 from tactile_lab import simulate, study
 from tactile_lab.cli import cli
-from tactile_lab.errors import NotFoundError, SceneError
+from tactile_lab.errors import (
+    LinkLostError,
+    NotFoundError,
+    RecordingError,
+    SceneError,
+)
+from tactile_lab.studies.addresses import code_digests
 from tactile_lab.studies.carry_out import Progress, carry_out, forecast
 from tactile_lab.studies.dataset import Gathered
 from tactile_lab.studies.study import Study, load_study
+from tactile_lab.studies.workers import _check_versions
 
 SHORT = {
     "scene": "demo",
@@ -197,6 +207,10 @@ def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
     assert numbers["noise"][0] != numbers["noise"][1]
 
 
+ZIPPED = {"key": "sensor.R1", "normal": "1 %", "zip": "a"}
+VAST = {"key": "sensor.R1", "values": "1 MOhm : 2 MOhm : 1 mOhm"}
+LARGE = {"key": "sensor.R1", "values": "1 MOhm : 2 MOhm : 100 Ohm"}
+LARGER = {"key": "sensor.R2", "values": "1 MOhm : 2 MOhm : 100 Ohm"}
 BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
 
 
@@ -216,6 +230,12 @@ BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
         ({"draw": {"points": 4}}, "draws no axis"),
         ({"axes": []}, 'did you mean "axis"'),
         ({"scene": "dmeo"}, 'did you mean "demo"'),
+        ({"axis": [ZIPPED]}, "is drawn and cannot go"),
+        ({"axis": [VAST]}, r"larger steps"),
+        (
+            {"axis": [LARGE, LARGER]},
+            r"10001 × 10001 = 1e\+08 points.* GB.* h of a core",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused(change: dict, told: str) -> None:
@@ -231,6 +251,82 @@ def test_a_study_that_is_not_there_is_named_with_those_that_are() -> None:
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match=r"tcp://127\.0\.0\.1:9 does not answer"):
         done(load_study(LEVELS), tmp_path, count=None, scheduler="tcp://127.0.0.1:9")
+
+
+class Cluster:
+    """A scheduler whose workers answer so when they are asked for their version."""
+
+    def __init__(self, answers: dict) -> None:
+        self.answers = answers
+
+    def nthreads(self) -> dict[str, int]:
+        return dict.fromkeys(self.answers, 1)
+
+    def submit(self, function, *, workers: list[str], pure: bool) -> Future:
+        answer: Future = Future()
+        told = self.answers[workers[0]]
+        if isinstance(told, Exception):
+            answer.set_exception(told)
+        else:
+            answer.set_result(told)
+        return answer
+
+
+OURS = code_digests()
+
+
+@pytest.mark.parametrize(
+    ("answers", "error", "told"),
+    [
+        ({}, NotFoundError, "has no workers"),
+        (
+            {"a": OURS, "b": {**OURS, "drivers": "0"}},
+            SceneError,
+            "worker b of .* has another version of drivers",
+        ),
+        (
+            {"a": {n: d for n, d in OURS.items() if n != "drivers"}},
+            SceneError,
+            "worker a of .* lacks drivers",
+        ),
+        ({"a": ModuleNotFoundError("no tactile_lab")}, SceneError, "lack this program"),
+        ({"a": TimeoutError("timed out")}, LinkLostError, "went silent"),
+    ],
+)
+def test_workers_that_would_compute_something_else_are_refused(
+    answers: dict, error: type[Exception], told: str
+) -> None:
+    with pytest.raises(error, match=told):
+        _check_versions(Cluster(answers), "tcp://there:8786")
+
+
+def test_an_address_without_a_scheme_is_refused_at_once(tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match="such as tcp://HOST:8786"):
+        done(load_study(LEVELS), tmp_path, count=None, scheduler="there:8786")
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "points").write_text("in the way")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        done(load_study(SHORT), tmp_path)
+    (tmp_path / "points").unlink()
+    (tmp_path / "study").write_text("in the way")
+    with pytest.raises(RecordingError, match="All points are kept"):
+        done(load_study(SHORT), tmp_path)
+
+
+def test_a_worker_that_is_killed_is_replaced(tmp_path: Path) -> None:
+    """SIGKILL of one worker in the midst: the study goes on by itself."""
+    asked = load_study({**LEVELS, "keep": {"n": "result.spike_times.size"}})
+    hit = []
+
+    def tell(progress: Progress) -> None:
+        if not hit and progress.done > 1:
+            hit.append(multiprocessing.active_children()[0].pid)
+            os.kill(hit[0], signal.SIGKILL)
+
+    found = carry_out(asked, tmp_path, count=2, tell=tell)
+    assert hit and same(found, done(asked, tmp_path / "alone")[0])
 
 
 def test_a_dask_cluster_gives_the_same(tmp_path: Path) -> None:
