@@ -33,6 +33,7 @@ VERBS = {
     "runs": "The runs recorded so far; find, sort and tabulate by any key.",
     "show": "What one run holds, in numbers, and where its figures are.",
     "compare": "What differs between two runs, and what each found.",
+    "chart": "One number over many runs: what is usual, what drifts, by specimen.",
     "verify": "Check every sample and spike of a run; exit code 1 if damaged.",
     "recover": "Make a run whole that was cut short by a crash.",
     "export": "A run as CSV, MATLAB, netCDF, Parquet, NWB or RO-Crate.",

@@ -1,0 +1,188 @@
+"""One number of many runs: a control chart over time, and each specimen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from tactile_lab.analysis.control_chart import (
+    LEAST,
+    RUN,
+    ControlChart,
+    control_chart,
+    mean_and_error,
+)
+from tactile_lab.conclusion import Table
+from tactile_lab.errors import ParameterError
+from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.quantity import count, show
+from tactile_lab.report.canvas import draw, save
+from tactile_lab.report.html import picture, rendered
+
+DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """One number of one run.
+
+    Attributes:
+        run: its name.
+        started: when, with zone.
+        sensor: noted with it; "" for none.
+        value: SI; the mean where the run has several.
+        simulated: whether physics was computed.
+    """
+
+    run: str
+    started: datetime
+    sensor: str
+    value: float
+    simulated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class OverRuns:
+    """A key over runs, in order of time.
+
+    Attributes:
+        key: what it is called.
+        unit: SI.
+        points: at least one.
+        chart: None where there are too few to say what is usual.
+    """
+
+    key: str
+    unit: str
+    points: tuple[Point, ...]
+    chart: ControlChart | None
+
+    @classmethod
+    def of(cls, key: str, unit: str, points: Sequence[Point]) -> OverRuns:
+        """The points in order of time, and their chart.
+
+        Raises:
+            ParameterError: there is none.
+        """
+        if not points:
+            raise ParameterError(
+                f"No run has the number {key}; `runs --keys` lists all."
+            )
+        ordered = tuple(sorted(points, key=lambda one: (one.started, one.run)))
+        enough = len(ordered) >= LEAST
+        chart = control_chart([one.value for one in ordered]) if enough else None
+        return cls(key, unit, ordered, chart)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What it says, for a person."""
+        values = [one.value for one in self.points]
+        mean, error = mean_and_error(values)
+        of = count(len(values), "run")
+        known = "" if math.isnan(error) else f" ± {show(error, self.unit)}"
+        said = [f"{self.key}: {show(mean, self.unit)}{known} (standard error, {of})."]
+        if self.chart is None:
+            return [*said, f"{LEAST} runs or more say what is usual."]
+        chart = self.chart
+        said.append(
+            f"Usual is {show(chart.low, self.unit)} to {show(chart.high, self.unit)} "
+            "(mean ± 2.66 mean moving ranges, Shewhart's chart of single values)."
+        )
+        for i in chart.outside:
+            told = show(self.points[i].value, self.unit)
+            said.append(f"{self.points[i].run} lies outside: {told}.")
+        if chart.drifting:
+            said.append(
+                f"{RUN} or more in a row lie on one side of the mean up to "
+                f"{self.points[chart.drifting[-1]].run}: it drifts."
+            )
+        if not (chart.outside or chart.drifting):
+            said.append("All lie within, and none drifts.")
+        return said
+
+    @property
+    def table(self) -> Table:
+        """Mean and standard error of each specimen."""
+        rows = []
+        for sensor in sorted({one.sensor for one in self.points}):
+            values = [one.value for one in self.points if one.sensor == sensor]
+            mean, error = mean_and_error(values)
+            shown = "" if math.isnan(error) else show(error, self.unit)
+            rows.append(
+                (sensor or "not noted", str(len(values)), show(mean, self.unit), shown)
+            )
+        return Table(
+            title="Specimens",
+            headings=("Sensor", "Runs", f"{self.key}", "Standard error"),
+            rows=tuple(rows),
+        )
+
+    @property
+    def plot(self) -> Plot:
+        """Every run, the mean and the limits, against days."""
+        first = self.points[0].started
+        days = np.array(
+            [(p.started - first).total_seconds() / DAY for p in self.points]
+        )
+        values = np.array([one.value for one in self.points])
+        guides: tuple[Guide, ...] = ()
+        series = [Series(x=days, y=values, mark="joined")]
+        if self.chart is not None:
+            guides = (
+                Guide(at=self.chart.mean, along="x", text="mean", dashed=False),
+                Guide(at=self.chart.low, along="x"),
+                Guide(at=self.chart.high, along="x", text="usual up to here"),
+            )
+            odd = list(self.chart.outside)
+            if odd:
+                series.append(
+                    Series(x=days[odd], y=values[odd], mark="open", colour="V_C1",
+                           name="outside")
+                )  # fmt: skip
+        return Plot(
+            name="over_runs",
+            caption=f"{self.key} of each run, in days since {first:%Y-%m-%d %H:%M}; "
+            "dashed, the limits of what is usual.",
+            x_label="Days",
+            panels=(
+                Panel(
+                    label=self.key, unit=self.unit, series=tuple(series), guides=guides
+                ),
+            ),
+        )
+
+    def write(self, file: Path) -> None:
+        """Write the page.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        title = f"{self.key} over {count(len(self.points), 'run')}"
+        simulated = any(one.simulated for one in self.points)
+        drawn = draw(self.plot, title, "", simulated=simulated)
+        _, svg = save(drawn, file.with_suffix(""))
+        rows = tuple(
+            (p.run, f"{p.started:%Y-%m-%d %H:%M}", p.sensor, show(p.value, self.unit))
+            for p in self.points
+        )
+        every = Table(
+            title="Runs", headings=("Run", "Started", "Sensor", self.key), rows=rows
+        )
+        text = rendered(
+            "chart.html",
+            title=title,
+            subtitle="",
+            mark="Simulated" if simulated else "Measured",
+            measured=not simulated,
+            key={"Runs": str(len(self.points))},
+            said=self.sentences,
+            picture=picture(title, self.plot, svg),
+            tables=(self.table, every),
+            made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
+        )
+        file.write_text(text, encoding="utf-8")

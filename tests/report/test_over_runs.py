@@ -1,0 +1,78 @@
+"""One number over many runs: what is usual, what is not, and for which specimen."""
+
+import math
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tactile_lab.analysis.control_chart import control_chart
+from tactile_lab.cli import cli
+from tactile_lab.errors import ParameterError
+from tactile_lab.report.over_runs import OverRuns, Point
+from tactile_lab.store.folder import RunFolder, write_json
+
+
+def points(values, sensors="A"):
+    begun = datetime(2026, 1, 1, tzinfo=UTC)
+    return [
+        Point(
+            f"run{i:02d}", begun + timedelta(days=i), sensors[i % len(sensors)], v, True
+        )
+        for i, v in enumerate(values)
+    ]
+
+
+def test_limits_are_shewharts():
+    # NIST e-Handbook 6.3.2.2: flow rates of ten batches; UCL 53.71, LCL 46.50
+    flow = [49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1]
+    found = control_chart(flow)
+    moving = np.abs(np.diff(flow)).mean()
+    assert moving == pytest.approx(1.8778, abs=1e-4)
+    assert found.mean == pytest.approx(50.81)
+    assert found.high == pytest.approx(50.81 + 3 * moving / 1.128, abs=2e-3)
+    assert found.low == pytest.approx(50.81 - 3 * moving / 1.128, abs=2e-3)
+    assert found.outside == () and found.drifting == ()
+
+
+def test_of_normal_values_few_lie_outside():
+    drawn = np.random.default_rng(3).normal(size=20_000)
+    found = control_chart(drawn)
+    assert len(found.outside) / 20_000 == pytest.approx(0.0027, abs=0.002)
+
+
+def test_what_jumps_and_what_drifts_is_told():
+    jump = OverRuns.of("tau", "s", points([8.0, 8.1] * 6 + [9.0]))
+    assert any("run12 lies outside: 9 s" in text for text in jump.sentences)
+    step = OverRuns.of("tau", "s", points([8.0, 8.1] * 5 + [8.2, 8.3] * 5))
+    assert any("it drifts" in text for text in step.sentences)
+    still = OverRuns.of("tau", "s", points([8.0, 8.1] * 6))
+    assert "All lie within, and none drifts." in still.sentences
+
+
+def test_few_runs_have_a_mean_and_no_limits():
+    found = OverRuns.of("tau", "s", points([8.0, 9.0], "AB"))
+    assert found.chart is None and "8 runs or more" in found.sentences[-1]
+    assert [row[:2] for row in found.table.rows] == [("A", "1"), ("B", "1")]
+    with pytest.raises(ParameterError, match="at least 8"):
+        control_chart([1.0, math.nan])
+    with pytest.raises(ParameterError, match="No run has the number"):
+        OverRuns.of("tau", "s", [])
+
+
+def test_from_run_folders_to_a_page(tmp_path):
+    for k in range(9):
+        told = {"protocol": "hold", "notes": {"sensor": f"S{k % 2 + 1}"}}
+        folder = RunFolder.create(tmp_path, "hold", {**told, "simulated": True})
+        folder.finish("complete")
+        trials = [{"rest_V_C1_V": 4.3 + 0.001 * (k % 3)}, {"rest_V_C1_V": 4.3}]
+        write_json(folder.path / "results.json", {"trials": trials})
+    page = tmp_path / "rest.html"
+    asked = ["chart", "rest_V_C1", str(tmp_path)]
+    done = CliRunner().invoke(cli, [*asked, "--out", str(page)])
+    assert done.exit_code == 0, done.output
+    assert "Usual is" in done.output and "S1" in done.output
+    assert "<svg" in page.read_text() and "Shewhart" in page.read_text()
+    wrong = CliRunner().invoke(cli, ["chart", "rest", str(tmp_path)])
+    assert wrong.exit_code == 2 and "runs --keys" in wrong.output
