@@ -179,6 +179,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             self._runs(on, runs)
         else:
             self._beyond(on)
+            self._threshold(on)
             self._traces(on, runs[0], self._twin)
         self._levels(on)
         painter.restore()
@@ -217,6 +218,17 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             above = y - 8 if y > 18 else y + 9
             at = QPointF(frame.right - 5, above)
             paint.write(painter, at, words, tokens.accent, align=1.0)
+
+    def _threshold(self, on: Drawing) -> None:
+        """The level at which spikes were counted."""
+        level, frame = on.source.threshold, on.frame
+        if level is None or self.lane.key != "V_K":
+            return
+        y = round(frame.y1(level)) + 0.5
+        on.painter.setPen(paint.pen(on.tokens.muted, Qt.PenStyle.DotLine))
+        on.painter.drawLine(QPointF(0, y), QPointF(frame.right, y))
+        words = f"threshold {number(level, 2)} V"
+        paint.write(on.painter, QPointF(5, y - 8), words, on.tokens.muted)
 
     def _beyond(self, on: Drawing) -> None:
         """Shade where the input left its range: the trace is a limit there."""

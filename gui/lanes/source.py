@@ -94,6 +94,11 @@ class Source:
         """What people noted, and at which time, s."""
         return []
 
+    @property
+    def threshold(self) -> float | None:
+        """Level of V_K, V, at which spikes were counted; None where none is known."""
+        return None
+
     def beyond(self, signal: str) -> FloatArray:
         """Stretches in which a signal's input left its range, shape (k, 2), s."""
         return NONE.reshape(0, 2)

@@ -21,6 +21,7 @@ from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.parts import column, lines, row
+from gui.plots.numbers import number
 from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ class LaneStack(QFrame):
     """The lanes of one source: cards, and beside them their plots in one scene."""
 
     export_asked = Signal()
+    threshold_asked = Signal(float)
+    """Spikes of the next run shall be counted from this level of V_K, V, on."""
     source_changed = Signal()
     arranged = Signal()
     """Lanes were moved, resized or hidden by hand."""
@@ -252,6 +255,12 @@ class LaneStack(QFrame):
         level = menu.addAction("Level line here", lambda: levels([value]))
         level.setEnabled(box.valued)
         menu.addAction("Remove level lines", levels).setEnabled(bool(box.levels))
+        if lane.key == "V_K":
+            near = box.level_at(here.y())
+            level_ = value if near is None else box.levels[near]
+            count = menu.addAction(f"Count spikes from {number(level_, 2)} V on")
+            count.triggered.connect(lambda: self.threshold_asked.emit(level_))
+            count.setEnabled(level_ > 0)
         cross = menu.addAction("Crosshair", self.scene.toggle_crosshair)
         cross.setCheckable(True)
         cross.setChecked(self.scene.crosshair)

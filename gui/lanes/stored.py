@@ -20,6 +20,7 @@ from tactile_lab.store.overrange import overrange
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
+from tactile_lab.store.spike_shapes import threshold_of
 from tactile_lab.trace import FloatArray, Trace
 
 FINER = 2
@@ -66,6 +67,7 @@ class RunSource(Source):
         self.holds = [_hold(trial) for trial in self.trials]
         self.simulated = run.simulated
         self.moves_probes = _moves_probes(run)
+        self._threshold = threshold_of(run)
         self._beyond = {name: overrange(run, name) for name in run.signals}
         self._gain = float(run.attributes.get("newtons_per_ampere", 1.0)) or 1.0
         self._slow = _slow(run, self._gain)
@@ -130,6 +132,11 @@ class RunSource(Source):
         return self.model.trace(signal, start, end, count)
 
     # --- samples
+
+    @property
+    def threshold(self) -> float | None:
+        """As the record has it."""
+        return self._threshold
 
     def beyond(self, signal: str) -> FloatArray:
         """As the scope told it, block by block."""

@@ -19,7 +19,7 @@ from gui.session.log import Severity
 from gui.state import WindowState
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
-from tactile_lab.quantity import count
+from tactile_lab.quantity import count, show
 from tactile_lab.signals import AVERAGED
 from tactile_lab.store.catalogue import catalogue
 from tactile_lab.store.folder import DATA
@@ -72,6 +72,7 @@ class Screen(QObject):
         records.failed.connect(self.say)
         self.listed.connect(self._list)
         panels.review.results.step_chosen.connect(panels.centre.view.show_step)
+        panels.centre.stack.threshold_asked.connect(self._count_from)
         runs = panels.review.runs
         runs.opened.connect(lambda entry: self.open_run(entry.folder))
         runs.again.connect(self._again)
@@ -344,6 +345,14 @@ class Screen(QObject):
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
         self.changed.emit()
+
+    def _count_from(self, level: float) -> None:
+        """Put a threshold into the form, with a fifth of it as hysteresis as usual."""
+        texts = {"threshold": level, "hysteresis": level / 5}
+        detect = {key: show(round(value, 3), "V") for key, value in texts.items()}
+        self._panels.setup.tables.form("detect").propose(detect)
+        said = f"In the form: spikes are counted from {detect['threshold']} on"
+        self._panels.session.log.add(Severity.INFO, "detect", said)
 
     def _queue(self, scene: str, title: str) -> None:
         problem = self._panels.session.enqueue_scene(scene, title)

@@ -49,6 +49,18 @@ class SpikeShapes:
     values: FloatArray
 
 
+def threshold_of(run: Run) -> float | None:
+    """The level, SI, at which a spike was counted; None where none is known.
+
+    Where resets were searched there is none, nor where the signal was not stored.
+    """
+    found = run.detection
+    if found is None or found.kind == "reset" or found.signal not in run.signals:
+        return None
+    signal = run.signal(found.signal)
+    return found.threshold / signal.code_scale * signal.gain + signal.offset
+
+
 def spike_shapes(run: Run, times: FloatArray) -> SpikeShapes:
     """Read the samples around the spikes of `run` that are nearest to `times`, s.
 
@@ -75,10 +87,10 @@ def spike_shapes(run: Run, times: FloatArray) -> SpikeShapes:
         low, high = max(start, 0), min(start + before + after, len(signal))
         values[row, low - start : high - start] = signal[low:high]
     since = signal.axis.time_of(each.ravel()).reshape(each.shape)
-    level = found.threshold / signal.code_scale * signal.gain + signal.offset
+    level = threshold_of(run)
     return SpikeShapes(
         signal=signal.name,
-        threshold=None if found.kind == "reset" else level,
+        threshold=level,
         times=wanted["time"],
         peaks=wanted["amplitude"],
         widths=wanted["width"],

@@ -88,3 +88,17 @@ def test_cards_tell_statistics_between_the_cursors(lab) -> None:
     view.move_cursor(0, 0.3)
     assert row.statistics is None, "what it was of is gone"
     view.clear_cursors()
+
+
+def test_a_level_of_V_K_becomes_the_threshold_of_the_next_run(lab) -> None:
+    (folder,) = lab.runs(1)
+    window, form = lab.window, lab.window.setup.tables.form("detect")
+    window.screen_.open_run(folder)
+    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    assert window.screen_.run.threshold == pytest.approx(0.5, abs=0.01)
+    before = form.texts()
+    window.centre.stack.threshold_asked.emit(0.8)
+    assert form.texts()["threshold"] == "800 mV"
+    assert form.texts()["hysteresis"] == "160 mV"
+    assert form.problem == ""
+    form.set_texts(before)
