@@ -147,7 +147,7 @@ def silences() -> str:
     """Where each netlist falls silent, as a table."""
     cells = {
         netlist: [
-            f"{silent_from(netlist, *how) * 1e3:.0f} mN"
+            f"{math.ceil(silent_from(netlist, *how) * 1e3)} mN"
             for how in ((STEADY, 2.0), (8.69, 1.0), (8.69, 10.0))
         ]
         for netlist in FIRING
@@ -280,9 +280,10 @@ ends some five spikes earlier. Its peak voltage moves by 30 mV with the current,
 
 ## When more force silences it
 
-The least force, reached from 0 within 10 ms, under which the model fires no spike until
-the hold ends. In a longer hold V_P decays by the leakage of the film, V_C1 rises, and
-what was silent fires late: there it takes far more force to silence all of the hold.
+The least force in whole millinewtons, reached from 0 within 10 ms, under which the
+model fires no spike until the hold ends. In a longer hold V_P decays by the leakage of
+the film, V_C1 rises, and what was silent fires late: there it takes far more force to
+silence all of the hold.
 
 {silences()}
 """

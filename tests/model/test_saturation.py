@@ -2,6 +2,7 @@
 
 import csv
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -201,3 +202,30 @@ def test_it_does_not_warn_of_what_it_shows():
 def test_spikes_too_fast_are_refused():
     with pytest.raises(SolverError, match="Spikes follow"):
         simulate(Circuit(saturation=True, V_reset=3.213 - 1e-12), step(0.15), until=0.4)
+
+
+def test_the_page_says_where_more_force_silences_the_circuit():
+    page = Path(__file__).parents[2] / "docs/saturation.md"
+    rows = re.findall(
+        r"^\| (T1 a|complete).*?\| (.*) \|$", page.read_text("utf-8"), re.M
+    )
+    assert len(rows) == 2
+    for (_, cells), firing, junctions in zip(
+        rows, ("lif", "put"), (5e-12, 11e-12), strict=True
+    ):
+        forces = [float(cell.removesuffix(" mN")) / 1e3 for cell in cells.split(" | ")]
+        for force, (tau, hold) in zip(
+            forces[:2], ((1e9, 2.0), (8.69, 1.0)), strict=True
+        ):
+            circuit = Circuit(
+                saturation=True, firing=firing, tau=tau, C2=150e-12 + junctions
+            )
+            counts = [
+                simulate(
+                    circuit,
+                    Waveform.through([(0, 0), (0.1, 0), (0.11, F)]),
+                    until=0.11 + hold,
+                ).spike_times.size
+                for F in (force - 1e-3, force)
+            ]
+            assert counts[0] > 0 == counts[1], (firing, force)
