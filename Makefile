@@ -46,33 +46,10 @@ fast: $(DEV_STAMP)
 search: $(DEV_STAMP)
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=search -n auto
 
-# hours on two cores, alone on the machine; every table states commit and date
+# hours on two cores, alone on the machine: says how many, and goes on where it was
+# stopped; every table states commit and date
 reports: $(DEV_STAMP)
-	$(BIN)/tactile-lab validate accuracy --out docs
-	$(BIN)/tactile-lab validate sweeps --out docs
-	$(BIN)/tactile-lab validate honesty --scenes 1000 --out docs
-	$(BIN)/tactile-lab validate stability --out docs
-	$(BIN)/python docs/make_fit_recovery.py
-	$(BIN)/python docs/make_bench_coverage.py
-	if command -v ngspice >/dev/null; then $(BIN)/python docs/make_saturation.py; fi
-	$(BIN)/python docs/make_paper.py
-	$(BIN)/python tests/benchmarks/surprises.py --out docs/surprise-figures.md
-	$(BIN)/python tests/benchmarks/protocol_speed.py --out docs/protocol-figures.md
-	$(BIN)/python tests/benchmarks/plan_cost.py --out docs/plan-figures.md
-	$(BIN)/python tests/benchmarks/spike_detection.py --out docs/detection-figures.md
-	$(BIN)/python tests/benchmarks/store_speed.py --out docs/store-figures.md
-	$(BIN)/python tests/benchmarks/kill_store.py --kills 200 --out docs/kill-figures.md
-	$(BIN)/python tests/benchmarks/sustained.py --out docs/streaming-figures.md
-	$(BIN)/python tests/benchmarks/serial_bench.py --out docs/serial-figures.md
-	$(BIN)/python tests/benchmarks/force_following.py --out docs/force-figures.md
-	$(BIN)/python tests/benchmarks/scope_stream.py --out docs/scope-figures.md
-	$(BIN)/python tests/benchmarks/fault_table.py --out docs/fault-figures.md
-	$(BIN)/python tests/benchmarks/fuzz.py --out docs/fuzz-figures.md
-	$(BIN)/python tests/benchmarks/study_speed.py --out docs/study-figures.md
-	$(BIN)/python tests/benchmarks/study_answers.py --out docs/study-answers.md
-	$(BIN)/python tests/benchmarks/study_kills.py --out docs/study-kills.md
-	$(BIN)/python tests/benchmarks/design_table.py --out docs/design-figures.md
-	$(BIN)/python tests/benchmarks/window_figures.py --out docs/window-figures.md
+	$(BIN)/python docs/make_reports.py
 
 screenshots: $(DEV_STAMP)
 	$(BIN)/python tests/pictures/take_pictures.py docs/pictures

@@ -1,0 +1,89 @@
+"""Measure again what docs/ states: every campaign, one after another.
+
+``make reports`` runs this. It first says how long that takes, does only what is not
+done yet at this commit, and so goes on where it was stopped; the long campaigns among
+them keep their own rows too. Words choose those whose names contain one of them:
+``.venv/bin/python docs/make_reports.py paper plan``.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+DONE = ROOT / "runs" / "reports.json"
+BENCHMARKS = "tests/benchmarks"
+STEPS: dict[str, tuple[float, str]] = {
+    "accuracy": (20, "-m tactile_lab validate accuracy --out docs"),
+    "sweeps": (30, "-m tactile_lab validate sweeps --out docs"),
+    "honesty": (120, "-m tactile_lab validate honesty --scenes 1000 --out docs"),
+    "stability": (10, "-m tactile_lab validate stability --out docs"),
+    "fit recovery": (15, "docs/make_fit_recovery.py"),
+    "bench coverage": (420, "docs/make_bench_coverage.py"),
+    "saturation": (10, "docs/make_saturation.py"),
+    "paper": (2, "docs/make_paper.py"),
+    "surprises": (16, f"{BENCHMARKS}/surprises.py --out docs/surprise-figures.md"),
+    "plan": (6, f"{BENCHMARKS}/plan_cost.py --out docs/plan-figures.md"),
+    "protocols": (5, f"{BENCHMARKS}/protocol_speed.py --out docs/protocol-figures.md"),
+    "detection": (
+        5,
+        f"{BENCHMARKS}/spike_detection.py --out docs/detection-figures.md",
+    ),
+    "store": (5, f"{BENCHMARKS}/store_speed.py --out docs/store-figures.md"),
+    "kills": (15, f"{BENCHMARKS}/kill_store.py --kills 200 --out docs/kill-figures.md"),
+    "streaming": (5, f"{BENCHMARKS}/sustained.py --out docs/streaming-figures.md"),
+    "serial": (5, f"{BENCHMARKS}/serial_bench.py --out docs/serial-figures.md"),
+    "force": (5, f"{BENCHMARKS}/force_following.py --out docs/force-figures.md"),
+    "scope": (5, f"{BENCHMARKS}/scope_stream.py --out docs/scope-figures.md"),
+    "faults": (20, f"{BENCHMARKS}/fault_table.py --out docs/fault-figures.md"),
+    "fuzz": (30, f"{BENCHMARKS}/fuzz.py --out docs/fuzz-figures.md"),
+    "study speed": (30, f"{BENCHMARKS}/study_speed.py --out docs/study-figures.md"),
+    "study answers": (20, f"{BENCHMARKS}/study_answers.py --out docs/study-answers.md"),
+    "study kills": (30, f"{BENCHMARKS}/study_kills.py --out docs/study-kills.md"),
+    "designs": (10, f"{BENCHMARKS}/design_table.py --out docs/design-figures.md"),
+    "window": (10, f"{BENCHMARKS}/window_figures.py --out docs/window-figures.md"),
+}
+"""What to run by its name, and the minutes it is thought to take on two cores with
+nothing else running; once it has run here, what it took here counts."""
+NEEDS = {"saturation": "ngspice"}
+
+
+def commit() -> str:
+    """Of the checkout; tables that were just written do not change it."""
+    asked = ["git", "rev-parse", "--short", "HEAD"]
+    return subprocess.check_output(asked, cwd=ROOT, text=True).strip()
+
+
+def main() -> None:
+    """Say how long it takes, then do what is left."""
+    version, words = commit(), sys.argv[1:]
+    known = json.loads(DONE.read_text()) if DONE.exists() else {}
+    wanted = [n for n in STEPS if not words or any(word in n for word in words)]
+    left = []
+    for name in wanted:
+        if name in NEEDS and shutil.which(NEEDS[name]) is None:
+            print(f"{name}: left out, {NEEDS[name]} is not installed")
+        elif known.get(name, {}).get("commit") == version:
+            print(f"{name}: done at {version}")
+        else:
+            left.append(name)
+    minutes = {n: known.get(n, {}).get("minutes", STEPS[n][0]) for n in left}
+    told = ", ".join(f"{name} {minutes[name]:.0f}" for name in left)
+    print(f"{sum(minutes.values()) / 60:.1f} h left, in minutes: {told or 'nothing'}")
+    for name in left:
+        print(f"{name} ...", flush=True)
+        began = time.monotonic()
+        subprocess.run([sys.executable, *STEPS[name][1].split()], cwd=ROOT, check=True)
+        took = (time.monotonic() - began) / 60
+        known[name] = {"commit": version, "minutes": took}
+        DONE.parent.mkdir(exist_ok=True)
+        DONE.write_text(json.dumps(known, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
