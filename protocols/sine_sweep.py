@@ -30,7 +30,7 @@ RAMP = 0.1
 """Time from one frequency's last force to the next one's first, s; less where a sine is
 so fast that its film would not be settled then."""
 WITHIN = 16
-"""Points in a bin at which the force is averaged, as the scope averages V_C1."""
+"""Points in a bin at which the force is averaged, as V_C1 and the model's are."""
 
 
 class SineSweep(ForceProtocol):
@@ -250,7 +250,7 @@ def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
             continue
         inside = (trace.time >= trial.held[0]) & (trace.time <= trial.held[1])
         time = trace.time[inside]
-        force = run.force.at(time) if model else _averaged(run.force, time)
+        force = _averaged(run.force, time)
         try:
             frequency = parse(trial.label, "Hz")
             answer = gain(time, force, trace.mean[inside], frequency, steps, leak)
