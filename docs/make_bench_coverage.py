@@ -432,7 +432,7 @@ numbers: one run may tell several. "Refused" counts runs that told none of their
 Intervals that hold the truth more often than in 97 % hold a bound rather than a
 scatter, and the bound is seldom reached: half a code of a converter whose steps no
 noise smooths (offset, gain and V_GS of `wiring_check`, changes of I_DS), the 0.5 ms to
-which the edges of the current fix the clocks (phase, and what `identify` says of tau),
+which the edges of the current fix the clocks (phase at 0.8 Hz),
 the step at which a search ended (V_GS of `threshold_search`). A field lies at the very
 edge of its band where it came from saturation, as both fields told here do.
 

@@ -38,7 +38,10 @@ def page(
     search, rated = found["threshold_search"]["conclusion"], found["rate_force"]
     bipolar, repeat = found["bipolar"]["conclusion"], found["repeat"]["conclusion"]
     ratios = rated["conclusion"]["peak_rate_over_eq15"]
-    low, high = (s["slope_Hz_per_N"] for s in rated["conclusion"]["slopes"])
+    low, high = (
+        interval({k: 1e-3 * v for k, v in s["slope_Hz_per_N"].items()}, "Hz/mN")
+        for s in rated["conclusion"]["slopes"]
+    )
     twin = rated["twin"]
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"],
@@ -95,13 +98,13 @@ def page(
         (
             "Fig. 5b", '"approximately 50 s"; of 5c "approximately 50 mN"',
             f"{lasted:.1f} s from first to last of {long['spikes']} spikes",
-            f"{lasted - 50:+.1f} s",
+            f"{lasted - 50:+.1f} s".replace("-", "−"),
             "V_GS tuned to it (`preset = \"fig5b\"`); Table 1's stays silent at 50 mN",
         ),
         (
             "Fig. 5c", "an exponential, no coefficients",
-            f"alpha {fit['alpha_Hz']['value']:.3g} Hz, beta "
-            f"{fit['beta_per_s']['value']:.3g} /s, gamma "
+            f"alpha {fit['alpha_Hz']['value']:.3g} Hz, beta −"
+            f"{-fit['beta_per_s']['value']:.3g} /s, gamma "
             f"{fit['gamma_Hz']['value']:.3g} Hz", "-",
             "taken for the same run as 5b, which is an assumption",
         ),
@@ -206,8 +209,8 @@ Separate steps from rest with recovery until |V_P| < 1 mV between them: {rates(r
 That is {min(ratios):.2f} to {max(ratios):.2f} of Eq. (15) for the current at the end of
 the ramp (at 200 mN Eq. (15) gives {eq15_rate(table_1, 0.2, 0.25):.3g} Hz); the rest
 is adaptation within the first intervals. By Eq. (15) fitted
-to the intervals the rate rises by {low["value"] * 1e-3:.3g} Hz/mN at the least force
-that gave a rate and by {high["value"] * 1e-3:.3g} Hz/mN at the largest. Bisection
+to the intervals the rate rises by {low} at the least force that gave a rate and by
+{high} at the largest. Bisection
 (`tactile-lab run threshold_search`) puts the critical force at {critical:.2f} mN
 (±{search["critical_force_half_width_N"] * 1e3:.2f} mN) for a 0.25 s ramp and a 1 s
 hold; the quasi-static value of the equations is 92.60 mN without the follower's bias.
