@@ -7,9 +7,13 @@ folded range, attenuation and offset into the pieces.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from tactile_lab.code_cache import kept
 
 TILE_BITS = 14
 """Noise is laid out in tiles of 2**14 samples, each at its own place in the table."""
@@ -87,10 +91,10 @@ def _line(  # type: ignore[no-untyped-def]
     return highest
 
 
-@numba.njit(
-    "int64(int16[::1], int64, float64, float64, float64[::1], float64[::1],"
+@partial(
+    kept,
+    signature="int64(int16[::1], int64, float64, float64, float64[::1], float64[::1],"
     "float64[::1], int16[::1], int64, float64, float64, float64, int32, int32)",
-    cache=True,
     nogil=True,
 )
 def digitise(  # type: ignore[no-untyped-def]
@@ -155,11 +159,11 @@ def digitise(  # type: ignore[no-untyped-def]
     return highest
 
 
-@numba.njit(
-    "int64(int16[::1], int64, float64, float64, float64[::1], float64[::1],"
+@partial(
+    kept,
+    signature="int64(int16[::1], int64, float64, float64, float64[::1], float64[::1],"
     "float64[::1], int16[::1], int64, float64, float64, float64, int32, int32,"
     "float64[::1], float64[::1], float64)",
-    cache=True,
     nogil=True,
 )
 def add_pulses(  # type: ignore[no-untyped-def]

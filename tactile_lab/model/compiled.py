@@ -10,14 +10,13 @@ from __future__ import annotations
 import logging
 import zlib
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any, TypeVar, cast
 
 from numba import njit
 from numba.core import event
-from numba.core.caching import FunctionCache
+
+from tactile_lab.code_cache import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 COMPILED = (
@@ -51,27 +50,6 @@ class _FirstUse(event.Listener):
         """Nothing to say."""
 
 
-@cache
-def _say_unkept() -> None:
-    """Say, once, that compiled code cannot be kept."""
-    logging.getLogger(__name__).warning(
-        "Compiled code cannot be kept: neither this installation nor your home can be "
-        "written. Name a folder in the environment variable NUMBA_CACHE_DIR."
-    )
-
-
-class _CodeOnDisk(FunctionCache):  # type: ignore[misc]
-    """numba's cache, where a file that was cut short is as good as none."""
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Machine code for a signature; None where it has to be compiled."""
-        try:
-            return super().load_overload(sig, target_context)
-        except (EOFError, UnpicklingError, ValueError, IndexError):
-            self.flush()
-            return None
-
-
 event.register(_FirstUse.KIND, _FirstUse())  # type: ignore[no-untyped-call]
 
 
@@ -85,12 +63,7 @@ def entry(function: F) -> F:
 
     Where no folder can be written it is compiled in every process, which is said.
     """
-    compiled = njit(error_model="numpy", nogil=True)(function)
-    try:
-        compiled._cache = _CodeOnDisk(function)  # noqa: SLF001  as numba does itself
-    except RuntimeError:  # numba finds no folder that it may write
-        _say_unkept()
-    return cast(F, compiled)
+    return cast(F, kept(function, error_model="numpy", nogil=True))
 
 
 def source_stamp(*more: Path) -> int:

@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tactile_lab.code_cache import kept
+
 Codes = NDArray[np.int16]
 Spikes = NDArray[Any]
 
@@ -27,7 +29,7 @@ UP, DOWN, LAST = 0, 1, 2
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile without the GIL, so that detection runs beside the recorder."""
-    compiled: Callable[..., Any] = njit(cache=True, nogil=True)(function)
+    compiled: Callable[..., Any] = kept(function, nogil=True)
     return compiled
 
 

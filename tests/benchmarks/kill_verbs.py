@@ -176,7 +176,7 @@ def is_whole(file: Path) -> bool:
 
 def killed_export(place: Path, known: dict[str, Any], after: float) -> str:
     """What became of a killed export."""
-    path = Path(shutil.copytree(known["whole"], place / "run"))
+    path = Path(shutil.copytree(known["whole"], place / known["whole"].name))
     form = known["chance"].choice(FORMATS)
     there = {file.name for file in path.iterdir()}
     asked = ("export", str(path), "--to", form)
@@ -282,7 +282,7 @@ def prepared(place: Path) -> tuple[dict[str, Any], dict[str, float]]:
     exports = {}
     times = []
     for form in FORMATS:
-        copy = Path(shutil.copytree(whole, place / f"for-{form}"))
+        copy = Path(shutil.copytree(whole, place / f"for-{form}" / whole.name))
         there = {file.name for file in copy.iterdir()}
         times.append(forked(("export", str(copy), "--to", form)))
         exports[form] = {

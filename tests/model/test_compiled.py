@@ -25,14 +25,15 @@ KEPT = """
 import sys
 from pathlib import Path
 from numba.core import caching
-from tactile_lab.model import compiled
+import tactile_lab.model.compiled
+from tactile_lab.code_cache import kept
 if "unwritable" in sys.argv:
     caching.CacheImpl._locator_classes = []
 
 def twice(x):
     return 2 * x
 
-print(compiled.entry(twice)(3.0))
+print(kept(twice)(3.0))
 """
 
 

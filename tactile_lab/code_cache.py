@@ -1,0 +1,56 @@
+"""Machine code that numba makes, kept on disk as far as the disk allows."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from functools import cache
+from pickle import UnpicklingError
+from typing import Any
+
+from numba import njit
+from numba.core.caching import FunctionCache
+
+
+def kept(
+    function: Callable[..., Any], signature: str | None = None, **options: Any
+) -> Any:
+    """Compile `function`, on its first call unless a signature is given; keep the code.
+
+    Where no folder can be written it is compiled in every process, which is said.
+
+    Args:
+        function: what to compile.
+        signature: of its arguments, as numba writes them: compile for these now.
+        options: of numba's `njit`.
+    """
+    compiled = njit(**options)(function)
+    try:
+        compiled._cache = _CodeOnDisk(function)  # noqa: SLF001  as numba does itself
+    except RuntimeError:  # numba finds no folder that it may write
+        _say_unkept()
+    if signature is not None:
+        compiled.compile(signature)
+        compiled.disable_compile()
+    return compiled
+
+
+@cache
+def _say_unkept() -> None:
+    """Say, once, that compiled code cannot be kept."""
+    logging.getLogger(__name__).warning(
+        "Compiled code cannot be kept: neither this installation nor your home can be "
+        "written. Name a folder in the environment variable NUMBA_CACHE_DIR."
+    )
+
+
+class _CodeOnDisk(FunctionCache):  # type: ignore[misc]
+    """numba's cache, where a file that was cut short is as good as none."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Machine code for a signature; None where it has to be compiled."""
+        try:
+            return super().load_overload(sig, target_context)
+        except (EOFError, UnpicklingError, ValueError, IndexError):
+            self.flush()
+            return None
