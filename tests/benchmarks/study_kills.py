@@ -200,7 +200,7 @@ def main() -> None:
         while number < asked.kills:
             what = order[number % len(order)]
             number += 1
-            if number <= len(told):
+            if number <= len(told) and told[number - 1]:
                 continue
             with tempfile.TemporaryDirectory() as name:
                 folder = Path(name)
@@ -210,8 +210,8 @@ def main() -> None:
                     number, tries = number - 1, tries + 1
                     continue
                 same = answer(folder) == right
-            told.append([what, end, same])
-            print(number, *told[-1], flush=True)
+            told[number - 1 : number] = [[what, end, same]]
+            print(number, *told[number - 1], flush=True)
             if state:
                 state.write_text(json.dumps(told))
     counted = Counter((what, end, same) for what, end, same in told)
