@@ -131,9 +131,10 @@ class CoilSource:
             wire.connect()
             self._reached = True
             if wire.output_is_on():
+                went = "" if self._analogue else "ramped to zero and "
                 self.warnings.append(
                     f"The output was already on at {show(wire.current(), 'A')} when "
-                    "connected; it was ramped to zero and switched off."
+                    f"connected; it was {went}switched off."
                 )
             else:
                 self._setpoint = 0.0  # nothing flows, nothing to ramp

@@ -275,7 +275,7 @@ class CoilThread(InstrumentThread):
         self._generated = None
         coil.follow(points, player.grain)
         self._playing = True
-        began = player.start()
+        began = player.start(coil.beat)
         coil.followed_from(*began)
         self.list = PlayedList(points, *began, generated=True)
         self._passed, self._read = 0, began[0]

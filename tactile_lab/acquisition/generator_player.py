@@ -19,6 +19,9 @@ ANSWERS = 1.0
 LONGEST_RAMP = 0.5
 """Longest time of a ramp to 0 V, s; a larger current ramps faster."""
 
+BEAT = 0.1
+"""Time between two signs of life while the scope's thread is waited for, s."""
+
 STEP = 2e-3
 """Time between two steps of that ramp, s."""
 
@@ -74,15 +77,18 @@ class GeneratorPlayer:
         self.loaded = None
         self._scope.do(load)
 
-    def start(self) -> tuple[float, float]:
+    def start(self, beat: Callable[[], None]) -> tuple[float, float]:
         """Have the points played; between which clock times they began, s.
+
+        Args:
+            beat: called meanwhile.
 
         Raises:
             NoReplyError: the scope's thread does not start them.
         """
         self._began = None
         self._scope.do(self._start)
-        self._wait(lambda: self._began is not None, ANSWERS)
+        self._wait(lambda: self._began is not None, ANSWERS, beat)
         if self._began is None:
             raise NoReplyError(
                 f"The scope's generator did not start within {ANSWERS:g} s."
@@ -100,14 +106,18 @@ class GeneratorPlayer:
             beat: called meanwhile.
         """
         self._scope.do(self._ramp_down)
-        until = self._clock.now() + LONGEST_RAMP + 0.1
-        while not (self.quiet or self._scope.ended) and self._clock.now() < until:
-            beat()
-            self._wait(lambda: self.quiet, 0.1)
+        self._wait(lambda: self.quiet, LONGEST_RAMP + BEAT, beat)
 
-    def _wait(self, done: Callable[[], bool], longest: float) -> None:
+    def _wait(
+        self, done: Callable[[], bool], longest: float, beat: Callable[[], None]
+    ) -> None:
+        """Wait until the scope's thread is done, has ended, or `longest` s went by."""
         until = self._clock.now() + longest
-        self._clock.wait_for(lambda: done() or self._scope.ended, until)
+        while not (done() or self._scope.ended) and self._clock.now() < until:
+            beat()
+            self._clock.wait_for(
+                lambda: done() or self._scope.ended, self._clock.now() + BEAT
+            )
 
     def _start(self) -> None:
         self.quiet = False

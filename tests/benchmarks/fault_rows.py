@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.picoscope.scope import PicoScope
+from sim_backend.coil.list_mode import ListFault
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.scope import Make
@@ -35,7 +36,7 @@ SAMPLES = (20_000, 150_000)
 class Injection:
     """What goes wrong in one run, and what is done to the bench before."""
 
-    coil: tuple[SerialFault, ...] = ()
+    coil: tuple[SerialFault | ListFault, ...] = ()
     scope: tuple[ScopeFault, ...] = ()
     meter: tuple[SerialFault, ...] = ()
     make: Make | None = None
@@ -49,10 +50,11 @@ Cause = Callable[[random.Random], Injection]
 
 @dataclass(frozen=True)
 class Row:
-    """One observed fault and all its causes."""
+    """One observed fault and all its causes, in runs whose force goes by a way."""
 
     title: str
     causes: list[Cause] = field(default_factory=list)
+    way: str = "set-points"
 
 
 def coil_end(bench: Bench) -> FarEnd:
@@ -288,3 +290,43 @@ SCOPE = [
     Row("suspend or hub reset", [_scope(kind="reset")]),
 ]  # fmt: skip
 """Rows of the scope."""
+
+
+def _loading(**fault: Any) -> Cause:
+    """A serial fault at a line that loads, starts or ends a list."""
+
+    def cause(chance: random.Random) -> Injection:
+        line = chance.choice(("LIST:CURR ", "LIST:DWEL ", "LIST:COUN", "CURR:MODE"))
+        skip = chance.randrange(20) if line.endswith(" ") else 0
+        return Injection(coil=(SerialFault(line=line, skip=skip, **fault),))
+
+    return cause
+
+
+def _list(**fault: Any) -> Cause:
+    return lambda chance: Injection(coil=(ListFault(**fault),))
+
+
+PLAYED = [
+    Row("list: unplugged, silent or answering late, in part or with an error, as it is "
+        "loaded, started or ended",
+        [_loading(kind="unplug"), _loading(kind="deaf"), _loading(kind="missing"),
+         _loading(kind="late", amount=0.3), _loading(kind="partial", amount=3),
+         _loading(kind="garbled"), _loading(kind="refused"),
+         _loading(kind="deaf", times=None)], "list"),
+    Row("list: does not start, is cut short, does not fit, is played at other times",
+        [_list(trigger_lost=True), _list(cut_after=0.25), _list(memory=200),
+         _list(dwell_grid=2e-3)], "list"),
+    Row("generator: its scope unplugged, silent or failing as it plays",
+        [_scope(kind="unplug"), _scope(kind="silent"), _scope(kind="stream_fails"),
+         _scope(kind="supply_lost")], "generator"),
+    Row("generator: refuses to be set, loaded or started (0x27, 0x2E, 0x07)",
+        [_scope(kind="status", call=f"{call}", code=code)
+         for call in ("SetSigGenBuiltIn", "SetSigGenArbitrary",
+                      "SigGenFrequencyToPhase", "SigGenSoftwareControl")
+         for code in (0x27, 0x2E, 0x07)], "generator"),
+    Row("generator: the source unplugged, silent or late as it follows",
+        [_serial(kind="unplug"), _serial(kind="deaf", times=None),
+         _serial(kind="late", amount=0.3), _serial(kind="refused")], "generator"),
+]  # fmt: skip
+"""Rows of forces that source or generator plays by its own clock."""

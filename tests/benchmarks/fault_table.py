@@ -16,15 +16,26 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from fault_rows import SCOPE, SERIAL, Cause, Injection, Row, coil_end  # beside it
+from fault_rows import (  # beside it
+    PLAYED,
+    SCOPE,
+    SERIAL,
+    Cause,
+    Injection,
+    Row,
+    coil_end,
+)
 from provenance import provenance
 from usb_fault_rows import ROWS as USB  # beside it
 from usb_fault_rows import session
 
 from sim_backend.bench import open_bench
+from sim_backend.coil.list_mode import ListFault
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.execution import Executed, Execution
 from tactile_lab.errors import TactileLabError
@@ -64,6 +75,7 @@ def outcome(scene: Scene, injection: Injection, folder: Path) -> tuple[str, str]
     if injection.prepare is not None:
         bench = injection.prepare(bench)
     made = injection.make is not None or injection.prepare is not None
+    made = made or any(isinstance(one, ListFault) for one in injection.coil)
     done = Execution(scene, folder, bench=bench).run()
     struck = made or _struck(bench, end)
     really_off = not source.output_on and abs(source.measured_current()) < OFF_CURRENT
@@ -108,8 +120,22 @@ def _kept(done: Executed) -> bool:
         return len(run.signal("V_K")) == run.samples
 
 
-def runs(row: Row, times: int, scene: Scene) -> tuple[Counter[str], list[str]]:
+def played_by(way: str) -> Scene:
+    """What is run: a pulse, its force by `way` on a bench where that can be."""
+    with tempfile.TemporaryDirectory() as folder:
+        bench = None
+        if way == "generator":
+            built_in = resources.files("tactile_lab.scene") / "simulated_bench.toml"
+            bench = Path(folder) / "generator.toml"
+            bench.write_text(built_in.read_text("utf-8") + "\n[coil.generator]\n")
+        scene = load("demo", (*OVERRIDES, f"coil.way={way}"), bench)
+        # the run keeps a copy of its scene, not of a bench file that is gone
+        return replace(scene, bench=replace(scene.bench, file=None))
+
+
+def runs(row: Row, times: int) -> tuple[Counter[str], list[str]]:
     """Outcomes of a row's causes, each `times` times, and what the wrong ones said."""
+    scene = played_by(row.way)
     found: Counter[str] = Counter()
     wrong = []
     for number, cause in enumerate(row.causes):
@@ -133,7 +159,7 @@ def _strike(cause: Cause, seed: str, scene: Scene) -> tuple[str, str]:
     return what, told
 
 
-def usb_runs(row: Row, times: int, _: Scene) -> tuple[Counter[str], list[str]]:
+def usb_runs(row: Row, times: int) -> tuple[Counter[str], list[str]]:
     """Outcomes of sessions with a USBTMC scope, which drives no coil."""
     found: Counter[str] = Counter()
     wrong = []
@@ -154,16 +180,15 @@ def main() -> int:
     options.add_argument("--row", default="", help="only rows with this in their title")
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
-    scene = load("demo", OVERRIDES)
     lines, total, bad = [], Counter[str](), []
     groups: list[tuple[list[Row], Callable[..., tuple[Counter[str], list[str]]]]] = [
-        (SERIAL, runs), (SCOPE, runs), (USB, usb_runs)
+        (SERIAL, runs), (PLAYED, runs), (SCOPE, runs), (USB, usb_runs)
     ]  # fmt: skip
     for rows, judge in groups:
         for row in rows:
             if chosen.row not in row.title:
                 continue
-            found, wrong = judge(row, chosen.times, scene)
+            found, wrong = judge(row, chosen.times)
             total, bad = total + found, bad + wrong
             lines.append(_line(row.title, found))
             print(lines[-1], *wrong, sep="\n", flush=True)
