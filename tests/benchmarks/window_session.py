@@ -172,13 +172,21 @@ class Session:
         self.tell("mend")
 
         def ready() -> bool:
-            if self.now["state"] == "ready" and not self.now["open"]:
+            left = self.now["open"] or self.now["dialogs"]
+            if self.now["state"] == "ready" and not left:
                 return True
             if self.now["state"] == "disconnected":
                 self.tell("connect")
             if time.monotonic() - self.now["at"] > 0.5:
                 return False  # keys would pile up, and Esc in Ready asks all anew
             if self.press("Acknowledge and reset"):
+                time.sleep(1)
+            elif self.now["dialogs"]:
+                # not in the window, where Esc is STOP
+                pid = str(self.program.pid)
+                for one in self.tool("search", "--onlyvisible", "--pid", pid).split():
+                    if one != self.main:
+                        self.tool("windowfocus", one, "key", "Escape")
                 time.sleep(1)
             elif self.now["open"] or self.now["state"] == "running":
                 self.key("Escape")
@@ -343,7 +351,8 @@ def inside(folder: Path) -> None:
 
     def coils():
         ends = [far for name, far in wires._far_ends.items() if "coil" in name]
-        return [far for far in ends if hasattr(far.instrument, "output_on")]
+        # a bench connected anew has a source of its own; one unplugged stays as it was
+        return [far for far in ends if hasattr(far.instrument, "output_on")][-1:]
 
     def buttons() -> dict[str, list[int]]:
         found = {}
@@ -367,14 +376,16 @@ def inside(folder: Path) -> None:
         at = stop.mapToGlobal(QPoint(60, 25))
         pages = Path("/proc/self/statm").read_text().split()[1]
         cards = [c for c in window.findChildren(Overlay) if c.isVisible()]
-        others = [w for w in app.topLevelWidgets() if isinstance(w, QDialog | QMenu)]
-        others = [w for w in others if w.isVisible()]
+        top = [w for w in app.topLevelWidgets() if w.isVisible()]
+        menus = [w for w in top if isinstance(w, QMenu)]
+        dialogs = [w for w in top if isinstance(w, QDialog)]
         tell(
             {
                 "at": time.monotonic(), "state": behind.state.value,
                 "truth": stop.truth.value, "manual": behind.manual.alive,
                 "output": any(far.instrument.output_on for far in coils()),
-                "open": len(cards) + len(others), "stop": [at.x(), at.y()],
+                "open": len(cards) + len(menus), "dialogs": len(dialogs),
+                "stop": [at.x(), at.y()],
                 "memory": int(pages) * 4096 / 1e6, "buttons": names,
             }
         )  # fmt: skip
