@@ -26,7 +26,8 @@ def kept(
     """
     compiled = njit(**options)(function)
     try:
-        compiled._cache = _CodeOnDisk(function)  # noqa: SLF001  as numba does itself
+        code = _CodeOnDisk(function)  # type: ignore[no-untyped-call]
+        compiled._cache = code  # noqa: SLF001  as numba does itself
     except RuntimeError:  # numba finds no folder that it may write
         _say_unkept()
     if signature is not None:
@@ -44,13 +45,13 @@ def _say_unkept() -> None:
     )
 
 
-class _CodeOnDisk(FunctionCache):  # type: ignore[misc]
+class _CodeOnDisk(FunctionCache):
     """numba's cache, where a file that was cut short is as good as none."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Machine code for a signature; None where it has to be compiled."""
         try:
-            return super().load_overload(sig, target_context)
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except (EOFError, UnpicklingError, ValueError, IndexError):
-            self.flush()
+            self.flush()  # type: ignore[no-untyped-call]
             return None
