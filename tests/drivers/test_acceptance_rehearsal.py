@@ -23,7 +23,9 @@ def test_the_checklist_passes_on_the_emulator(tmp_path: Path) -> None:
     subprocess.run([compiler, "-o", str(file), *flags], check=True)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-s", "-p", "no:cacheprovider",
-         "tests/hardware/test_picoscope.py", "-k", "not lost or 1000000"],
+         "tests/hardware/test_picoscope.py",
+         # its generator is wired to nothing
+         "-k", "(not lost or 1000000) and not test_generator"],
         cwd=ROOT, check=False, capture_output=True, text=True,
         env=os.environ | {
             "TACTILE_LAB_HARDWARE": "picoscope",

@@ -140,6 +140,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     starts = [m.source.holds[0].start + m.shift for m in comparison.members]
     assert abs(starts[0] - starts[1]) < 1e-9
     stack = window.centre.stack
+    lab.until(lambda: (row := stack.row("V_C1")) is not None and row.isVisible())
     lab.until(lambda: stack.row("V_C1").card.text.count("\n") == 2)
     assert stack.row("spikes").card.text.startswith("Spikes in view")
     window.centre.tools.toggle_cursors(True)

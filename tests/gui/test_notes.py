@@ -56,7 +56,7 @@ def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
     window, folder = lab.window, lab.runs(1)[0]
     window.screen_.open_run(folder)
     lab.until(lambda: lab.session.opened == f"Looking at {folder.name}")
-    assert folder.name in window.centre.log.note.placeholderText()
+    assert "on the run on screen" in window.centre.log.note.placeholderText()
     window.centre.view.place_cursors(0.25, 0.5)
     type_note(lab, "odd spike")
     assert "odd spike" in [n.text for n in read_remarks(folder).notes]

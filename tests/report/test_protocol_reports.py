@@ -34,6 +34,13 @@ LEVELS = (0.05, 0.1)
 MAGNET = Magnet(r=6e-3)
 
 
+def means(found, signal, time):
+    """Of bins about these times, as a scope's samples give them."""
+    step = time[1] - time[0]
+    inside = time[:, None] + step * (np.arange(8) - 3.5) / 8
+    return found.sample(signal, inside).mean(axis=1)
+
+
 def modelled(protocol, steps, *, circuit=None, bins=2000, parameters=None, **entries):
     """A run of (label, level, force, pause) steps as the model answers them."""
     circuit = circuit or Circuit()
@@ -58,7 +65,7 @@ def modelled(protocol, steps, *, circuit=None, bins=2000, parameters=None, **ent
             )
         )
     traces = tuple(
-        RecordedSignal(signal=s, time=time, mean=found.sample(s, time))
+        RecordedSignal(signal=s, time=time, mean=means(found, s, time))
         for s in ("V_C1", "V_C2")
     )
     plain = {

@@ -132,15 +132,16 @@ def test_samples_are_found_by_the_ledger_alone(cut_runs, tmp_path, broken):
         np.testing.assert_array_equal(found, made[0, : run.samples])
 
 
-def test_a_run_without_its_ledger_is_left_as_it_is(cut_runs, tmp_path):
-    left, _, _ = cut_runs
+def test_a_run_without_its_ledger_is_recovered_from_its_file(cut_runs, tmp_path):
+    left, made, _ = cut_runs
     path = tmp_path / "run"
     shutil.copytree(left, path)
     (path / LEDGER).unlink()
-    with pytest.raises(RunFolderError, match="that tells what was written"):
-        recover(path)
+    assert recover(path).samples > 100_000
     with Run.load(path) as run:
-        assert (run.status, run.samples > 100_000) == ("running", True)
+        assert run.status == "recovered"
+        found = run.signal("V_C1").scope_codes(0, run.samples)
+        np.testing.assert_array_equal(found, made[0, : run.samples])
 
 
 def test_a_recovery_that_was_cut_short_is_begun_again(cut_runs, tmp_path):
