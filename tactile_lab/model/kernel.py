@@ -249,8 +249,9 @@ def _build(stamp: int) -> Callable[..., Any]:
                 rate = par[LAMBDA] + B_s * math.exp(-y / par[V_T]) / par[V_T]
                 rise = slope_at(B_s, y, par)
                 layer = unseen(rise, rate, h, left, a)
-                # exp(-V_C1/V_T) on the way up, gone before the first nodes
-                if par[V_T] < 3.0 * NODES[0] * h * rise:
+                # exp(-V_C1/V_T) on the way up, gone before the first nodes; where a
+                # force holds V_C1 down, its slope alone is rounding times a huge rate
+                if min(W[0], NODES[0] * h * rise) > par[V_T] / 3.0:
                     closing = (rate - par[LAMBDA]) * par[V_T]
                     layer = max(layer, closing * par[V_T] / rise)
                 growth = longer(a, biggest, wanted, rate * h)

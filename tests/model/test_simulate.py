@@ -98,3 +98,14 @@ def test_v_c2_is_held_at_v_fire_where_a_simulation_ends_within_a_reset():
     found = simulate(held, wave, until=at + 0.005, keep=("spikes", "V_C2"))
     end = np.array([at + 0.005])
     assert found.sample("V_C2", end) == found.end.V_C2 == held.fire_voltage
+
+
+@pytest.mark.parametrize("level", [4.0, 5.0, 10.0])
+def test_a_force_that_holds_V_C1_down_by_a_huge_current_has_an_answer(level):
+    """There its slope is rounding times a huge rate, and says nothing of a rise."""
+    push = Waveform.pulse(level, ramp=0.01, hold=0.5, rest=1.0)
+    found = simulate(Circuit(), push, keep=("V_C1", "spikes"))
+    assert found.error.V_C1 < 1e-9
+    assert found.sample("V_C1", np.array([0.3]))[0] < 1e-12
+    loose = simulate(Circuit(), push, tolerance=1e-6)
+    assert np.abs(found.spike_times - loose.spike_times).max() < 2e-6

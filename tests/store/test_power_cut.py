@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.errors import RecordingError
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
