@@ -87,7 +87,7 @@ def find(run: RunData) -> Findings:
     return Findings(
         run=run,
         notes=notes,
-        missing=(*conclusion.missing, *missing),
+        missing=(*conclusion.missing, *_cut_short(run), *missing),
         conclusion=conclusion,
         answers=answers,
         beside=beside,
@@ -96,7 +96,7 @@ def find(run: RunData) -> Findings:
 
 def _conclusion(run: RunData) -> Conclusion:
     """What the protocol concludes, and F(0) where it was read."""
-    own = Conclusion(missing=("No trial was completed: there is no result.",))
+    own = Conclusion(missing=("No trial was completed: nothing is concluded.",))
     if run.results:
         try:
             own = run.protocol.conclude(run)
@@ -107,6 +107,18 @@ def _conclusion(run: RunData) -> Conclusion:
         except Exception as error:  # whatever a user's protocol raises
             own = Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
     return own + force_at_zero(run)
+
+
+def _cut_short(run: RunData) -> tuple[str, ...]:
+    """What the numbers of a trial that did not come to its end are of."""
+    cut = [trial.label for trial in run.results if not trial.complete]
+    if not cut:
+        return ()
+    return (
+        f"Cut short: {', '.join(cut)}. The protocol concludes and draws nothing from "
+        "it; its row, its fits and the model beside it are of the part before the "
+        "run ended.",
+    )
 
 
 def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:

@@ -201,7 +201,8 @@ def test_a_trial_that_was_cut_short_is_reported_with_all_its_spikes(run_scene, s
     assert trial.start + trial.duration == findings.run.duration
     assert trial.hold[1] == pytest.approx(trial.duration)
     assert trials_table(findings.run).rows[0][0] == "200 mN, cut short"
-    assert "No trial was completed" in findings.missing[0]
+    assert findings.missing[0] == "No trial was completed: nothing is concluded."
+    assert findings.missing[1].startswith("Cut short: 200 mN.")
     drawn = next(p for p in findings.plots if p.name == "figure")
     ticks = [s for p in drawn.panels for s in p.series if s.mark == "ticks"]
     assert sum(np.size(s.x) for s in ticks) == ran.done.spikes

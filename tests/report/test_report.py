@@ -175,6 +175,21 @@ def test_gaps_in_a_trace_split_it():
     assert stretches(np.array([])) == []
 
 
+@pytest.mark.parametrize("completed", [0, 1])
+def test_a_fit_of_a_trial_cut_short_is_told_as_such(run_maker, tmp_path, completed):
+    run = run_maker((0.2, 0.2), ramp=0.01, hold=10.0, rest=0.5)
+    cut = replace(run.trials[completed], complete=False)
+    trials = (*run.trials[:completed], cut)
+    report = write(tmp_path, replace(run, trials=trials, status="aborted"))
+    page = report.html.read_text(encoding="utf-8")
+    assert "Adaptation: α exp(βt) + γ" in page
+    assert "there is no result" not in page
+    told = "Cut short: 200 mN. The protocol concludes and draws nothing from it"
+    assert told in page
+    missing = json.loads((tmp_path / "results.json").read_text())["missing"]
+    assert sum(told in text for text in missing) == 1
+
+
 def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
     empty = replace(
         demo, traces=(), trials=(), loss=None, accuracy="", warnings=(), settings={},
