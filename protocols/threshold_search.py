@@ -206,12 +206,15 @@ def _gate(run: Measurement, found: Onset, force_error: float) -> Conclusion:
         for level in (found.silent, found.fires)
     )
     try:
-        low, high = V_GS_of_onset(run.circuit, silent, fires, force_error)
+        low, high = V_GS_of_onset(
+            run.circuit, silent, fires, force_error, run.bias_uncertainty
+        )
     except NotIdentifiableError as reason:
         return Conclusion((f"No V_GS explains the critical force: {reason}.",))
     said = (
         f"By the model, a V_GS of {show((low + high) / 2, 'V', 5)} "
-        f"({show(low, 'V', 5)} to {show(high, 'V', 5)}) explains it; "
+        f"({show(low, 'V', 5)} to {show(high, 'V', 5)}, 95 %, the circuit's other "
+        "parameters as believed) explains it; "
         f"{show(run.circuit.V_GS, 'V', 5)} is believed."
     )
     return Conclusion((said,), {"V_GS_low_V": low, "V_GS_high_V": high})

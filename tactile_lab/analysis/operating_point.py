@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 from tactile_lab.errors import NotIdentifiableError
@@ -19,40 +18,53 @@ CLOSE = 2e-5
 
 
 def V_GS_of_onset(
-    circuit: Circuit, silent: Waveform, fires: Waveform, force_error: float = 0.0
+    circuit: Circuit,
+    silent: Waveform,
+    fires: Waveform,
+    force_error: float = 0.0,
+    bias_uncertainty: float = 0.0,
 ) -> tuple[float, float]:
     """Least and largest V_GS with which the model agrees with two trials from rest, V.
+
+    The truth lies anywhere between the two trials; with either error this is a 95 %
+    interval. A lag of the force delays the onset and moves no V_GS: it is left out.
 
     Args:
         circuit: all else; its V_GS is where the search begins.
         silent: strongest force, N(t), that gave no spike.
         fires: weakest force, N(t), that gave one.
         force_error: of both forces alike (95 %), N; widens the interval.
+        bias_uncertainty: half of the 95 % band of the current that a measuring follower
+            draws from C2, A; widens it likewise.
 
     Raises:
         NotIdentifiableError: none within 0.15 V of the believed V_GS agrees.
     """
-
-    def spikes(V_GS: float, force: Waveform) -> bool:
-        found = simulate(
-            replace(circuit, V_GS=V_GS), force, keep=("spikes",), tolerance=1e-6
-        ).spike_times
-        return found is not None and found.size > 0
-
-    low = _edge(lambda V: spikes(V, fires), circuit.V_GS)
-    high = _edge(lambda V: spikes(V, silent), circuit.V_GS)
+    low, high = _edge(circuit, fires), _edge(circuit, silent)
     if low > high:
         raise NotIdentifiableError(
             f"the weakest force that fired asks for a V_GS above {show(low, 'V', 6)}, "
             f"the strongest silent one for less than {show(high, 'V', 6)}"
         )
-    wider = abs(circuit.k_F) * force_error
+    moved = 0.0
+    if bias_uncertainty:
+        biased = replace(circuit, I_bias=circuit.I_bias + bias_uncertainty)
+        moved = _edge(biased, fires) - low
+    half = (high - low) / 2
+    wider = math.hypot(half, circuit.k_F * force_error, moved) - half
     return low - wider, high + wider
 
 
-def _edge(fires: Callable[[float], bool], middle: float) -> float:
-    """The V_GS above which it fires."""
-    low, high = middle - REACH, middle + REACH
+def _edge(circuit: Circuit, force: Waveform) -> float:
+    """The V_GS above which it fires under a force."""
+
+    def fires(V_GS: float) -> bool:
+        found = simulate(
+            replace(circuit, V_GS=V_GS), force, keep=("spikes",), tolerance=1e-6
+        ).spike_times
+        return found is not None and found.size > 0
+
+    low, high = circuit.V_GS - REACH, circuit.V_GS + REACH
     if fires(low) or not fires(high):
         raise NotIdentifiableError(
             f"no V_GS from {show(low, 'V')} to {show(high, 'V')} explains it"

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tactile_lab.analysis.operating_point import V_GS_of_onset
@@ -34,8 +35,23 @@ def test_the_force_s_error_widens_it_by_0_65_mn_a_millivolt():
     silent, fires = bracket(Circuit())
     low, high = V_GS_of_onset(Circuit(), push(silent), push(fires))
     wide = V_GS_of_onset(Circuit(), push(silent), push(fires), force_error=0.65e-3)
-    assert low - wide[0] == pytest.approx(1e-3, rel=0.01)
-    assert wide[1] - high == pytest.approx(1e-3, rel=0.01)
+    # bracket and force are independent
+    assert wide[1] - wide[0] == pytest.approx(np.hypot(high - low, 2e-3), rel=0.01)
+    assert wide[0] + wide[1] == pytest.approx(low + high)
+
+
+def test_what_the_bias_leaves_open_is_in_it():
+    """As often as it says: biases and critical forces drawn, V_GS as believed."""
+    rng, inside, believed = np.random.default_rng(2), 0, Circuit(I_bias=65e-12)
+    for _ in range(40):
+        bias = rng.normal(0, 20e-12 / 1.96)
+        true = replace(believed, I_bias=believed.I_bias + bias)
+        silent, fires = bracket(true, low=rng.uniform(0.05, 0.06), width=7e-4)
+        low, high = V_GS_of_onset(
+            believed, push(silent), push(fires), bias_uncertainty=20e-12
+        )
+        inside += low < believed.V_GS < high
+    assert 35 <= inside
 
 
 def test_trials_that_contradict_each_other_are_refused():

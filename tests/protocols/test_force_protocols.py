@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -17,6 +18,7 @@ from protocols.staircase import Staircase
 from protocols.threshold_search import ThresholdSearch
 from protocols.wiring_check import WiringCheck
 from tactile_lab.errors import LimitError
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.stimulus.demagnetise import demagnetising_current
@@ -239,6 +241,47 @@ def test_threshold_search_finds_the_models_critical_force():
     trials = drive(ThresholdSearch(ramp=0.01, hold=1.0, resolution=2e-4), answer)
     levels = [t.level for t in trials if t.level is not None]
     assert levels[-1] == pytest.approx(96.1e-3, abs=3e-4)
+
+
+def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
+    """The true follower draws 10 pA less than believed, half of its band."""
+    believed, search = Circuit(I_bias=65e-12), ThresholdSearch()
+    true, trials, force = replace(believed, I_bias=55e-12), [], None
+
+    def answer(trial):
+        nonlocal force
+        if trial.pause:
+            return outcome_of(trial)
+        spikes = simulate(true, trial.force).spike_times
+        start = 0.0 if force is None else force.end
+        force = trial.force if force is None else force.then(trial.force)
+        trials.append(
+            MeasuredTrial(
+                label=trial.label,
+                level=trial.level,
+                start=start,
+                duration=trial.length,
+                spike_times=spikes,
+            )
+        )
+        return outcome_of(trial, spikes=spikes)
+
+    drive(search, answer)
+    run = Measurement(
+        simulated=True,
+        bench="made up",
+        duration=force.end,
+        trials=tuple(trials),
+        force=force,
+        circuit=believed,
+    )
+    found = search.conclude(replace(run, bias_uncertainty=20e-12))
+    low, high = found.values["V_GS_low_V"], found.values["V_GS_high_V"]
+    assert low < believed.V_GS < high
+    assert "95 %, the circuit's other parameters as believed) explains" in found.text
+    bare = search.conclude(run).values
+    bracket = bare["V_GS_high_V"] - bare["V_GS_low_V"]
+    assert high - low == pytest.approx(math.hypot(bracket, 1e-3), rel=0.05)
 
 
 @pytest.mark.parametrize(
