@@ -68,7 +68,7 @@ def test_transfer_fits_a_csv(tmp_path):
     assert "11 points between 1 V and 2 V" in said
     assert call("transfer", path, "--figure", tmp_path / "fig1c").exit_code == 0
     assert (tmp_path / "fig1c.png").read_bytes().startswith(b"\x89PNG")
-    lost = call("transfer", path, "--figure", tmp_path / "none" / "fig1c")
+    lost = call("transfer", path, "--figure", path / "fig1c")  # beneath a file
     assert lost.exit_code == 2
     assert "cannot be written" in lost.stderr
 

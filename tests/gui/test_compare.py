@@ -12,6 +12,7 @@ from gui.lanes.lane import lanes_for
 from gui.lanes.readings import Painted, values_at
 from gui.lanes.source import Member, Source
 from gui.lanes.view import TimeView
+from gui.review.run_card import RunCard
 from tactile_lab.trace import Trace
 
 LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "V_C2", "spikes"})}
@@ -123,14 +124,19 @@ def test_values_are_read_on_the_common_time(comparison: Comparison) -> None:
 
 def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
-    lab.runs(1)
-    lab.complete_run()
+    two = {lab.runs(1)[0], lab.complete_run()}
     window.screen_.list_runs()
-    lab.until(lambda: len(window.review.runs.cards) >= 2)
-    complete = [c for c in window.review.runs.cards if c.entry.status == "complete"]
-    for card in complete[:2]:
+
+    def of_two() -> list[RunCard]:
+        cards = window.review.runs.cards
+        return [
+            c for c in cards if c.entry.folder in two and c.entry.status == "complete"
+        ]
+
+    lab.until(lambda: len(of_two()) == 2)
+    for card in of_two():
         card.tick.setChecked(True)
-    assert window.review.runs.compare.isEnabled()
+    lab.until(lambda: window.review.runs.compare.isEnabled())
     window.review.runs.compare.click()
     lab.until(lambda: window.centre.compare_bar.isVisible())
     comparison = window.screen_.run
@@ -140,7 +146,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     starts = [m.source.holds[0].start + m.shift for m in comparison.members]
     assert abs(starts[0] - starts[1]) < 1e-9
     stack = window.centre.stack
-    lab.until(lambda: (row := stack.row("V_C1")) is not None and row.isVisible())
+    lab.until(lambda: stack.row("V_C1") in stack.visible_rows())
     lab.until(lambda: stack.row("V_C1").card.text.count("\n") == 2)
     assert stack.row("spikes").card.text.startswith("Spikes in view")
     window.centre.tools.toggle_cursors(True)
