@@ -3,7 +3,8 @@
 Each suspect is fitted alone, by a deviation of one size, to V_C1 and to the intervals
 between spikes. Whatever the bench states a band for (offset of V_C1's channel, clocks,
 follower, lag, force, temperature) may take any value in its band, to first order. The
-suspect that leaves only the noise is named, if every other leaves clearly more.
+suspect that leaves only the noise is named, if every other leaves clearly more; those
+that do not are named with it.
 """
 
 from __future__ import annotations
@@ -110,8 +111,8 @@ class Explanation:
         if not self.suspects:
             return "The model can follow none of the usual suspects."
         best, *others = self.suspects
-        found = self.cause
-        if found is None:
+        noise = f"times the noise of {self.misfit:.3g} times"
+        if not self.candidates:
             names = ", ".join(TITLES[s.name][0] for s in self.suspects)
             return (
                 f"What explains it cannot be told: of {names}, the best, "
@@ -121,26 +122,36 @@ class Explanation:
                 )
                 + ". Something else, or more than one thing, is other than believed."
             )
+        if self.cause is None:
+            each = "".join(
+                f"; {s.text} leaves {s.misfit:.2g} times" for s in self.candidates[1:]
+            )
+            return (
+                f"Each of {len(self.candidates)} causes would explain it alone, and "
+                f"this run cannot tell them apart: {best.text} leaves "
+                f"{best.misfit:.2g} {noise}{each}."
+            )
         next_best = "".join(
             f"; the next best, {TITLES[o.name][0]}, leaves {o.misfit:.2g} times"
             for o in others[:1]
         )
         return (
-            f"One cause explains it: {found.text}. That leaves {found.misfit:.2g} "
-            f"times the noise of {self.misfit:.3g} times{next_best}."
+            f"One cause explains it: {best.text}. That leaves {best.misfit:.2g} "
+            f"{noise}{next_best}."
         )
+
+    @property
+    def candidates(self) -> tuple[Suspect, ...]:
+        """Those of which each alone explains the misfit, about as well as the best."""
+        if not self.suspects or self.suspects[0].misfit > EXPLAINED:
+            return ()
+        most = CLEARLY * self.suspects[0].misfit
+        return tuple(s for s in self.suspects if s.misfit <= most)
 
     @property
     def cause(self) -> Suspect | None:
         """The one that explains the misfit; None: it cannot be told."""
-        if not self.suspects:
-            return None
-        best, *others = self.suspects
-        if best.misfit > EXPLAINED:
-            return None
-        if any(other.misfit < CLEARLY * best.misfit for other in others):
-            return None
-        return best
+        return self.candidates[0] if len(self.candidates) == 1 else None
 
 
 def explain(

@@ -70,7 +70,25 @@ def test_the_single_cause_is_named_with_its_size(name, size):
 def test_what_no_single_suspect_explains_is_pinned_on_none(deviation, other):
     found = explained(deviation, **other)
     assert found.cause is None
+    assert not found.candidates
     assert "cannot be told" in found.text
+
+
+@pytest.mark.parametrize(
+    ("deviation", "told"),
+    [
+        (Deviation(temperature=0.5), {"temperature", "force"}),
+        (Deviation(V_GS=0.7e-3), {"V_GS", "R1", "temperature"}),
+    ],
+)
+def test_causes_that_explain_it_equally_well_are_all_named(deviation, told):
+    found = explained(deviation)
+    assert found.cause is None
+    assert {suspect.name for suspect in found.candidates} == told
+    assert f"Each of {len(told)} causes would explain it alone" in found.text
+    assert "cannot tell them apart" in found.text
+    assert all(suspect.text in found.text for suspect in found.candidates)
+    assert "Something else" not in found.text
 
 
 @pytest.mark.parametrize(
