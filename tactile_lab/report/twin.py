@@ -42,7 +42,9 @@ class BesideModel:
     def budget_line(self) -> str:
         """The error budgets as one line; "" where nothing was compared."""
         told = (f"{what} {budget.text}" for what, budget in self.budgets.items())
-        return f"Model (95 %): {'. '.join(told)}." if self.budgets else ""
+        if not self.budgets:
+            return ""
+        return f"Model (95 %, median over the run): {'. '.join(told)}."
 
 
 def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:

@@ -60,6 +60,7 @@ def test_the_error_budget_tells_what_is_stated_and_what_is_not(as_believed):
     assert 1e-9 < spikes["numerics"] < 1e-5
     line = find(as_believed).beside.budget_line
     assert "force, temperature not stated" in line
+    assert line.startswith("Model (95 %, median over the run): spike times ±")
 
 
 def test_a_surprise_is_found_out_by_the_report(tmp_path):
