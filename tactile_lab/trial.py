@@ -71,7 +71,8 @@ class Outcome:
         start: on the run's time axis, s.
         spike_times: shape (k,), s from the trial's start, detected on V_K.
         current: applied current: shape (n, 2), s from the trial's start and A.
-        rest: mean of each measured signal just before the trial, by name.
+        rest: mean of each measured signal just before the trial, by name; not a number
+            where it left its channel's range.
         traces: decimated measured signals by name: shape (n, 2), s and SI unit.
         skipped: coil set-points that were skipped because they came too late.
         codes: one code of the converter for each measured signal, SI; empty where it

@@ -42,10 +42,14 @@ class Drift:
         self._still = -STILL
         self._first: tuple[float, float] | None = None
 
-    def before(self, V_C1: float, time: float) -> float | None:
+    def before(
+        self, V_C1: float, time: float, *, cut_off: bool = False
+    ) -> float | None:
         """The drift, V, of a rest value measured just before run time `time` s.
 
-        None where the sensor was not at rest: under force, or until a moment ago.
+        None where the sensor was not at rest: under force, or until a moment ago; and
+        where V_C1 was `cut_off` at its channel's range, which is no value to compare
+        with but still shows a drift beyond the limit.
 
         Raises:
             LimitError: it is beyond the limit, and so is the change of V_C1 itself: a
@@ -56,6 +60,8 @@ class Drift:
         remembered = V_P(self._circuit, self._V_P, 0.0, max(time - self._at, 0.0))
         alone = V_C1 - rest_V_C1(self._circuit, remembered)
         if self._first is None:
+            if cut_off:
+                return None
             self._first = alone, V_C1
         drift, plain = alone - self._first[0], V_C1 - self._first[1]
         if min(abs(drift), abs(plain)) > self._limit:
@@ -64,7 +70,7 @@ class Drift:
                 f"trial; {show(self._limit, 'V')} is the limit. Check V_GS, the supply "
                 "and the temperature, or raise protocol.drift_limit."
             )
-        return drift
+        return None if cut_off else drift
 
     def plays(self, current: Waveform, begin: float) -> None:
         """The coil plays `current`, A against s from run time `begin` s."""

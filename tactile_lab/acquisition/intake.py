@@ -40,7 +40,8 @@ class Intake:
         self.spikes = 0
         self._spike_times: list[float] = []
         self.produced = 0
-        self.overrange: set[str] = set()
+        self.overrange: dict[str, float] = {}
+        """By signal that left its channel's range: until when at the latest, s."""
 
     @property
     def streaming(self) -> bool:
@@ -100,7 +101,7 @@ class Intake:
         self.produced += block.samples
         for channel, over in zip(self._stream.channels, block.overrange, strict=True):
             if over:
-                self.overrange.add(channel.signal)
+                self.overrange[channel.signal] = self.reached
         self._journal.append(block)
         self._live.add(block)
         for signal, mean in self._means.items():

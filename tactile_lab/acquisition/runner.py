@@ -167,8 +167,13 @@ class Runner:
         if trial.probes != self._probes:
             self._move_probes(trial.probes)
         self._hold(trial.voltages)
-        rest = self._live.levels(self.intake.reached - BASELINE, self.intake.reached)
-        drift = self._drifted(rest)
+        since = self.intake.reached - BASELINE
+        rest = self._live.levels(since, self.intake.reached)
+        cut_off = {
+            name for name, until in self.intake.overrange.items() if until > since
+        }
+        drift = self._drifted(rest, cut_off="V_C1" in cut_off)
+        rest.update(dict.fromkeys(cut_off, math.nan))
         drive = self._prepared(trial)
         asked = self._program.asked_field if trial.hold is not None else None
         coil = self.instruments.coil
@@ -259,7 +264,7 @@ class Runner:
         held_from, held_to = trial.hold or (0.0, trial.length)
         self._account.field(start + held_from + LATE * (held_to - held_from), field)
 
-    def _drifted(self, rest: dict[str, float]) -> float | None:
+    def _drifted(self, rest: dict[str, float], *, cut_off: bool) -> float | None:
         """Drift of V_C1 at rest, V; None where it is not measured or does not matter.
 
         Raises:
@@ -269,7 +274,7 @@ class Runner:
         if watch is None or "V_C1" not in rest:
             return None
         seen = self.intake.reached if self._record else self._account.now
-        return watch.before(rest["V_C1"], seen)
+        return watch.before(rest["V_C1"], seen, cut_off=cut_off)
 
     def _pause(self, index: int, trial: Trial) -> Outcome:
         """A planned recovery: the coil holds, nothing is streamed or stored."""

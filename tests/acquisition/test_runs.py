@@ -223,6 +223,25 @@ def test_a_run_that_clipped_says_so_in_its_report(run_scene, tmp_path):
     assert 0.3 < start < 0.6 < end < 1.4
 
 
+def test_a_rest_that_was_cut_off_at_the_range_is_no_number(run_scene, short):
+    from sim_backend.bench import open_bench
+    from sim_backend.picoscope.faults import ScopeFault
+
+    beyond = ScopeFault(kind="overrange", sample=1, duration=0.5, inputs=("A",))
+    ran = run_scene(
+        *short,
+        'protocol.levels=["20 mN", "20 mN", "20 mN"]',
+        bench=lambda scene: open_bench(scene, needs(scene), scope_faults=[beyond]),
+    )
+    run = read(ran.folder)
+    ((_, end),) = run.trace("V_C1").overrange
+    first, *later = run.trials
+    assert first.start < end < later[0].start - 0.2
+    assert (first.rest, first.drift) == (None, None)
+    assert [t.rest for t in later] == [pytest.approx(4.35, abs=0.05)] * 2
+    assert later[0].drift == 0.0  # the first that is known is compared with
+
+
 def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(
     run_scene, short
 ):

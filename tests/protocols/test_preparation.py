@@ -126,6 +126,15 @@ def test_only_a_sensor_at_rest_is_judged():
     assert watch.before(4.4, 6.0) is not None
 
 
+def test_a_rest_that_was_cut_off_gives_no_drift_but_may_end_the_run():
+    watch = Drift(Circuit(), lambda current: current, limit=0.1)
+    assert watch.before(4.5, 0.0, cut_off=True) is None
+    assert watch.before(4.35, 1.0) == 0  # nothing was compared with the former
+    assert watch.before(4.4, 2.0, cut_off=True) is None
+    with pytest.raises(LimitError):
+        watch.before(4.5, 3.0, cut_off=True)
+
+
 def test_a_film_that_remembers_less_than_believed_is_no_drift():
     """A core with a tenth of Table 1's A2 moves the sensor by a tenth."""
     watch = Drift(Circuit(), lambda current: current, limit=0.1)
