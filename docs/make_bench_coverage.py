@@ -45,6 +45,8 @@ from tactile_lab.waveform import Waveform
 DOCS = Path(__file__).parent
 KEPT = DOCS.parent / "runs" / "bench-coverage.jsonl"
 REPEATS = 1000
+SAME = 1e-6
+"""Errors that differ by less, in half-widths, are one number told again and again."""
 GEOMETRY = 0.04
 """Half of the 95 % band of the force that the bench file states here."""
 Told = Iterator[tuple[str, float, float, float, float]]
@@ -401,10 +403,12 @@ def table(rows: list[dict[str, Any]]) -> str:
         for (of_case, name), seen in counts.items():
             if of_case != case:
                 continue
-            inside = 100 * np.mean([hit for hit, _ in seen])
             errors = np.array([error for _, error in seen])
+            inside = f"{100 * np.mean([hit for hit, _ in seen]):.1f} %"
+            if len(seen) > 1 and np.ptp(errors) < SAME:
+                inside = "one number repeated"
             lines.append(
-                f"| {case} | {name} | {len(seen)} | {inside:.1f} % "
+                f"| {case} | {name} | {len(seen)} | {inside} "
                 f"| {np.mean(errors):+.2f} | {Z95 * np.std(errors):.2f} "
                 f"| {refused[case]} of {runs[case]} | {commits[case]} |"
             )
@@ -431,10 +435,16 @@ numbers: one run may tell several. "Refused" counts runs that told none of their
 
 Intervals that hold the truth more often than in 97 % hold a bound rather than a
 scatter, and the bound is seldom reached: half a code of a converter whose steps no
-noise smooths (offset, gain and V_GS of `wiring_check`, changes of I_DS), the 0.5 ms to
-which the edges of the current fix the clocks (phase at 0.8 Hz),
-the step at which a search ended (V_GS of `threshold_search`). A field lies at the very
-edge of its band where it came from saturation, as both fields told here do.
+noise smooths (V_GS of `wiring_check`, changes of I_DS), the 0.5 ms to which the edges
+of the current fix the clocks (phase at 0.8 Hz), the step at which a search ended (V_GS
+of `threshold_search`). A field lies at the very edge of its band where it came from
+saturation, as both fields told here do.
+
+"One number repeated" is no evidence of coverage, however many runs gave it. Offset and
+gain of `wiring_check` are such: the probes on 0 V and V_S pass by all that is drawn,
+the stored samples carry no noise there, and 0 V lies on the edge of a code. So all runs
+tell the same offset, half a code off, and the same gain; the truth lies exactly on the
+bound of either, which held, but was tried once.
 
 Rows of one run share their seeds' errors, such as that of the force: few seeds whose
 force lies beyond its band count in each of them. Open: the phase at 0.05 Hz is low by
