@@ -116,7 +116,7 @@ def resolve(
         if not isinstance(table, dict):
             raise complaint((name,), "this must be a table, not a value.", blame)
     _refuse_impossible(data, blame)
-    frozen = _moved(_lists_to_tuples(data))
+    frozen = _moved(tuples(data))
     folder = path.parent
     spec = _bench(frozen.get("bench", {}), folder, blame)
     hand_set = dumped(spec).get("hand_set", {})
@@ -189,10 +189,14 @@ def _find(path: str | Path | None) -> Path:
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """What a TOML file holds.
+    """The contents of a TOML file.
+
+    Args:
+        path: of the file.
+        what: it is, for messages: "Scene", "Bench file".
 
     Raises:
-        SceneError: it cannot be read, or is no TOML.
+        SceneError: it cannot be read, or is not TOML.
     """
     try:
         return tomllib.loads(read_text(path, what))
@@ -234,11 +238,12 @@ def _items(data: Any) -> Iterator[tuple[str, Any]]:
         yield from ((f"number {i + 1}", value) for i, value in enumerate(data))
 
 
-def _lists_to_tuples(data: Any) -> Any:
+def tuples(data: Any) -> Any:
+    """What a file holds, its lists as tuples."""
     if isinstance(data, dict):
-        return {key: _lists_to_tuples(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return tuple(_lists_to_tuples(value) for value in data)
+        return {key: tuples(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return tuple(tuples(value) for value in data)
     return data
 
 
@@ -301,7 +306,7 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
         if "file" in under:
             raise SceneError(f'{path}: a bench file has no key "file".')
         _refuse_impossible(under, _blame(str(path), {}))
-        whole = under = _living(_lists_to_tuples(under))
+        whole = under = _living(tuples(under))
         validated(BenchSpec, whole, (), _blame(str(path), {}), None)
         if inline.get("simulated") is False and under.get("simulated") is True:
             raise complaint(
@@ -315,7 +320,7 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
 
 def _of_the_same_rows(under: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     """A bench's tables without the baud rate of a row that another one replaces."""
-    kept = dict(_lists_to_tuples(under))
+    kept = dict(tuples(under))
     for name, table in over.items():
         below = kept.get(name)
         if not (isinstance(table, dict) and isinstance(below, dict)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,11 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from tactile_lab.columns import read_text
 from tactile_lab.complaint import validated
 from tactile_lab.errors import SceneError, choices
 from tactile_lab.model.circuit import Circuit, FloatArray
 from tactile_lab.quantity import Duration, Unit
+from tactile_lab.scene.load import read_toml, tuples
 from tactile_lab.scene.sensor import Sensor, with_preset
 from tactile_lab.skin.frames import Frames
 from tactile_lab.skin.layout import Array
@@ -99,13 +98,7 @@ def load_skin(
     path = Path(skin)
     if not path.is_file():
         raise SceneError(f"Skin {skin} does not exist; give the path of a TOML file.")
-    try:
-        data = tomllib.loads(read_text(path, "Skin"))
-    except SceneError:
-        raise
-    except ValueError as reason:
-        raise SceneError(f"{path} is not TOML: {reason}.") from reason
-    return _skin(data, path.stem, path.parent, str(path))
+    return _skin(read_toml(path, "Skin"), path.stem, path.parent, str(path))
 
 
 def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
@@ -151,12 +144,3 @@ def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
         seed=table.seed,
         source=data,
     )
-
-
-def tuples(data: Any) -> Any:
-    """What a file holds, its lists as tuples."""
-    if isinstance(data, Mapping):
-        return {key: tuples(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return tuple(tuples(value) for value in data)
-    return data

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,12 +13,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator
 
-from tactile_lab.columns import read_text
 from tactile_lab.complaint import validated
 from tactile_lab.errors import QuantityError, SceneError, choices
 from tactile_lab.model.circuit import Circuit, units
 from tactile_lab.quantity import Unit, parse, show
-from tactile_lab.scene.load import load
+from tactile_lab.scene.load import load, read_toml
 from tactile_lab.table import SceneTable
 
 E24 = (
@@ -217,12 +215,7 @@ def load_specification(
         if not path.is_file():
             raise SceneError(f"Specification {path} does not exist.")
         origin, name, folder = str(path), path.stem, path.parent
-        try:
-            data = tomllib.loads(read_text(path, "Specification"))
-        except SceneError:
-            raise
-        except ValueError as reason:
-            raise SceneError(f"{path} is not TOML: {reason}.") from reason
+        data = read_toml(path, "Specification")
     table = validated(SpecificationFile, _renamed(data), (), lambda at: origin, None)
     if not table.want.names:
         raise SceneError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,11 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from tactile_lab.columns import read_text
 from tactile_lab.complaint import validated
 from tactile_lab.errors import SceneError, choices, nearest
 from tactile_lab.plugins import study_names, study_path
-from tactile_lab.scene.load import load
+from tactile_lab.scene.load import load, read_toml, tuples
 from tactile_lab.scene.overrides import from_text
 from tactile_lab.scene.scene import Scene
 from tactile_lab.studies.axes import axis, changed
@@ -150,17 +148,11 @@ def load_study(study: str | Path | Mapping[str, Any], name: str = "study") -> St
     elif not path.is_file():
         told = choices(str(study), study_names(), "Studies that ship")
         raise SceneError(f"Study {study} does not exist; {told}")
-    try:
-        data = tomllib.loads(read_text(path, "Study"))
-    except SceneError:
-        raise
-    except ValueError as reason:
-        raise SceneError(f"{path} is not TOML: {reason}.") from reason
-    return _study(data, path.stem, path.parent, str(path))
+    return _study(read_toml(path, "Study"), path.stem, path.parent, str(path))
 
 
 def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
-    table = validated(StudyFile, _tuples(data), (), lambda at: origin, None)
+    table = validated(StudyFile, tuples(data), (), lambda at: origin, None)
     scene = _scene(table, folder)
     axes = []
     for one in table.axis:
@@ -237,14 +229,6 @@ def _check(study: Study, origin: str) -> None:
     for one in study.design.axes:  # each key alone, so that the message names it
         first = one.values[0] if one.values else one.spread and one.spread.centre
         load(study.scene, changed([one], [first]))
-
-
-def _tuples(data: Any) -> Any:
-    if isinstance(data, Mapping):
-        return {key: _tuples(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return tuple(_tuples(value) for value in data)
-    return data
 
 
 def short(scene: Scene, sweeps: tuple[str, ...], repeat: int) -> Study:
