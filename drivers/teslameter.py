@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from drivers.serial_line.conversation import Conversation
+from drivers.serial_line.instrument import SerialInstrument
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import Reading
 from tactile_lab.clock import Clock
@@ -16,7 +16,7 @@ MOST_READINGS = 4
 """Readings to take until two in a row have one multiplier."""
 
 
-class Teslameter:
+class Teslameter(SerialInstrument[Conversation[MeterDialect]]):
     """A field meter behind a serial port.
 
     Args:
@@ -37,33 +37,18 @@ class Teslameter:
         spy: Spy | None = None,
     ) -> None:
         self.dialect = dialect
-        wire = dialect.serial
-        if baud is not None:
-            wire = wire.model_copy(update={"baud": baud})
+        wire = dialect.serial.at(baud)
         link = SerialLink(
             port, wire, clock, what="teslameter", identify=dialect.identify, spy=spy
         )
         self._clock = clock
-        self._talk = Conversation(link, dialect)
+        super().__init__(Conversation(link, dialect))
         self._last_factor = 1.0
-
-    @property
-    def identity(self) -> str:
-        """What the meter answered when asked who it is."""
-        return self._talk.link.identity or "not connected"
 
     @property
     def interval(self) -> float:
         """Shortest time between two readings, s."""
         return self.dialect.interval
-
-    def record(self, path: Path) -> None:
-        """Write every byte to a transcript at `path`, until closed; before `open`.
-
-        Raises:
-            SceneError: the file cannot be written.
-        """
-        self._talk.link.record(path)
 
     def open(self) -> None:
         """Connect, identify, set unit and range, and read back that they were taken.
@@ -73,10 +58,10 @@ class Teslameter:
             BadReplyError: another instrument answers, or it does not take its settings.
         """
         try:
-            self._talk.connect()
-            self._talk.set_up("its readings could be in another unit")
+            self._wire.connect()
+            self._wire.set_up("its readings could be in another unit")
         except BaseException:
-            self._talk.link.close()
+            self._wire.link.close()
             raise
 
     def look(self) -> str:
@@ -85,11 +70,8 @@ class Teslameter:
         Raises:
             InstrumentError: the port or what is behind it, as `open`.
         """
-        try:
-            self._talk.meet()
+        with self._met():
             return self.identity
-        finally:
-            self._talk.link.close()
 
     def read(self) -> Reading:
         """Magnetic flux density, T.
@@ -111,22 +93,19 @@ class Teslameter:
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
-        link = self._talk.link
+        link = self._wire.link
         known = {
             "identity": self.identity,
             "dialect": self.dialect.id,
             "port": link.port,
             "baud": str(link.wire.baud),
         }
-        asked = {k: self._talk.query(line) for k, line in self.dialect.report.items()}
+        asked = {k: self._wire.query(line) for k, line in self.dialect.report.items()}
         return known | asked
 
     def close(self) -> None:
         """Let go of the port; idempotent."""
-        if self._talk.link.is_open:
-            self._talk.offer(self.dialect.release)
-            self._talk.link.close()
-        self._talk.link.end_record()
+        self._let_go()
 
     def _value(self) -> float:
         """What the meter shows, in its unit.
@@ -134,14 +113,14 @@ class Teslameter:
         Raises:
             LimitError: the field exceeds its range.
         """
-        answer = self._talk.query(self.dialect.field)
+        answer = self._wire.query(self.dialect.field)
         if re.search(self.dialect.overload, answer):
             raise LimitError(
                 f"The field exceeds the teslameter's range (it answers {answer!r}). "
                 "Choose a larger range or autorange."
             )
-        value = self._talk.parsed(answer)
-        return self._talk.number(self.dialect.field) if value is None else value
+        value = self._wire.parsed(answer)
+        return self._wire.number(self.dialect.field) if value is None else value
 
     def _factor(self) -> float:
         """Factor by the prefix letter of the row's multiplier query, or 1.
@@ -152,9 +131,9 @@ class Teslameter:
         query = self.dialect.multiplier
         if query is None:
             return 1.0
-        letter = self._talk.query(query, blank=True).lower()
+        letter = self._wire.query(query, blank=True).lower()
         if not letter:
-            letter = self._talk.query(query, blank=True).lower()
+            letter = self._wire.query(query, blank=True).lower()
         if letter not in MULTIPLIERS:
             raise BadReplyError(f"The teslameter's multiplier {letter!r} is unknown.")
         return MULTIPLIERS[letter]

@@ -8,8 +8,8 @@ program dies, and the next `open` takes it over from there.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
+from drivers.serial_line.instrument import SerialInstrument
 from drivers.serial_line.link import SerialLink, Spy
 from drivers.serial_line.source_wire import RECONNECT, VERIFICATIONS, SourceWire
 from tactile_lab.clock import Clock
@@ -37,7 +37,7 @@ DEVIATING_READINGS = 3
 """Readings in a row that must differ before it counts."""
 
 
-class SourceMeter:
+class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
     """A source meter behind a serial port, on one voltage of the circuit.
 
     Args:
@@ -66,9 +66,7 @@ class SourceMeter:
     ) -> None:
         self.name, self.dialect, self.limits = name, dialect, limits
         self.capability = dialect.capability(limits)
-        wire = dialect.serial
-        if baud is not None:
-            wire = wire.model_copy(update={"baud": baud})
+        wire = dialect.serial.at(baud)
         link = SerialLink(
             port,
             wire,
@@ -78,24 +76,11 @@ class SourceMeter:
             spy=spy,
         )
         self._clock = clock
-        self._wire = SourceWire(link, dialect)
+        super().__init__(SourceWire(link, dialect))
         self._setpoint: float | None = None
         self._commanded = clock.now()
         self._on = False
         self._deviating = 0
-
-    @property
-    def identity(self) -> str:
-        """What the source answered when asked who it is."""
-        return self._wire.link.identity or "not connected"
-
-    def record(self, path: Path) -> None:
-        """Write every byte to a transcript at `path`, until closed; before `open`.
-
-        Raises:
-            SceneError: the file cannot be written.
-        """
-        self._wire.link.record(path)
 
     def open(self) -> None:
         """Connect and identify; set up what is off, take over what it holds.
@@ -128,11 +113,8 @@ class SourceMeter:
         Raises:
             InstrumentError: the port or what is behind it, as `open`.
         """
-        try:
-            self._wire.meet()
+        with self._met():
             return self.identity
-        finally:
-            self._wire.link.close()
 
     def step_to(self, volts: float) -> bool:
         """Step towards `volts`, V, as far as slew allows; whether it is there.
@@ -202,11 +184,7 @@ class SourceMeter:
 
     def close(self) -> None:
         """Let go of the port, leaving the output as it is; idempotent."""
-        link = self._wire.link
-        if link.is_open:
-            self._wire.offer(self.dialect.release)
-            link.close()
-        link.end_record()
+        self._let_go()
 
     def _take_over(self) -> None:
         """Go on from what an earlier run, or a person, left it holding."""

@@ -43,7 +43,7 @@ def serial_source(table: CoilSpec, world: World) -> CoilSource:
     from sim_backend.serial_line.wires import plug_in
 
     row = coil_dialect(table.dialect)
-    wire = row.serial.model_copy(update={"baud": table.baud or row.serial.baud})
+    wire = row.serial.at(table.baud)
     given = world.faults.get("coil", ())
     faults = [one for one in given if isinstance(one, SerialFault)]
     if (when := world.simulated.coil_unplugged) is not None:

@@ -115,8 +115,7 @@ class ServedBench:
                 if log is not None:
                     self._log = _appended(log)
                     source.on_change = _writer(self._log)
-                wire = wire.model_copy(update={"baud": baud or wire.baud})
-                self._add("coil", coil, source, wire, clock, paced)
+                self._add("coil", coil, source, wire.at(baud), clock, paced)
             if teslameter is not None:
                 known = meter_dialect(meter_row)
                 meter = meter_far_end(plant, known, clock, noise=2e-6, seed=seed)

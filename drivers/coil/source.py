@@ -6,12 +6,11 @@ heat budget, read-back, resistance. Every way out leads through `safe_off`.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from drivers.coil.guard import Guard, in_process
 from drivers.coil.interlock import GENERATOR, Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, check_points, load
 from drivers.coil.wire import CoilWire
+from drivers.serial_line.instrument import SerialInstrument
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading, SeenOutput
 from tactile_lab.clock import Clock
@@ -24,7 +23,7 @@ CATCH_UP = 0.05
 """Time after a late set-point, s, that one step may make up for at the slew limit."""
 
 
-class CoilSource:
+class CoilSource(SerialInstrument[CoilWire]):
     """A current source behind a serial port.
 
     Args:
@@ -55,9 +54,7 @@ class CoilSource:
     ) -> None:
         self.dialect = dialect
         self.warnings: list[str] = []
-        setup = dialect.serial
-        if baud is not None:
-            setup = setup.model_copy(update={"baud": baud})
+        setup = dialect.serial.at(baud)
         link = SerialLink(
             port,
             setup,
@@ -72,7 +69,7 @@ class CoilSource:
         if guard is None and guarded and not in_process(port):
             guard = Guard(port, dialect, setup)
         self._guard = guard
-        self._wire = CoilWire(link, dialect)
+        super().__init__(CoilWire(link, dialect))
         self._interval = dialect.promised_interval(baud)
         self._setpoint: float | None = None
         self._loaded: CurrentList | None = None
@@ -84,11 +81,6 @@ class CoilSource:
         self._given_up: OffReport | None = None
         """What could not be verified off and is the guard's from `close` on."""
         self._interlock = Interlock(self._limits, clock.now(), guard, self._warn)
-
-    @property
-    def identity(self) -> str:
-        """What the source answered when asked who it is."""
-        return self._wire.link.identity or "not connected"
 
     @property
     def limits(self) -> CoilLimits:
@@ -109,14 +101,6 @@ class CoilSource:
     def tripped(self) -> str | None:
         """Why the interlock latched, or None."""
         return self._interlock.tripped
-
-    def record(self, path: Path) -> None:
-        """Write every byte to a transcript at `path`, until closed; before `open`.
-
-        Raises:
-            SceneError: the file cannot be written.
-        """
-        self._wire.link.record(path)
 
     def open(self) -> None:
         """Connect, identify, make safe, measure the update interval.
@@ -155,15 +139,11 @@ class CoilSource:
         Raises:
             InstrumentError: the port or what is behind it, as `open`.
         """
-        wire = self._wire
-        try:
-            wire.meet()
+        with self._met() as wire:
             on = wire.output_is_on()
             return SeenOutput(
                 self.identity, on, wire.current() if on else wire.current_when_off()
             )
-        finally:
-            wire.link.close()
 
     def energise(self) -> None:
         """Set compliance and 0 A, verify both, then switch the output on.

@@ -85,6 +85,10 @@ class SerialSettings(Strict):
     strip: str = ""
     preamble: str = ""
 
+    def at(self, baud: int | None) -> SerialSettings:
+        """The same at another rate; as they are where None is given."""
+        return self if baud is None else self.model_copy(update={"baud": baud})
+
     @property
     def character_time(self) -> float:
         """Time one character takes on the wire, s."""
@@ -365,7 +369,7 @@ class CoilDialect(SourceDialect):
 
     def _exchange(self, line: str, baud: int | None) -> float:
         """Typical time to send `line` and to verify it, s."""
-        wire = self.serial.model_copy(update={"baud": baud or self.serial.baud})
+        wire = self.serial.at(baud)
         lines = self.verified(line)
         sent = sum(len(line) + len(wire.send_end) for line in lines)
         answer = len('0,"No error"\r\n') if self.error else 0

@@ -88,7 +88,7 @@ def outcome(scene: Scene, injection: Injection, folder: Path) -> tuple[str, str]
 
 
 def _struck(bench: Any, end: Any) -> bool:
-    meter = bench.field_meter._talk.link.port.far_end
+    meter = bench.field_meter._wire.link.port.far_end
     schedule = bench.scope._unit._library.device.schedule
     return bool(end.faults.struck or meter.faults.struck or schedule.struck)
 
