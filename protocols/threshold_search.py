@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tactile_lab.analysis.rate_force import Onset, onset
+from tactile_lab.analysis.rate_force import Bracket, onset
 from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
@@ -190,12 +190,12 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
     )
 
 
-def _onset(trials: Sequence[MeasuredTrial]) -> Onset:
+def _onset(trials: Sequence[MeasuredTrial]) -> Bracket:
     forces = [float(t.level or 0.0) for t in trials]
     return onset(forces, [t.response.spikes for t in trials])
 
 
-def _gate(run: Measurement, found: Onset, force_error: float) -> Conclusion:
+def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
     """V_GS from the applied force of the two trials that bracket the onset."""
     from tactile_lab.analysis.operating_point import V_GS_of_onset
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from tactile_lab.analysis.rate_force import Bracket
 from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
@@ -208,40 +209,27 @@ class ThresholdTrim(Recovering):
 
 
 @dataclass(frozen=True)
-class TrimmedGate:
+class TrimmedGate(Bracket):
     """The V_GS wanted lies between these two, V, as the source was read back."""
-
-    silent: float
-    fires: float
-
-    @property
-    def middle(self) -> float:
-        """Middle of the bracket, V."""
-        return (self.silent + self.fires) / 2
-
-    @property
-    def half(self) -> float:
-        """Half the bracket, V."""
-        return (self.fires - self.silent) / 2
 
     def conclusion(self, run: Measurement, asked: ThresholdTrim) -> Conclusion:
         """What it means, in sentences and values."""
         wanted = asked.wanted
         values: dict[str, float | None] = {
             "V_GS_V": self.middle,
-            "V_GS_half_width_V": self.half,
+            "V_GS_half_width_V": self.half_width,
             "critical_force_N": wanted,
         }
         sentences = [
-            f"V_GS = {show(self.middle, 'V', 6)} ± {show(self.half, 'V', 2)}, as its "
-            f"source reads it, puts the critical force at {show(wanted, 'N')} for a "
-            f"ramp of {asked.ramp:g} s and a hold of {asked.hold:g} s: silent at "
+            f"V_GS = {show(self.middle, 'V', 6)} ± {show(self.half_width, 'V', 2)}, as "
+            f"its source reads it, puts the critical force at {show(wanted, 'N')} for "
+            f"a ramp of {asked.ramp:g} s and a hold of {asked.hold:g} s: silent at "
             f"{show(self.silent, 'V', 6)}, fires at {show(self.fires, 'V', 6)}. To use "
             f'it, write [sensor] V_GS = "{self.middle:.5f} V" and sourced = ["V_GS"].'
         ]
         error = run.source_error("V_GS", self.middle)
         values["V_GS_uncertainty_V"] = whole = (
-            None if error is None else math.hypot(self.half, error)
+            None if error is None else math.hypot(self.half_width, error)
         )
         if whole is not None:
             sentences.append(
@@ -249,7 +237,7 @@ class TrimmedGate:
                 "bound that the source's maker gives for its reading is in it."
             )
         if run.circuit is not None:
-            left = self.half / abs(run.circuit.k_F)
+            left = self.half_width / abs(run.circuit.k_F)
             values["critical_force_half_width_N"] = left
             known = run.uncertain(wanted)
             told = f"The critical force is within ±{show(left, 'N', 2)} of that"

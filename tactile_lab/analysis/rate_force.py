@@ -22,20 +22,20 @@ STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Onset:
-    """The critical force lies between these two, N."""
+class Bracket:
+    """Where firing begins lies between these two: forces, N, or gate voltages, V."""
 
     silent: float
     fires: float
 
     @property
     def middle(self) -> float:
-        """Middle of the bracket, N."""
+        """Middle of the bracket."""
         return (self.silent + self.fires) / 2
 
     @property
     def half_width(self) -> float:
-        """Half the bracket, N."""
+        """Half the bracket."""
         return (self.fires - self.silent) / 2
 
 
@@ -200,7 +200,7 @@ def fit_rate_law(
     )  # fmt: skip
 
 
-def onset(forces: Sequence[float], spikes: Sequence[int]) -> Onset:
+def onset(forces: Sequence[float], spikes: Sequence[int]) -> Bracket:
     """Bracket of the critical force from trials that each started from rest.
 
     Args:
@@ -223,4 +223,4 @@ def onset(forces: Sequence[float], spikes: Sequence[int]) -> Onset:
             f"{below.max() * 1e3:g} mN silent though {lowest * 1e3:g} mN fired: not at "
             "rest, or a drift"
         )
-    return Onset(float(below.max()), lowest)
+    return Bracket(float(below.max()), lowest)
