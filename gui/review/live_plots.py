@@ -47,15 +47,7 @@ def rate_plot(
         x_label="force",
         x_unit="N",
         x_prefix="m",
-        panels=(
-            Panel(
-                label="rate",
-                unit="Hz",
-                prefix="",
-                series=tuple(series),
-                limits=(0.0, None),
-            ),
-        ),
+        panels=(_rates(series),),
     )
 
 
@@ -95,15 +87,14 @@ def train_plot(
         x_label="time in the hold",
         x_unit="s",
         x_prefix="",
-        panels=(
-            Panel(
-                label="rate",
-                unit="Hz",
-                prefix="",
-                series=tuple(series),
-                limits=(0.0, None),
-            ),
-        ),
+        panels=(_rates(series),),
+    )
+
+
+def _rates(series: Sequence[Series]) -> Panel:
+    """One panel of rates, from 0 up."""
+    return Panel(
+        label="rate", unit="Hz", prefix="", series=tuple(series), limits=(0.0, None)
     )
 
 
