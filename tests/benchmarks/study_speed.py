@@ -236,8 +236,8 @@ of a sensor whose five parts vary, on two worker processes; made by
 processor time a point. "Whole" is from the call to the written data set, "computing"
 from the first batch to the last; "in the kernel" is the kernel's time for all points
 over the processor time of all processes, and over that of two cores for the whole
-time. Load is of the machine before each row: others worked on it, which lowers every
-rate, and the last share but one.
+time. Load is of the machine before each row: work of others lowers every rate, and the
+last share but one.
 
 | {" | ".join(HEADINGS)} |
 {"|---" * len(HEADINGS)}|
