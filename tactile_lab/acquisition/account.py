@@ -19,6 +19,7 @@ from tactile_lab.acquisition.alignment import (
 )
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.acquisition.instruments import Instruments
+from tactile_lab.acquisition.intake import FoundSpikes
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.bench import Reading, Stream
 from tactile_lab.clock import Clock
@@ -108,6 +109,8 @@ class Account:
         self.journal = self._open_journal(stream)
         for kind, text in self._waiting:
             self.journal.event(0.0, kind, text)
+        uncertainty = 0.0 if stream is None else stream.uncertainty
+        self.emit(events.RecordBegun(self._origin, uncertainty))
         return self.journal
 
     def state(self, state: events.RunState, text: str) -> None:
@@ -152,11 +155,12 @@ class Account:
         if self.journal is not None:
             self.journal.pause(start, end)
 
-    def spikes(self, times: tuple[float, ...]) -> None:
-        """Spikes were found at these run times, s."""
+    def spikes(self, found: FoundSpikes) -> None:
+        """Spikes were found."""
+        times, amplitudes = found
         if times:
             rates = self._rate.feed(np.array(times))
-            self.emit(events.SpikesSeen(times, tuple(rates.tolist())))
+            self.emit(events.SpikesSeen(times, tuple(rates.tolist()), amplitudes))
 
     def readings(self, instruments: Instruments) -> None:
         """Take what coil and meter have told since last time."""

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.voltage_source import HeldVoltage
@@ -35,6 +36,19 @@ class StateChanged:
 
     state: RunState
     text: str
+
+
+@dataclass(frozen=True)
+class RecordBegun:
+    """The record begins: run time 0 is `origin` s of the bench's clock.
+
+    Attributes:
+        origin: when the first sample was taken, s.
+        uncertainty: of that, s.
+    """
+
+    origin: float
+    uncertainty: float
 
 
 @dataclass(frozen=True)
@@ -120,10 +134,12 @@ class SpikesSeen:
         times: on the run's axis, s, ascending.
         rates: instantaneous rate right after each of them, 1/ISI, Hz: 0 after the
             run's first spike; the ISI may span a planned pause.
+        amplitudes: of each, V: the peak of V_K, or the fall of V_C2 in a reset.
     """
 
     times: tuple[float, ...]
     rates: tuple[float, ...]
+    amplitudes: tuple[float, ...]
 
     @property
     def intervals(self) -> tuple[float, ...]:
@@ -141,6 +157,7 @@ class Message:
 
 Event = (
     StateChanged
+    | RecordBegun
     | TrialStarted
     | TrialEnded
     | Progress
@@ -152,6 +169,37 @@ Event = (
     | Message
 )
 Emit = Callable[[Event], None]
+
+
+def documented(event: Event) -> dict[str, Any] | None:
+    """The object other programs are told (docs/json.md); None if they are not."""
+    match event:
+        case StateChanged(state=state, text=text):
+            told: dict[str, Any] = {"event": "state", "state": str(state), "text": text}
+        case Progress(elapsed=elapsed, expected=expected):
+            told = {"event": "progress", "elapsed_s": elapsed, "expected_s": expected}
+        case TrialStarted(index=index, trial=trial, start=start):
+            told = {"event": "trial_started", "index": index, "label": trial.label}
+            told["start_s"] = start
+        case TrialEnded(outcome=outcome):
+            told = {"event": "trial_ended", "index": outcome.index}
+            told["spikes"] = len(outcome.spike_times)
+        case SpikesSeen(times=times, rates=rates, amplitudes=amplitudes):
+            told = {"event": "spikes", "times_s": list(times), "rates_Hz": list(rates)}
+            told["amplitudes_V"] = list(amplitudes)
+        case FieldRead(time=at, field=field):
+            told = {"event": "field", "time_s": at, "field_T": field}
+        case TemperatureRead(time=at, kelvin=kelvin):
+            told = {"event": "temperature", "time_s": at, "temperature_K": kelvin}
+        case VoltageRead(name=name, held=held):
+            told = {"event": "voltage", "time_s": held.time, "name": name}
+            told |= {"V": held.voltage, "A": held.current}
+            told["setpoint_V"] = held.setpoint
+        case Message(level=level, text=text):
+            told = {"event": "message", "level": level, "text": text}
+        case _:
+            return None
+    return told
 
 
 def ignore(event: Event) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,21 @@ if TYPE_CHECKING:  # compiled code, which a run without spikes does not load
     from tactile_lab.spikes.detector import Detector, ResetDetector
 
 
+class FoundSpikes(NamedTuple):
+    """Spikes found in a block.
+
+    Attributes:
+        times: s on the run's axis, ascending.
+        amplitudes: of each, V.
+    """
+
+    times: tuple[float, ...]
+    amplitudes: tuple[float, ...]
+
+
+NONE_FOUND = FoundSpikes((), ())
+
+
 class Intake:
     """Takes each block once, in order, and accounts for it.
 
@@ -29,7 +44,7 @@ class Intake:
 
     def __init__(self, live: Live) -> None:
         self._live = live
-        self._row = 0
+        self._row, self._scale = 0, (1.0, 0.0)
         self._journal: Journal | None = None
         self._detector: Detector | ResetDetector | None = None
         self._stream: Stream | None = None
@@ -61,6 +76,7 @@ class Intake:
         journal: Journal,
         detector: Detector | ResetDetector | None = None,
         row: int = 0,
+        scale: tuple[float, float] = (1.0, 0.0),
     ) -> None:
         """A stream starts.
 
@@ -70,8 +86,9 @@ class Intake:
             journal: stores what comes.
             detector: finds spikes; None where none are searched.
             row: of each block that is searched.
+            scale: gain and offset, V, of a spike's amplitude in codes.
         """
-        self._row = row
+        self._row, self._scale = row, scale
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._journal = detector, journal
         self._means = {
@@ -82,8 +99,8 @@ class Intake:
         self._live.begin(stream, start)
         journal.segment(stream, start)
 
-    def add(self, block: Block) -> tuple[float, ...]:
-        """Take a block; times of the spikes it completed, s on the run's axis.
+    def add(self, block: Block) -> FoundSpikes:
+        """Take a block; the spikes it completed.
 
         Raises:
             SamplesLostError: samples between this block and the last are missing,
@@ -107,7 +124,7 @@ class Intake:
         for signal, mean in self._means.items():
             self._readings += [(signal, reading) for reading in mean.feed(block)]
         if self._detector is None:
-            return ()
+            return NONE_FOUND
         return self._keep(self._detector.feed(block.first, block.codes[self._row]))
 
     def take_readings(self) -> list[tuple[str, Reading]]:
@@ -124,8 +141,8 @@ class Intake:
         """Let go of spikes that no trial to come can ask for."""
         del self._spike_times[: bisect_left(self._spike_times, time)]
 
-    def end(self, time: float) -> tuple[float, ...]:
-        """The stream ended at run time `time`, s; times of spikes still open."""
+    def end(self, time: float) -> FoundSpikes:
+        """The stream ended at run time `time`, s; the spike still open, if any."""
         if self._stream is not None and self._journal is not None:
             # a scope that was never polled has seen nothing, at no time
             polled = time > self.reached and not self._stream.gapless
@@ -134,16 +151,20 @@ class Intake:
             )
             if unseen > 0:
                 self._journal.gap(unseen)
-        found = () if self._detector is None else self._keep(self._detector.flush())
+        found = NONE_FOUND
+        if self._detector is not None:
+            found = self._keep(self._detector.flush())
         self._stream, self._detector = None, None
         return found
 
-    def _keep(self, found: NDArray[np.void]) -> tuple[float, ...]:
+    def _keep(self, found: NDArray[np.void]) -> FoundSpikes:
         if found.size == 0 or self._stream is None or self._journal is None:
-            return ()
+            return NONE_FOUND
         times = self._start + found["sample"] * self._stream.interval
         self._journal.spikes(times, found)
-        new = tuple(float(t) for t in times)
+        new: list[float] = times.tolist()
         self._spike_times.extend(new)
         self.spikes += len(new)
-        return new
+        gain, offset = self._scale
+        volts = found["amplitude"] * gain + offset
+        return FoundSpikes(tuple(new), tuple(volts.tolist()))

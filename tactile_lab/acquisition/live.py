@@ -116,6 +116,16 @@ class Live:
         with self._lock:
             return self._levels[self.signals.index(signal)].since(written)
 
+    def fresh(self, written: int) -> tuple[int, dict[str, Trace]]:
+        """Number of bins written, and of each signal those from `written` on."""
+        with self._lock:
+            count = self._levels[0].count if self._levels else 0
+            first = written if count >= written else 0
+            if first == count:
+                return count, {}
+            pairs = zip(self._channels, self._levels, strict=True)
+            return count, {one.signal: level.since(first) for one, level in pairs}
+
     def levels(self, start: float, end: float) -> dict[str, float]:
         """Mean of each measured signal over [start, end) s, where there is any."""
         found = {}

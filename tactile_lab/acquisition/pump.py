@@ -144,7 +144,8 @@ class Pump:
             self._intake.begin(stream, start, journal)
             return
         detector, row = search.detector(stream), search.row(stream)
-        self._intake.begin(stream, start, journal, detector, row)
+        scale = search.amplitude_scale(stream)
+        self._intake.begin(stream, start, journal, detector, row, scale)
 
     def stop_stream(self) -> None:
         """Have the stream end, take the last of it, and align it in time."""

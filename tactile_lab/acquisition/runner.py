@@ -56,7 +56,7 @@ class Runner:
         journal: starts the record, told how the samples are scaled (None: no scope).
         stop: asks for the end.
         live: gets the newest samples.
-        emit: is told what happens.
+        emits: are told what happens, each for as long as it works.
 
     Attributes:
         missing: what found that samples are missing from a stream without gaps; None
@@ -70,13 +70,18 @@ class Runner:
         journal: Callable[[Stream | None], Journal],
         stop: StopRequest,
         live: Live,
-        emit: events.Emit = events.ignore,
+        *emits: events.Emit,
     ) -> None:
         self.intake = Intake(live)
         self._live = live
         self._program = program
         self._clock = bench.clock
-        emit = events.until_it_fails(emit, self._note_watcher)
+        guarded = [events.until_it_fails(one, self._note_watcher) for one in emits]
+
+        def emit(event: events.Event) -> None:
+            for one in guarded:
+                one(event)
+
         self._account = Account(bench.clock, journal, emit)
         self._stop = stop
         self._lease = Lease(bench.clock)

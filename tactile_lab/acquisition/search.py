@@ -105,6 +105,11 @@ class SpikeSearch:
             refractory=refractory,
         )
 
+    def amplitude_scale(self, stream: Stream) -> tuple[float, float]:
+        """Gain and offset, V, that make volts of the amplitude of a spike found."""
+        scale = stream.volts_per_code(self.row(stream))
+        return self.detection(stream).amplitude_scale(*scale)
+
     def detector(self, stream: Stream) -> Detector | ResetDetector:
         """A fresh detector for the stream."""
         from tactile_lab.spikes.detector import detector_of

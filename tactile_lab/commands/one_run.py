@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from tactile_lab.acquisition.model_comparison import ModelComparison
     from tactile_lab.commands.status_server import StatusServer
     from tactile_lab.engine.execution import Execution
+    from tactile_lab.engine.lsl import LslStreams
     from tactile_lab.report.write import Report
     from tactile_lab.scene.scene import Scene
     from tactile_lab.store.compare import Differences
@@ -102,61 +103,65 @@ class Watchers:
 
     Args:
         narrator: tells it at the terminal.
-        server: tells it to other programs; None where nobody asked.
+        others: tell it to other programs.
     """
 
-    def __init__(self, narrator: Narrator, server: StatusServer | None) -> None:
-        self.narrator, self._server = narrator, server
+    def __init__(
+        self, narrator: Narrator, others: tuple[StatusServer | LslStreams, ...] = ()
+    ) -> None:
+        self.narrator, self.others = narrator, others
 
     def expect(self, execution: Execution) -> None:
         """This is about to run."""
         self.narrator.expect(execution)
-        if self._server is not None:
-            self._server.stop = execution.stop
-            self._server.tell(
-                "begun",
-                run=str(execution.folder.path),
-                scene=execution.scene.name,
-                simulated=execution.bench.simulated,
-                planned_s=execution.plan.estimate.duration,
-            )
-
-    def __call__(self, event: Event) -> None:
-        """Take an event of the run."""
-        self.narrator(event)
-        if self._server is not None:
-            self._server(event)
+        for other in self.others:
+            other.begin(execution)
 
     def end(self, result: dict[str, Any]) -> None:
         """Tell what came of it, as ``--json`` prints it."""
-        if self._server is not None:
-            self._server.stop = None
-            self._server.tell("result", **result)
+        for other in self.others:
+            other.end(result)
 
 
-def serve_status(address: str | None, until: ExitStack) -> StatusServer | None:
-    """Who tells other programs of runs until that stack is left; None without address.
+def tell_others(
+    status: str | None, live: str | None, until: ExitStack
+) -> tuple[StatusServer | LslStreams, ...]:
+    """Who tells other programs of runs until that stack is left; nobody unless asked.
+
+    Args:
+        status: address of `--status`.
+        live: kind of `--live`.
+        until: closes them.
 
     Raises:
-        SceneError: it is no address, or cannot be listened at.
+        SceneError: that is no address or cannot be listened at, or LSL is not there.
     """
-    if address is None:
-        return None
-    from tactile_lab.commands.status_server import StatusServer
+    others: list[StatusServer | LslStreams] = []
+    if status is not None:
+        from tactile_lab.commands.status_server import StatusServer
 
-    server = StatusServer(address)
-    until.callback(server.close)
-    say(f"status {server.address}", sys.stderr)
-    if not server.local:
-        warn(f"every computer that reaches {server.address} can read it and stop runs.")
-    return server
+        server = StatusServer(status)
+        until.callback(server.close)
+        others.append(server)
+        say(f"status {server.address}", sys.stderr)
+        if not server.local:
+            reach = f"every computer that reaches {server.address}"
+            warn(f"{reach} can read it and stop runs.")
+    if live is not None:
+        from tactile_lab.engine.lsl import LslStreams
+
+        streams = LslStreams(warn)
+        until.callback(streams.close)
+        others.append(streams)
+        say(f"live   lsl {streams.source}", sys.stderr)
+    return tuple(others)
 
 
 def prepared(
     scene: Scene,
     out: Path,
     notes: Mapping[str, str],
-    server: StatusServer | None = None,
+    others: tuple[StatusServer | LslStreams, ...] = (),
     *,
     realtime: bool = False,
     field: Path | None = None,
@@ -167,7 +172,7 @@ def prepared(
         scene: what to run.
         out: folder for run folders.
         notes: kept with it.
-        server: tells other programs of it.
+        others: tell other programs of it.
         realtime: pace a simulated bench by the clock.
         field: file of what a manual teslameter showed.
 
@@ -176,12 +181,13 @@ def prepared(
     """
     from tactile_lab.engine.execution import Execution
 
-    watchers, person = Watchers(Narrator(scene.name), server), somebody()
+    watchers, person = Watchers(Narrator(scene.name), others), somebody()
     execution = Execution(
         scene,
         out,
         realtime=realtime,
-        emit=watchers,
+        emit=watchers.narrator,
+        others=others,
         notes=notes,
         ask=person,
         asked_field=field_reader(scene, person, field),

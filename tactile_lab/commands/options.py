@@ -136,6 +136,12 @@ status_option: Decorator = click.option(
     "takes a free one. See docs/how-to/work-with-other-programs.md.",
 )
 
+live_option: Decorator = click.option(
+    "--live",
+    type=click.Choice(["lsl"]),
+    help="Publish spikes, envelopes and events while it runs, by Lab Streaming Layer.",
+)
+
 notes_option: Decorator = click.option(
     "--note",
     "notes",

@@ -18,10 +18,11 @@ from tactile_lab.commands.one_run import (
     leave,
     prepared,
     print_run,
-    serve_status,
+    tell_others,
 )
 from tactile_lab.commands.options import (
     json_option,
+    live_option,
     noted,
     notes_option,
     runs_option,
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
     help="Run it N times at each value, as a study.",
 )
 @status_option
+@live_option
 @click.option("--no-report", is_flag=True, help="Leave out figure and report.")
 @json_option
 def command(
@@ -99,6 +101,7 @@ def command(
     sweeps: tuple[str, ...],
     repeat: int,
     status: str | None,
+    live: str | None,
     no_report: bool,
     as_json: bool,
 ) -> None:
@@ -122,6 +125,7 @@ def command(
                     "--again": again,
                     "--field": field,
                     "--status": status,
+                    "--live": live,
                 }
                 _refuse_with_sweep([name for name, value in given.items() if value])
                 with interrupted():
@@ -132,7 +136,7 @@ def command(
                 loaded,
                 out,
                 noted(notes),
-                serve_status(status, served),
+                tell_others(status, live, served),
                 realtime=realtime,
                 field=field,
             )

@@ -18,10 +18,11 @@ from tactile_lab.commands.attended import Signals
 from tactile_lab.commands.one_run import (
     finished,
     prepared,
-    serve_status,
     tell_of,
+    tell_others,
 )
 from tactile_lab.commands.options import (
+    live_option,
     noted,
     notes_option,
     runs_option,
@@ -83,6 +84,7 @@ class Step:
 )
 @click.option("--realtime", is_flag=True, help="Pace the simulated bench by the clock.")
 @status_option
+@live_option
 @click.option("--no-report", is_flag=True, help="Leave out figures and reports.")
 def command(
     scenes: tuple[str, ...],
@@ -94,6 +96,7 @@ def command(
     go_on: bool,
     realtime: bool,
     status: str | None,
+    live: str | None,
     no_report: bool,
 ) -> None:
     """Run each SCENE in turn, or those of a FILE with [[run]] tables.
@@ -111,7 +114,7 @@ def command(
             _plan_all(steps)
             kept_notes = noted(notes)
             start = None if begin is None else _time(begin)
-            server = serve_status(status, served)
+            others = tell_others(status, live, served)
             signals.look()
             _keep(state, steps)
         if start is not None:
@@ -122,7 +125,7 @@ def command(
             say(f"{number + 1} of {len(steps)}: {step.scene}", sys.stderr)
             with refusing():
                 execution, watchers = prepared(
-                    step.load(), out, kept_notes, server, realtime=realtime
+                    step.load(), out, kept_notes, others, realtime=realtime
                 )
             done = finished(execution, signals, watchers)
             signals.opened = False

@@ -14,12 +14,14 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from tactile_lab.acquisition import events
 from tactile_lab.errors import SceneError
+
+if TYPE_CHECKING:
+    from tactile_lab.engine.execution import Execution
 
 UNREAD = 1 << 20
 """Bytes that may wait for a program before it is let go of."""
@@ -76,36 +78,29 @@ class StatusServer:
 
     def __call__(self, event: events.Event) -> None:
         """Tell an event of the run, from any thread; never waits."""
-        match event:
-            case events.StateChanged(state=state, text=text):
-                self.tell("state", state=str(state), text=text)
-            case events.Progress(elapsed=elapsed, expected=expected):
-                now = time.monotonic()
-                if now - self._told_progress >= PROGRESS_EVERY:
-                    self._told_progress = now
-                    self.tell("progress", elapsed_s=elapsed, expected_s=expected)
-            case events.TrialStarted(index=index, trial=trial, start=start):
-                told = {"index": index, "label": trial.label, "start_s": start}
-                self.tell("trial_started", **told)
-            case events.TrialEnded(outcome=outcome):
-                spikes = len(outcome.spike_times)
-                self.tell("trial_ended", index=outcome.index, spikes=spikes)
-            case events.SpikesSeen(times=times, rates=rates):
-                self.tell("spikes", times_s=list(times), rates_Hz=list(rates))
-            case events.FieldRead():
-                self.tell("field", time_s=event.time, field_T=event.field)
-            case events.TemperatureRead(time=at, kelvin=kelvin):
-                self.tell("temperature", time_s=at, temperature_K=kelvin)
-            case events.VoltageRead(name=name, held=held):
-                told = {"time_s": held.time, "V": held.voltage, "A": held.current}
-                self.tell("voltage", name=name, setpoint_V=held.setpoint, **told)
-            case events.Message():
-                self.tell("message", **asdict(event))
+        if isinstance(event, events.Progress):
+            now = time.monotonic()
+            if now - self._told_progress < PROGRESS_EVERY:
+                return
+            self._told_progress = now
+        line = events.documented(event)
+        if line is not None:
+            self._tell(line)
 
-    def tell(self, event: str, **entries: Any) -> None:
+    def begin(self, execution: Execution) -> None:
+        """This is about to run; from now on it can be stopped."""
+        self.stop = execution.stop
+        self._tell(execution.documented)
+
+    def end(self, result: dict[str, Any]) -> None:
+        """Tell what came of it, as ``--json`` prints it."""
+        self.stop = None
+        self._tell({"event": "result", **result})
+
+    def _tell(self, line: dict[str, Any]) -> None:
         """Tell every program that listens; one that comes later hears the newest."""
         with suppress(RuntimeError):  # closed
-            self._loop.call_soon_threadsafe(self._send, {"event": event, **entries})
+            self._loop.call_soon_threadsafe(self._send, line)
 
     def close(self) -> None:
         """Say what is left to say and let go of all; idempotent."""

@@ -260,16 +260,12 @@ class ServedTask:
         ended = False
         while not ended:
             ended = over.wait(EVERY)
-            written, coil = live.written, task.coil_state
+            coil = task.coil_state
+            seen, bins = live.fresh(seen)
             late = time.monotonic() - said > AT_LEAST
-            if written == seen and coil == last and not late:
-                continue
-            first = seen if written >= seen else 0
-            bins = {}
-            if written != seen:
-                bins = {name: live.since(first, name) for name in live.signals}
-            self._tell(Samples(bins, coil))
-            seen, last, said = written, coil, time.monotonic()
+            if bins or coil != last or late:
+                self._tell(Samples(bins, coil))
+                last, said = coil, time.monotonic()
 
     def _tell_model(
         self, model: LiveModel, task: Task[Any], over: threading.Event

@@ -14,6 +14,7 @@ import traceback
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.asked_field import AskedField
@@ -58,6 +59,7 @@ class Execution(Task[Executed]):
         bench: instruments made elsewhere; those of the scene's bench unless given.
         realtime: pace a simulated bench by the wall clock.
         emit: told of everything that happens, from the deciding thread.
+        others: are told, too, each for as long as it works.
         notes: kept with the run (operator, sample, ...).
         ask: asks a person to do something at a real bench and returns when it is done;
             called in a thread of its own.
@@ -80,6 +82,7 @@ class Execution(Task[Executed]):
         bench: Bench | None = None,
         realtime: bool = False,
         emit: events.Emit = events.ignore,
+        others: tuple[events.Emit, ...] = (),
         notes: Mapping[str, str] | None = None,
         ask: Ask | None = None,
         asked_field: AskedField | None = None,
@@ -88,6 +91,7 @@ class Execution(Task[Executed]):
         self.needs = self.plan.needs
         used = bench or open_bench(scene, self.needs, realtime=realtime)
         super().__init__(scene, used, emit)
+        self._others = others
         self._ask = ask
         self._asked_field = asked_field
         self._check_somebody_is_there()
@@ -100,6 +104,17 @@ class Execution(Task[Executed]):
             origin(self.plan, self.bench, {**scene.conditions.notes, **(notes or {})}),
             needed=self.plan.estimate.disk,
         )
+
+    @property
+    def documented(self) -> dict[str, Any]:
+        """What other programs are told as it begins (docs/json.md)."""
+        return {
+            "event": "begun",
+            "run": str(self.folder.path),
+            "scene": self.scene.name,
+            "simulated": self.bench.simulated,
+            "planned_s": self.plan.estimate.duration,
+        }
 
     @property
     def coil_state(self) -> CoilState:
@@ -137,6 +152,7 @@ class Execution(Task[Executed]):
             self.stop,
             self.live,
             self._emit,
+            *self._others,
         )
         ending = runner.run()
         took = time.monotonic() - began

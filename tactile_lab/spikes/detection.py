@@ -33,3 +33,14 @@ class Detection:
     polarity: Literal[1, -1] = 1
     kind: Literal["crossing", "reset"] = "crossing"
     span: int = 2
+
+    def amplitude_scale(self, gain: float, offset: float) -> tuple[float, float]:
+        """Gain and offset, V, that make volts of a spike's amplitude in codes.
+
+        Args:
+            gain: of the channel, V a code.
+            offset: of the channel, V.
+        """
+        if self.kind == "reset":  # half the fall is kept, see `ResetDetector`
+            return 2 * gain, 0.0
+        return gain, offset

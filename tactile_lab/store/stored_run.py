@@ -212,8 +212,8 @@ class StoredRun:
         if axis.first.size:
             spikes["time"] = axis.time_of(rows["sample"])
         gain, offset = attrs.get("gain", np.nan), attrs.get("offset", np.nan)
-        if attrs.get("kind") == "reset":
-            gain, offset = 2 * gain, 0.0  # half the fall is stored, see ResetDetector
+        if self.detection is not None:
+            gain, offset = self.detection.amplitude_scale(gain, offset)
         spikes["amplitude"] = rows["amplitude"] * gain + offset
         step = axis.step[0] if axis.step.size else np.nan
         spikes["width"] = rows["width"] * step
