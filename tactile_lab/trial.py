@@ -5,11 +5,11 @@ from __future__ import annotations
 import inspect
 from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
 from tactile_lab.conclusion import Conclusion
@@ -131,6 +131,14 @@ class Protocol(BaseModel):
     which way the coil plays it (`[coil] way`)."""
     checks: ClassVar[Literal["", "wiring", "field", "force"]] = ""
     """What of the bench it checks or calibrates; the connect dialog offers it there."""
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _listed(cls, value: Any, info: ValidationInfo) -> Any:
+        """A scene's lists come as tuples; a field may ask for either."""
+        asked = cls.model_fields[str(info.field_name)].annotation
+        listed = get_origin(asked) is list and isinstance(value, tuple)
+        return list(value) if listed else value
 
     def trials(self) -> Trials:
         """Yield trials; each ``yield`` returns that trial's outcome."""

@@ -54,6 +54,14 @@ def test_a_file_is_a_protocol_if_it_holds_one_of_its_name(tmp_path):
         protocol_from_file(path)
 
 
+def test_a_field_may_be_a_list_as_well_as_a_tuple(tmp_path):
+    path = tmp_path / "mine.py"
+    fields = "    levels: list[float] = [0.1]\n    holds: tuple[float, ...] = (1.0,)\n"
+    path.write_text(GOOD + fields)
+    scene = load(str(path), {"protocol.levels": [0.2, 0.3], "protocol.holds": [2.0]})
+    assert scene.protocol.model_dump() == {"levels": [0.2, 0.3], "holds": (2.0,)}
+
+
 def test_a_users_file_never_shadows_ours(tmp_path):
     path = tmp_path / "pulses.py"
     path.write_text(GOOD.replace('"mine"', '"pulses"'))
