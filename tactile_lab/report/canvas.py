@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
@@ -62,6 +63,8 @@ HEAD_HEIGHT = 0.62
 """Room the heading takes at the top."""
 HEADING = "heading"
 """Names the heading's parts in SVG: a page with a heading of its own hides them."""
+BESIDE = "beside"
+"""Names the texts of a series that is drawn as texts alone."""
 DASHES, DOTS = (0, (4, 2)), (0, (1, 2.5))
 MANY, MOST = 60, 200
 """So many points are drawn smaller."""
@@ -101,7 +104,30 @@ def draw(
                 axes.tick_params(axis="x", labelbottom=False, length=0)
                 axes.spines["bottom"].set_visible(False)
         _heading(figure, title, subtitle, simulated)
+        for axes in drawn:
+            _stagger(
+                [
+                    t
+                    for t in axes.texts
+                    if isinstance(t, Annotation) and t.get_gid() == BESIDE
+                ]
+            )
     return figure
+
+
+def _stagger(texts: list[Annotation]) -> None:
+    """Raise texts that would run into the one before; drop what still would."""
+    rows: list[float] = [-np.inf, -np.inf]
+    for text in texts:
+        box = text.get_window_extent()
+        row = next((n for n, end in enumerate(rows) if box.x0 > end), None)
+        if row is None:
+            text.set_visible(False)
+            continue
+        rows[row] = box.x1 + 0.3 * box.height
+        if row:
+            up = -1 if text.get_verticalalignment() == "top" else 1
+            text.xyann = (0, text.xyann[1] + up * 8.0)
 
 
 def _boxes(figure: Figure, plot: Plot) -> list[Axes]:
@@ -156,6 +182,9 @@ def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
     axes.set_ylim(
         None if low is None else low * factor, None if high is None else high * factor
     )
+    if high is None and low is not None and not panel.log:
+        bottom, top = axes.get_ylim()  # its margin is of the data, which may be flat
+        axes.set_ylim(bottom, top + 0.04 * (top - bottom))
     axes.set_ylabel(_math(text))
     if panel.blank:
         axes.yaxis.label.set(rotation=0, ha="right", va="center")
@@ -241,7 +270,7 @@ def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None
             text, (at, value), (0, (3 if beside else 6) * up),
             textcoords="offset points", ha="center",
             va="bottom" if up > 0 else "top", size=7.5 if beside else 7,
-            color=colour if beside else QUIET.light,
+            color=colour if beside else QUIET.light, gid=BESIDE if beside else None,
         )  # fmt: skip
 
 

@@ -1,0 +1,34 @@
+"""What a figure shows: margins, and texts that do not run into each other."""
+
+import numpy as np
+import pytest
+
+from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.report.canvas import draw
+
+
+def axes(*series, **panel):
+    panels = (Panel(label="Ratio", unit="", series=series, **panel),)
+    plot = Plot(name="x", caption="x.", x_label="Gap", x_unit="s", panels=panels)
+    return draw(plot, "x").axes[0]
+
+
+def test_a_flat_row_of_points_stands_clear_of_the_upper_end():
+    joined = Series(x=[0, 1], y=[0.87, 0.88], mark="joined")
+    low, high = axes(joined, limits=(0.0, None)).get_ylim()
+    assert low == 0
+    assert high > 0.88 * 1.03
+
+
+@pytest.mark.parametrize("apart", [0.01, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("level", [0.1, -0.1])
+def test_labels_of_trials_close_together_can_be_read(apart, level):
+    x = np.arange(12) * apart
+    texts = tuple(f"{at:g} s, press {n}" for n, at in enumerate(x))
+    labels = Series(x=x, y=np.full(12, level), mark="text", texts=texts)
+    span = Series(x=[0.0, 40.0], y=[0.0, level], mark="line")
+    shown = [text for text in axes(span, labels).texts if text.get_visible()]
+    boxes = [text.get_window_extent() for text in shown]
+    assert boxes
+    for n, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:n])
