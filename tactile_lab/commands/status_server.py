@@ -1,8 +1,9 @@
 """How a run goes, for other programs: JSON lines over TCP, and their stop taken.
 
 Off unless asked for. Each line out is one object with a key `event` (docs/json.md);
-one line in is heeded, ``{"do": "stop"}``. A program that does not read is let go of,
-and none can hold up the run: events wait in a thread of this server's own.
+one line in is heeded, ``{"do": "stop"}``. A program that does not read, or never stops
+talking, is let go of, and only so many may watch: none can hold up the run or take its
+files. Events wait in a thread of this server's own.
 """
 
 from __future__ import annotations
@@ -25,6 +26,12 @@ if TYPE_CHECKING:
 
 UNREAD = 1 << 20
 """Bytes that may wait for a program before it is let go of."""
+
+MOST_PROGRAMS = 16
+"""Programs that may watch at once; one more is refused."""
+
+MOST_LINES = 100
+"""Lines that one program may send before it is let go of."""
 
 LONGEST_LINE = 4096
 """Bytes of a line in; a program that sends a longer one is let go of."""
@@ -60,7 +67,9 @@ class StatusServer:
         self._loop = asyncio.new_event_loop()
         try:
             self._server = self._loop.run_until_complete(
-                asyncio.start_server(self._serve, host, port, limit=LONGEST_LINE)
+                asyncio.start_server(
+                    self._serve, host, port, limit=LONGEST_LINE, backlog=MOST_PROGRAMS
+                )
             )
         except OSError as reason:
             self._loop.close()
@@ -126,11 +135,19 @@ class StatusServer:
     async def _serve(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
+        if len(self._clients) >= MOST_PROGRAMS:
+            text = f"{MOST_PROGRAMS} programs watch already"
+            writer.write(_line({"event": "refused", "text": text}))
+            writer.close()
+            return
         for told in self._newest.values():
             writer.write(_line(told))
         self._clients.add(writer)
         try:
-            while line := await reader.readline():
+            for _ in range(MOST_LINES):
+                line = await reader.readline()
+                if not line or writer.transport.is_closing():
+                    break
                 writer.write(_line(self._answered(line)))
         except (ValueError, OSError):  # too long a line, or gone
             pass

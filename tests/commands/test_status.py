@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.acquisition import events
-from tactile_lab.commands.status_server import UNREAD, StatusServer
+from tactile_lab.commands.status_server import MOST_PROGRAMS, UNREAD, StatusServer
 from tactile_lab.errors import SceneError
 
 HOW_TO = Path(__file__).parents[2] / "docs/how-to/work-with-other-programs.md"
@@ -130,3 +130,35 @@ def test_nothing_of_it_is_loaded_unless_asked(tmp_path):
         "assert 'tactile_lab.commands.status_server' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", source], check=True, capture_output=True)
+
+
+def test_so_many_programs_may_watch_and_a_place_becomes_free(server):
+    links = [connected(server) for _ in range(MOST_PROGRAMS)]
+    for link in links:
+        link.sendall(b"are you there\n")
+        assert link.recv(4096)
+    with connected(server) as late, late.makefile() as lines:
+        told = [json.loads(line) for line in lines]
+    assert [one["event"] for one in told] == ["refused"]
+    assert f"{MOST_PROGRAMS} programs" in told[0]["text"]
+    links[0].close()
+    while True:  # its place is free once the server has noticed
+        with connected(server) as link, link.makefile() as lines:
+            link.sendall(b'{"do": "start"}\n')
+            if "programs" not in json.loads(next(lines))["text"]:
+                break
+    for link in links:
+        link.close()
+
+
+def test_one_that_never_stops_talking_is_let_go_of(server, capfd):
+    flood = b'{"do": "nothing"}\n' * 100_000
+    with connected(server) as link:
+        with pytest.raises(OSError, match=r"reset|pipe"):
+            while True:
+                link.sendall(flood)
+    server.tell("state", state="running", text="on")
+    with connected(server) as other, other.makefile() as lines:
+        assert json.loads(next(lines))["text"] == "on"
+    server.close()
+    assert capfd.readouterr().err == ""
