@@ -162,6 +162,21 @@ def numbers_of(c: Any, direct: bool, par: FloatArray) -> float:
 
 
 @inner
+def begun(
+    V_P: float, y: float, v: float, node: FloatArray, S: FloatArray, counts: Any
+) -> None:
+    """Set the kernel's state to these voltages, V, before the first spike."""
+    node[:] = 0.0
+    node[kernel.Y] = y
+    node[kernel.V_P] = node[kernel.V_P_HIGHEST] = V_P
+    S[:] = 0.0
+    S[spiking.VOLTAGE], S[spiking.RESUME] = v, -1.0
+    S[spiking.LAST] = S[spiking.PREVIOUS] = -np.inf
+    S[spiking.SHORTEST] = np.inf
+    counts[:] = 0
+
+
+@inner
 def train(
     c: Any,
     k_F: float,
@@ -188,14 +203,7 @@ def train(
         y, v = rest_of_cascade(par)
         if v >= c.fire_voltage:
             v = c.reset_voltage
-    node[:] = 0.0
-    node[kernel.Y] = y
-    node[kernel.V_P] = node[kernel.V_P_HIGHEST] = V_P
-    S[:] = 0.0
-    S[spiking.VOLTAGE], S[spiking.RESUME] = v, -1.0
-    S[spiking.LAST] = S[spiking.PREVIOUS] = -np.inf
-    S[spiking.SHORTEST] = np.inf
-    counts[:] = 0
+    begun(V_P, y, v, node, S, counts)
     status, _rows_0, _rows_1, _rows_2, spikes = kernel.run(
         time, force, 0.0, force[0], until, k_F, par, node, S, counts,
         tolerance, True, True, keep_times, False, False, most,

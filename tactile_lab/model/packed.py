@@ -27,7 +27,8 @@ def fill(
 ) -> None:
     """Put a circuit's numbers into `par`, as the compiled functions want them.
 
-    Compiled code calls it, too: with one record of many circuits (see `batch`).
+    T1 does not saturate unless the caller says so afterwards. Compiled code calls it,
+    too: with one record of many circuits (see `batch`).
     """
     drop = c.I_T1s * c.R3
     par[node_a.V_T] = c.V_T
@@ -58,3 +59,4 @@ def fill(
     par[transistor.E_LOG] = math.log(a) + par[integrator.T1_LOG]
     par[transistor.PER_F], par[transistor.PER_R] = 1 / c.beta_F, 1 / c.beta_R
     par[transistor.T1_C1], par[transistor.T1_C2] = c.C1, c.C2
+    par[transistor.SATURATES] = 0.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -109,15 +111,13 @@ class EventWriter:
         partial.replace(self._path)
 
 
-class _recording:  # noqa: N801
-    """Turns a failing disk into an error of the tree."""
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: Any, where: Any) -> None:
-        if isinstance(error, OSError):
-            raise RecordingError(f"The events cannot be written: {error}.") from error
+@contextmanager
+def _recording() -> Iterator[None]:
+    """Turn a failing disk into an error of the tree."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(f"The events cannot be written: {error}.") from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model import kernel, spiking
-from tactile_lab.model.batch import appended, numbers_of, train
+from tactile_lab.model import coupled, kernel, spiking
+from tactile_lab.model.batch import appended, begun, numbers_of, train
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
-from tactile_lab.model.integrator import Y_CRITICAL
-from tactile_lab.model.node_a import TAU, B_at, V_P_at, equilibrium
-from tactile_lab.model.transistor import ALL_PARAMETERS
+from tactile_lab.model.integrator import TAU_L, V_FIRE, Y_CRITICAL, Q_at
+from tactile_lab.model.node_a import LAMBDA, TAU, B_at, V_P_at, equilibrium
+from tactile_lab.model.rest_pair import rest_of_both
+from tactile_lab.model.transistor import (
+    ALL_PARAMETERS,
+    I_S1,
+    PER_F,
+    PER_R,
+    SATURATES,
+    T1_C1,
+    T1_C2,
+)
 from tactile_lab.skin.forces import SOURCES, force_on, thinned
 
 FIRED, SILENT, UNTOUCHED, DEAD, STUCK, REFUSED = range(6)
@@ -44,12 +53,45 @@ def surely_silent(
     """Whether V_C1 cannot come down to where V_C2 would reach V_fire.
 
     V_C1 starts at its equilibrium, and is never below the lowest equilibrium so far.
+    A T1 that saturates can pull it down by its leakage I_T1s alone, and brings C2 no
+    more than I_T1s (1 + 1/beta_R) beyond Eq. (17).
     """
     V = highest_V_P(time, force, k_F, par[TAU])
-    return bool(equilibrium(B_at(V, par), par) > par[Y_CRITICAL] + NEAR)
+    lowest = equilibrium(B_at(V, par), par) - NEAR
+    if par[SATURATES] == 0.0:
+        return bool(lowest > par[Y_CRITICAL])
+    lowest -= par[I_S1] * (par[PER_F] + par[PER_R]) / (par[T1_C1] * par[LAMBDA])
+    more = par[I_S1] * (1.0 + par[PER_R]) * par[TAU_L] / par[T1_C2]
+    return bool(Q_at(lowest, par) + more < par[V_FIRE])
 
 
-def _build(stamp: int) -> Callable[..., Any]:
+@inner
+def train_of_both(
+    c: Any,
+    k_F: float,
+    time: FloatArray,
+    force: FloatArray,
+    until: float,
+    tolerance: float,
+    most: float,
+    par: FloatArray,
+    node: FloatArray,
+    S: FloatArray,
+    counts: Any,
+) -> Any:
+    """As `batch.train` from the equilibrium, where T1 saturates."""
+    y, v = rest_of_both(par)
+    if v >= c.fire_voltage:
+        v = c.reset_voltage
+    begun(0.0, y, v, node, S, counts)
+    status, _rows_0, _rows_1, _rows_2, spikes = coupled.run(
+        time, force, 0.0, force[0], until, k_F, par, node, np.zeros(3), S, counts,
+        tolerance, True, False, False, most,
+    )  # fmt: skip
+    return status, spikes
+
+
+def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
     @entry
     def run(
         many: Any,
@@ -95,13 +137,19 @@ def _build(stamp: int) -> Callable[..., Any]:
             pieces[i] = thinned(t, F, 0.5 * force_error)
             t, F = t[: pieces[i]], F[: pieces[i]]
             k_F = numbers_of(many[i], direct, par)
+            par[SATURATES] = 1.0 if saturates else 0.0
             if surely_silent(t, F, k_F, par):
                 role[i] = UNTOUCHED
                 continue
-            status, found = train(
-                many[i], k_F, rest, t, F, until, tolerance, True, most, par, node, S,
-                counts,
-            )  # fmt: skip
+            if saturates:
+                status, found = train_of_both(
+                    many[i], k_F, t, F, until, tolerance, most, par, node, S, counts
+                )
+            else:
+                status, found = train(
+                    many[i], k_F, rest, t, F, until, tolerance, True, most, par, node,
+                    S, counts,
+                )  # fmt: skip
             if status != kernel.DONE:
                 role[i] = REFUSED
                 continue
@@ -115,4 +163,5 @@ def _build(stamp: int) -> Callable[..., Any]:
     return run
 
 
-run = _build(source_stamp(*SOURCES, Path(__file__)))
+_stamp = source_stamp(*SOURCES, Path(__file__))
+run, run_saturating = _build(_stamp, False), _build(_stamp, True)

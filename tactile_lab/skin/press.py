@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import time as wall
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,19 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import ParameterError, SolverError
-from tactile_lab.model.batch import Records, certain, records
+from tactile_lab.errors import ParameterError, TactileLabError
+from tactile_lab.model.batch import certain, records
 from tactile_lab.model.circuit import (
     LARGEST_VOLTAGE,
     SUBTHRESHOLD_LIMIT,
-    FloatArray,
 )
-from tactile_lab.model.solver import MOST_SPIKES
+from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.model.specimen import parts
 from tactile_lab.quantity import show
 from tactile_lab.skin import kernel
 from tactile_lab.skin.events import FILE, EventWriter
 from tactile_lab.skin.forces import Loads
+from tactile_lab.skin.single import simulate_taxel
 from tactile_lab.skin.skin import Skin
 
 BLOCK = 64
@@ -56,18 +57,6 @@ class Pressed:
     warnings: tuple[str, ...]
 
 
-def specimens(skin: Skin, taxels: NDArray[np.int64]) -> Records:
-    """The circuits of these taxels, each its own specimen where the array is spread."""
-    if not skin.array.spread:
-        return np.repeat(records(skin.circuit, {}), taxels.size)
-    return records(skin.circuit, parts(skin.circuit, first_specimen(skin) + taxels))
-
-
-def first_specimen(skin: Skin) -> int:
-    """The number of the specimen that taxel 0 is; the others follow."""
-    return 1 + skin.seed * (1 << 24)
-
-
 def press(
     skin: Skin,
     folder: Path,
@@ -84,6 +73,7 @@ def press(
         tell: is told how many taxels are done.
 
     Raises:
+        ParameterError: the parts of a taxel make no circuit.
         SolverError: a taxel cannot be solved to the tolerance.
         RecordingError: the events cannot be written.
     """
@@ -96,8 +86,8 @@ def press(
     role[skin.array.named(skin.array.stuck)] = kernel.STUCK
     count, largest = np.zeros(size, np.int64), np.zeros(size)
     worst, pieces = 0.0, 0
-    blocks = deque(range(0, size, BLOCK))
-    waiting: deque[tuple[int, Future[Any]]] = deque()
+    blocks = deque(slice(k, min(k + BLOCK, size)) for k in range(0, size, BLOCK))
+    waiting: deque[tuple[slice, Future[Any]]] = deque()
     folder.mkdir(parents=True, exist_ok=True)
     with (
         EventWriter(folder / FILE, skin.duration) as writer,
@@ -105,20 +95,19 @@ def press(
     ):
         while blocks or waiting:
             while blocks and len(waiting) < AHEAD * cores:
-                first = blocks.popleft()
-                part = slice(first, min(first + BLOCK, size))
-                waiting.append((first, pool.submit(_block, skin, loads, part, role)))
-            first, future = waiting.popleft()
-            part = slice(first, min(first + BLOCK, size))
+                part = blocks.popleft()
+                waiting.append(
+                    (part, pool.submit(_block, skin, loads, part, role[part]))
+                )
+            part, future = waiting.popleft()
             try:
                 count[part], found, largest[part], error, times = future.result()
-                _refuse(skin, role[part], largest[part], first)
             except BaseException:
                 for _, other in waiting:
                     other.cancel()
                 raise
             worst, pieces = max(worst, float(error.max())), pieces + int(found.sum())
-            writer.add(first, count[part], times)
+            writer.add(part.start, count[part], times)
             tell(part.stop)
         names = ("fired", "silent", "left out", "dead", "stuck")
         told = {name: int((role == k).sum()) for k, name in enumerate(names)}
@@ -136,40 +125,52 @@ def press(
                 "title": skin.title,
                 "duration_s": skin.duration,
                 "taxels": told,
-                "specimen": first_specimen(skin) if skin.array.spread else None,
+                "specimen": skin.first_specimen or None,
                 "error_s": worst,
                 "pieces": pieces,
-                "skin": _plain(skin.source),
+                "skin": skin.source,
             },
         )
     return Pressed(int(count.sum()), told, worst, seconds, warnings(skin, most))
 
 
 def _block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) -> Any:
-    array = skin.array
+    """Numbers of spikes and pieces, forces, errors, spikes; fills `role` in."""
+    array, circuit = skin.array, skin.circuit
     taxels = np.arange(part.start, part.stop)
-    many = specimens(skin, taxels)
-    refused = ~certain(skin.circuit, many, None)
-    role[part][refused] = kernel.REFUSED
-    return kernel.run(
-        many, skin.circuit.t1 == "direct", role[part], array.stuck_rate,
+    first = skin.first_specimen
+    many = (
+        records(circuit, parts(circuit, first + taxels))
+        if first
+        else np.repeat(records(circuit, {}), taxels.size)
+    )
+    for taxel in taxels[~certain(circuit, many, None)]:
+        with _saying(f"Taxel {taxel}"):
+            skin.circuit_of(int(taxel))
+    run = kernel.run_saturating if circuit.saturation else kernel.run
+    found = run(
+        many, circuit.t1 == "direct", role, array.stuck_rate,
         array.places[part], array.depth, array.side**2, loads.time, loads.rows,
         loads.owner, loads.courses, loads.framed(part),
-        skin.force_error, skin.duration, skin.tolerance, MOST_SPIKES,
+        skin.force_error, skin.duration, skin.tolerance,
+        MOST_COUPLED if circuit.saturation else MOST_SPIKES,
     )  # fmt: skip
+    refused = taxels[role == kernel.REFUSED]
+    if refused.size:
+        taxel = int(refused[0])
+        force = show(float(found[2][taxel - part.start]), "N")
+        with _saying(f"Taxel {taxel}, pressed with up to {force}"):
+            simulate_taxel(skin, taxel)
+    return found
 
 
-def _refuse(
-    skin: Skin, role: NDArray[np.uint8], largest: FloatArray, first: int
-) -> None:
-    bad = np.flatnonzero(role == kernel.REFUSED)
-    if not bad.size:
-        return
-    taxel, force = first + int(bad[0]), show(float(largest[bad[0]]), "N")
-    raise SolverError(
-        f"Taxel {taxel}, pressed with up to {force}, cannot be solved to "
-        f"{skin.tolerance:g} s; press less, or check the [sensor]."
-    )
+@contextmanager
+def _saying(which: str) -> Iterator[None]:
+    """Tell in an error which taxel it is about."""
+    try:
+        yield
+    except TactileLabError as reason:
+        raise type(reason)(f"{which}: {reason}") from reason
 
 
 def highest(skin: Skin) -> tuple[float, tuple[str, ...]]:
@@ -204,9 +205,3 @@ def warnings(skin: Skin, most: float) -> tuple[str, ...]:
         f"{show(limit, 'N')} leaves the exponential law of Eq. (1), and I_DS is "
         "overestimated there.",
     )
-
-
-def _plain(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _plain(value) for key, value in data.items()}
-    return [_plain(v) for v in data] if isinstance(data, list | tuple) else data

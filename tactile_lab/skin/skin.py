@@ -11,8 +11,9 @@ import numpy as np
 from pydantic import Field
 
 from tactile_lab.complaint import validated
-from tactile_lab.errors import SceneError, choices
+from tactile_lab.errors import ParameterError, SceneError, choices
 from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.specimen import specimen
 from tactile_lab.quantity import Duration, Unit
 from tactile_lab.scene.load import read_toml, tuples
 from tactile_lab.scene.sensor import Sensor, with_preset
@@ -76,6 +77,25 @@ class Skin:
         times = np.unique(np.concatenate([*ends, *found]))
         return times[(times >= 0) & (times <= self.duration)]
 
+    @property
+    def first_specimen(self) -> int:
+        """The number of the specimen that taxel 0 is; 0 where all are as marked."""
+        return 1 + self.seed * (1 << 24) if self.array.spread else 0
+
+    def circuit_of(self, taxel: int) -> Circuit:
+        """The circuit of one taxel, a specimen of its own where the array is spread.
+
+        Raises:
+            ParameterError: there is no such taxel, or its parts make no circuit.
+        """
+        if not 0 <= taxel < self.array.size:
+            raise ParameterError(
+                f"Taxel {taxel} does not exist; they are numbered 0 to "
+                f"{self.array.size - 1}."
+            )
+        first = self.first_specimen
+        return specimen(self.circuit, first + taxel if first else 0)
+
 
 def load_skin(
     skin: str | Path | Mapping[str, Any],
@@ -110,11 +130,6 @@ def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
     sensor = validated(Sensor, given, ("sensor",), blame)
     if sensor.start != "equilibrium":
         raise SceneError(f"{origin}: [sensor] start: taxels start at equilibrium.")
-    if sensor.circuit.saturation:
-        raise SceneError(
-            f"{origin}: [sensor] saturation = true: arrays are computed with the "
-            "cascade of Eqs. (16) to (18) only; leave it out."
-        )
     stimuli: list[Stimulus] = []
     frames: list[Frames] = []
     for number, one in enumerate(table.stimulus):

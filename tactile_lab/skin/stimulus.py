@@ -123,22 +123,47 @@ def _rows(kind: int, *columns: ArrayLike) -> FloatArray:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere(Stimulus):
-    """``kind = "sphere"``: a rigid ball, Hertz's contact.
+class ForceStimulus(Stimulus):
+    """What presses with a force.
 
     Attributes:
-        force: N.
-        radius: m.
+        force: N, on each of its contacts.
     """
 
-    kind: ClassVar[str] = "sphere"
     force: Strength = 1.0
-    radius: Length = 5e-3
 
     @property
     def strength(self) -> float:
         """N."""
         return self.force
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureStimulus(Stimulus):
+    """What presses with a pressure.
+
+    Attributes:
+        pressure: Pa.
+    """
+
+    pressure: Pressure = 50e3
+
+    @property
+    def strength(self) -> float:
+        """Pa."""
+        return self.pressure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere(ForceStimulus):
+    """``kind = "sphere"``: a rigid ball, Hertz's contact.
+
+    Attributes:
+        radius: m.
+    """
+
+    kind: ClassVar[str] = "sphere"
+    radius: Length = 5e-3
 
     def loads(self, array: Array) -> FloatArray:
         """One ball."""
@@ -146,22 +171,15 @@ class Sphere(Stimulus):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Punch(Stimulus):
+class Punch(ForceStimulus):
     """``kind = "punch"``: a rigid cylinder with a flat end.
 
     Attributes:
-        force: N.
         radius: m.
     """
 
     kind: ClassVar[str] = "punch"
-    force: Strength = 1.0
     radius: Length = 2e-3
-
-    @property
-    def strength(self) -> float:
-        """N."""
-        return self.force
 
     def loads(self, array: Array) -> FloatArray:
         """One punch."""
@@ -169,11 +187,10 @@ class Punch(Stimulus):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Grating(Stimulus):
+class Grating(PressureStimulus):
     """``kind = "grating"``: parallel ridges of even pressure; one of them is an edge.
 
     Attributes:
-        pressure: on a ridge, Pa.
         ridge: width of a ridge, m.
         spacing: from a ridge to the next, m.
         ridges: number of them.
@@ -181,7 +198,6 @@ class Grating(Stimulus):
     """
 
     kind: ClassVar[str] = "grating"
-    pressure: Pressure = 50e3
     ridge: Length = 1e-3
     spacing: Length = 2e-3
     ridges: Annotated[int, Field(ge=1, le=10_000)] = 20
@@ -195,11 +211,6 @@ class Grating(Stimulus):
                 "apart overlap: spacing goes from one ridge to the next"
             )
 
-    @property
-    def strength(self) -> float:
-        """Pa."""
-        return self.pressure
-
     def loads(self, array: Array) -> FloatArray:
         """A strip each."""
         middle = self.spacing * (np.arange(self.ridges) - (self.ridges - 1) / 2)
@@ -209,19 +220,17 @@ class Grating(Stimulus):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Texture(Stimulus):
+class Texture(PressureStimulus):
     """``kind = "texture"``: a plate whose pressure is a random, isotropic pattern.
 
     Attributes:
-        pressure: mean, Pa.
-        roughness: standard deviation of the pressure, a part of its mean; above 0.3 it
-            would pull here and there.
+        roughness: standard deviation of the pressure, a part of its mean,
+            `pressure`; above 0.3 it would pull here and there.
         longest, shortest: wave lengths, m.
         seed: of the pattern.
     """
 
     kind: ClassVar[str] = "texture"
-    pressure: Pressure = 50e3
     roughness: Annotated[float, Field(gt=0, le=0.3)] = 0.2
     longest: Length = 10e-3
     shortest: Length = 1e-3
@@ -235,11 +244,6 @@ class Texture(Stimulus):
                 f"shortest = {show(self.shortest, 'm')} is longer than longest = "
                 f"{show(self.longest, 'm')}"
             )
-
-    @property
-    def strength(self) -> float:
-        """Pa."""
-        return self.pressure
 
     def loads(self, array: Array) -> FloatArray:
         """Waves of equal size, their lengths spread evenly on a logarithmic scale."""
@@ -256,12 +260,11 @@ class Texture(Stimulus):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Braille(Stimulus):
+class Braille(ForceStimulus):
     """``kind = "braille"``: the dots of a text; the middle of its cells is at `at`.
 
     Attributes:
         text: letters a to z, digits and spaces.
-        force: on each dot, N.
         radius: of a dot's flat top, m.
         dot_pitch: between the dots of a cell, m.
         cell_pitch: from a cell to the next, m; both as in European signs (EN 15823).
@@ -277,11 +280,6 @@ class Braille(Stimulus):
     def __post_init__(self) -> None:
         super().__post_init__()
         dots(self.text)  # refuses what has none
-
-    @property
-    def strength(self) -> float:
-        """N on each dot."""
-        return self.force
 
     def loads(self, array: Array) -> FloatArray:
         """A flat punch for each dot."""

@@ -66,8 +66,6 @@ def test_a_stimulus_that_cannot_be_is_refused(stimulus, why):
 
 
 def test_what_arrays_cannot_do_is_said():
-    with pytest.raises(SceneError, match="saturation"):
-        skin(sensor={"saturation": True})
     with pytest.raises(SceneError, match="start"):
         skin(sensor={"start": {"V_P": "0 V", "V_C1": "0 V", "V_C2": "0 V"}})
 

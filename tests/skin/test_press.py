@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from tactile_lab.cli import cli as command_line
-from tactile_lab.errors import ParameterError, RunFolderError
+from tactile_lab.errors import ParameterError, RunFolderError, SolverError
 from tactile_lab.skin import kernel
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
@@ -44,6 +44,44 @@ def test_every_taxel_fires_as_it_would_alone_to_the_last_bit(pressed):
         assert np.array_equal(events.train(taxel), alone), taxel
     assert events.train(44).size == 0
     assert events.train(0) == pytest.approx(np.arange(1, 11) / 10)
+
+
+@pytest.mark.parametrize("preset", ["table1", "fig5b"])
+@pytest.mark.parametrize(
+    "more", [{}, {"firing": "put"}, {"t1": "direct", "I_T1s": "2.873e-20 A"}]
+)
+def test_where_t1_saturates_a_taxel_is_what_it_is_alone(preset, more, tmp_path):
+    skin = load_skin(
+        {
+            "duration": "0.5 s" if "t1" not in more else "10 ms",
+            "sensor": {"preset": preset, "saturation": True, **more},
+            "array": {"grid": [3, 4]},
+            "stimulus": [
+                {"kind": "sphere", "force": "2 N", "ramp": "20 ms"},
+                {"kind": "punch", "force": "0.2 N", "speed": "20 mm/s"},
+            ],
+        }
+    )
+    done = press(skin, tmp_path)
+    events = Events.read(tmp_path)
+    for taxel in range(skin.array.size):
+        alone = simulate_taxel(skin, taxel).spike_times
+        assert np.array_equal(events.train(taxel), alone), taxel
+    assert done.events > 0
+
+
+def test_a_taxel_whose_parts_make_no_circuit_is_refused_with_the_reason(tmp_path):
+    near = {"V_fire": "0.58 V", "V_reset": "0.578 V"}
+    skin = load_skin({**SLIDE, "sensor": {"preset": "fig5b", **near}})
+    with pytest.raises(ParameterError, match=r"Taxel \d+: V_reset .* must be below"):
+        press(skin, tmp_path)
+
+
+def test_what_the_solver_refuses_of_a_taxel_is_said_as_for_it_alone(tmp_path):
+    fast = {"t1": "direct", "C2": "0.1 fF"}
+    skin = load_skin({**SLIDE, "sensor": {"preset": "fig5b", **fast}})
+    with pytest.raises(SolverError, match=r"Taxel 1, pressed with .*More than"):
+        press(skin, tmp_path)
 
 
 def test_events_are_in_order_and_the_same_on_any_cores(pressed, tmp_path):
