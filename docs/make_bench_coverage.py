@@ -60,12 +60,14 @@ class Truth:
     Attributes:
         circuit: with its true parameters.
         force: on the run's time axis, N.
+        scale: of the force over that believed.
         field: of the electromagnet per current, T/A, and to either side of it the
             width of the core's loop, A.
     """
 
     circuit: Circuit
     force: Waveform
+    scale: float
     field: tuple[float, float]
 
 
@@ -155,7 +157,7 @@ def bipolar(run: RunData, values: dict[str, Any], true: Truth) -> Told:
         yield from around(
             f"I_DS per force, {sign}", change["sensitivity_A_per_N"],
             change["sensitivity_uncertainty_A_per_N_95"],
-            (after - before) / (change["level_N"] * force_scale(run, true)),
+            (after - before) / (change["level_N"] * true.scale),
         )  # fmt: skip
 
 
@@ -166,18 +168,11 @@ def at_rest(circuit: Circuit, V_P: float) -> float:
     return float(I_DS(circuit, V_P, rest_V_C1(circuit, V_P)))
 
 
-def force_scale(run: RunData, true: Truth) -> float:
-    """True over believed force."""
-    at = run.force.time[int(np.argmax(np.abs(run.force.value)))] + 1e-3
-    return float(true.force.at(at) / run.force.at(at))
-
-
 def sine_sweep(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """Gain and phase of each frequency, the truth by a long sine."""
     from tactile_lab.analysis.response import gain
 
-    scale = force_scale(run, true)
-    amplitude = run.protocol.amplitude * scale
+    amplitude = run.protocol.amplitude * true.scale
     for found in values.get("V_C1_over_force", ()):
         f = found["frequency_Hz"]
         cycles = max(8, int(100 * f) + 1)
@@ -215,9 +210,7 @@ def rate_force(run: RunData, values: dict[str, Any], true: Truth) -> Told:
         charging=Charging(true.circuit),
     )  # fmt: skip
     yield from of("V_GS", values.get("rate_law_V_GS_V"), true.circuit.V_GS)
-    yield from of(
-        "force over stated", values.get("rate_law_scale"), force_scale(run, true)
-    )
+    yield from of("force over stated", values.get("rate_law_scale"), true.scale)
     for which, found in zip(
         ("least", "largest"), values.get("slopes") or (), strict=False
     ):
@@ -353,7 +346,7 @@ def repeat(name: str, seed: int) -> dict[str, Any]:
     assert believed is not None
     circuit, force = believed.deviating(deviation)
     field = believed.magnet.B2_per_ampere, core
-    true = Truth(circuit, force, field)
+    true = Truth(circuit, force, 1 + deviation.force, field)
     told: list[tuple[str, float, float, float, float]] = []
     refused = ""
     try:

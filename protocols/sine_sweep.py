@@ -244,6 +244,7 @@ def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
     """Gain of V_C1 over the force, V/N, for each trial named by a frequency."""
     trace, found = run.trace("V_C1", model=model), []
     steps = 0.0 if model else run.step_bias("V_C1")
+    code = None if trace is None or model else trace.code
     leak = None if run.circuit is None else run.circuit.tau
     for trial in run.results:
         if trace is None or trial.held is None or run.left_range("V_C1", *trial.held):
@@ -253,7 +254,7 @@ def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
         force = _averaged(run.force, time)
         try:
             frequency = parse(trial.label, "Hz")
-            answer = gain(time, force, trace.mean[inside], frequency, steps, leak)
+            answer = gain(time, force, trace.mean[inside], frequency, steps, code, leak)
         except (QuantityError, NotIdentifiableError):
             continue  # another trial, or one that was cut short
         found.append(answer if model else _known(run, trial, answer))

@@ -6,13 +6,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.estimate import Estimate, correlated
 from tactile_lab.errors import NotIdentifiableError
 
-HARMONICS = 3
-"""So many harmonics of the answer are told apart from noise."""
+FloatArray = NDArray[np.float64]
+
+HARMONICS = 6
+"""So many harmonics of the answer are told apart from noise, with points enough."""
+NOT_YET = 3.0
+"""A cause so many times further from its sine than later on is not yet on it."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +42,13 @@ def gain(
     answer: ArrayLike,
     frequency: float,
     step_bias: float = 0.0,
+    code: float | None = None,
     leak: float | None = None,
 ) -> Gain:
     """Gain and phase at `frequency`, the answer's harmonics and slow drift allowed for.
+
+    A cause that comes onto its sine late, as a coil's force does, is looked at from
+    then on: what it did before, a transient would be taken for.
 
     Args:
         time: s, at least one cycle.
@@ -51,6 +59,8 @@ def gain(
             unit (`tactile_lab.analysis.converter`). They move a sine's amplitude A by
             2/pi b sqrt(step/A), b = step/pi where no noise smooths them (the first of a
             sum of Bessel functions), and its phase not at all.
+        code: one step of that converter, in the answer's unit; what is left of the
+            steps repeats with it and is no scatter either.
         leak: time constant with which a transient dies away, s; fitted if given.
 
     Intervals hold the scatter of the answer, correlated as it is, and the steps. What
@@ -64,27 +74,37 @@ def gain(
         raise NotIdentifiableError(
             f"less than one cycle or too few points at {frequency:g} Hz"
         )
+    given_by, answered = np.asarray(cause), np.asarray(answer)
+    begun = _begun(t, given_by, frequency)
+    t, given_by, answered = t[begun:], given_by[begun:], answered[begun:]
     phase = 2 * np.pi * frequency * t
     slow = (t - t.mean()) / (t[-1] - t[0])
-    waves = [f(n * phase) for n in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
+    harmonics = min(HARMONICS, max(1, t.size // 12))
+    waves = [f(n * phase) for n in range(1, harmonics + 1) for f in (np.sin, np.cos)]
     drift = [np.ones_like(t), slow, slow**2]
     if leak is not None:
         drift.append(np.exp((t[0] - t) / leak))
     design = np.column_stack([*waves, *drift])
     inverse = np.linalg.pinv(design)
-    into, out = inverse @ np.asarray(cause), inverse @ np.asarray(answer)
+    into, out = inverse @ given_by, inverse @ answered
     given, got = complex(into[0], into[1]), complex(out[0], out[1])
     if abs(given) < 1e-12:
         raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
-    left = np.asarray(answer) - design @ out
+    left = answered - design @ out
+    beside: list[FloatArray] = []
     # what the cause does beside its sine, such as a source's steps, is no scatter: the
     # answer follows it, a little late
-    steps = np.asarray(cause) - design @ into
-    late = np.gradient(steps)
-    beside = np.column_stack([steps, late - design @ (inverse @ late)])
-    if np.abs(beside).max() > 1e-9 * abs(given):
-        left -= beside @ (np.linalg.pinv(beside) @ left)
-    freedom = t.size - design.shape[1] - beside.shape[1]
+    steps = given_by - design @ into
+    if np.abs(steps).max() > 1e-9 * abs(given):
+        beside += [steps, np.gradient(steps)]
+    if code:
+        turn = 2 * np.pi * (design @ out) / code
+        beside += [np.sin(turn), np.cos(turn)]
+    if beside:
+        known = np.column_stack(beside)
+        known -= design @ (inverse @ known)
+        left -= known @ (np.linalg.pinv(known) @ left)
+    freedom = t.size - design.shape[1] - len(beside)
     alike = correlated(left)
     scatter = math.sqrt(float(np.sum(left**2)) / max(freedom, 1))
     error = scatter * math.sqrt(alike * float(np.sum(inverse[0] ** 2)))
@@ -99,3 +119,14 @@ def gain(
         Estimate.of(float(np.angle(ratio)), error / size, free),
         abs(given),
     )
+
+
+def _begun(time: FloatArray, cause: FloatArray, frequency: float) -> int:
+    """The first point from which the cause is on the sine of its second half."""
+    phase = 2 * np.pi * frequency * time
+    sine = np.column_stack([np.sin(phase), np.cos(phase), np.ones_like(time)])
+    half = time.size // 2
+    away = np.abs(cause - sine @ (np.linalg.pinv(sine[half:]) @ cause[half:]))
+    usual = float(np.sqrt(np.mean(away[half:] ** 2)))
+    not_yet = np.flatnonzero(away[:half] > NOT_YET * usual + 1e-9 * np.ptp(cause))
+    return int(not_yet[-1]) + 1 if not_yet.size else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -98,6 +99,8 @@ class StoredRun:
     def refresh(self) -> None:
         """See what a living writer has added since."""
         self.info = read_info(self.path)
+        for name in ("applied", "force"):
+            vars(self).pop(name, None)
 
         def renew(name: str, node: Any) -> None:
             if isinstance(node, h5py.Dataset):
@@ -321,7 +324,7 @@ class StoredRun:
 
         return seen
 
-    @property
+    @cached_property
     def applied(self) -> AppliedCurrent:
         """What the source gave: levels as read back, edges by what the shunt saw.
 
@@ -338,7 +341,7 @@ class StoredRun:
             rows["listed"] if "listed" in (rows.dtype.names or ()) else False,
         )
 
-    @property
+    @cached_property
     def scene(self) -> Scene:
         """The resolved scene that was run.
 
@@ -349,7 +352,7 @@ class StoredRun:
 
         return load(self.path / SCENE)
 
-    @property
+    @cached_property
     def force(self) -> Waveform:
         """The force that the applied current gives by the run's calibration, N.
 
