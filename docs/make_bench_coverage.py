@@ -4,15 +4,15 @@ Each repeat is a whole run on the simulated bench, drivers, converter, clocks, l
 noise included. What bench and sensor file have wrong is drawn for each seed from the
 uncertainty that they state, so that the believed circuit is never the true one.
 
-Run by `make reports`, or alone: ``.venv/bin/python docs/make_bench_coverage.py``; with
-a number, that many repeats of each case instead of 1000, then words of the names of
-cases. It goes on where it was stopped; ``runs/bench-coverage.jsonl`` keeps what was
-done, and each case counts at the newest commit at which it was. ``--table`` only
-writes the page from it.
+Run by `make reports`, or alone (``--help``). It goes on where it was stopped:
+``runs/bench-coverage.jsonl`` keeps what was done. Each case counts at the newest commit
+at which it was measured, with ``--since`` at that commit and all later ones: whoever
+says so holds that nothing between them moved an interval, and the page names both ends.
 """
 
 from __future__ import annotations
 
+import argparse
 import datetime
 import json
 import subprocess
@@ -335,7 +335,7 @@ CASES = {
 
 def repeat(name: str, seed: int) -> dict[str, Any]:
     """One run of a case: name, value, low, high and truth of each number it told."""
-    case = CASES[name]
+    case, began = CASES[name], time.process_time()
     changes, deviation, core = drawn(case, seed)
     with tempfile.TemporaryDirectory() as scratch:
         done = Execution(
@@ -356,24 +356,36 @@ def repeat(name: str, seed: int) -> dict[str, Any]:
         refused = "" if told else "; ".join(findings.missing)
     except TactileLabError as reason:
         refused = str(reason)
-    return {"case": name, "seed": seed, "told": told, "refused": refused}
+    took = time.process_time() - began
+    return {"case": name, "seed": seed, "told": told, "refused": refused, "cpu": took}
 
 
-def commit() -> str:
-    """Of the checkout."""
-    asked = ["git", "rev-parse", "--short", "HEAD"]
+def git(*words: str) -> subprocess.CompletedProcess[str]:
+    """What git answers of this checkout."""
     return subprocess.run(
-        asked, cwd=DOCS, capture_output=True, text=True, check=False
-    ).stdout.strip()
+        ["git", *words], cwd=DOCS, capture_output=True, text=True, check=False
+    )
 
 
-def kept() -> list[dict[str, Any]]:
-    """What was done already: of each case at the newest commit only."""
+def kept(since: str = "") -> list[dict[str, Any]]:
+    """What was done already and counts, in the order in which it was done."""
     if not KEPT.exists():
         return []
     rows = [json.loads(line) for line in KEPT.read_text().splitlines()]
     newest = {row["case"]: row["commit"] for row in rows}
-    return [row for row in rows if row["commit"] == newest[row["case"]]]
+    if not since:
+        return [row for row in rows if row["commit"] == newest[row["case"]]]
+    later = {
+        one: git("merge-base", "--is-ancestor", since, one).returncode == 0
+        for one in {row["commit"] for row in rows}
+    }
+    once = {(r["case"], r["seed"]): r for r in rows if later[r["commit"]]}
+    return list(once.values())
+
+
+def ends(commits: list[str]) -> str:
+    """The first and the last of commits in order, or the one."""
+    return " to ".join(dict.fromkeys([commits[0], commits[-1]]))
 
 
 def table(rows: list[dict[str, Any]]) -> str:
@@ -381,8 +393,12 @@ def table(rows: list[dict[str, Any]]) -> str:
     counts: dict[tuple[str, str], list[tuple[bool, float]]] = defaultdict(list)
     runs: dict[str, int] = defaultdict(int)
     refused: dict[str, int] = defaultdict(int)
-    commits = {row["case"]: row["commit"] for row in rows}
+    commits: dict[str, list[str]] = defaultdict(list)
+    seconds: dict[str, list[float]] = defaultdict(list)
     for row in rows:
+        if row["commit"] not in commits[row["case"]][-1:]:
+            commits[row["case"]].append(row["commit"])
+        seconds[row["case"]].append(row["cpu"])
         runs[row["case"]] += 1
         refused[row["case"]] += not row["told"]
         for name, value, low, high, truth in row["told"]:
@@ -403,7 +419,8 @@ def table(rows: list[dict[str, Any]]) -> str:
             lines.append(
                 f"| {case} | {name} | {len(seen)} | {inside} "
                 f"| {np.mean(errors):+.2f} | {Z95 * np.std(errors):.2f} "
-                f"| {refused[case]} of {runs[case]} | {commits[case]} |"
+                f"| {refused[case]} of {runs[case]} "
+                f"| {np.median(seconds[case]):.1f} s | {ends(commits[case])} |"
             )
     today = datetime.date.today().isoformat()
     body = "\n".join(lines)
@@ -418,13 +435,14 @@ channels (±1 code of V_C1), lag (±1 ms), force (±4 %, stated in the bench fil
 truth in 93 to 97 % of the numbers; with n of them that share itself is known to about
 ±43 %/√n.
 
-| run | number | n | holds the truth | mean error | spread | runs refused | commit |
-|---|---|---|---|---|---|---|---|
+| run | number | n | holds the truth | mean error | spread | refused | CPU | commit |
+|---|---|---|---|---|---|---|---|---|
 {body}
 
 Mean error and spread (1.96 standard deviations) are in units of the interval's
 half-width: 0 and 1 where the interval is neither biased nor too wide. "n" counts
 numbers: one run may tell several. "Refused" counts runs that told none of theirs.
+"CPU" is of one run with all that it tells, the median.
 
 Intervals that hold the truth more often than in 97 % hold a bound rather than a
 scatter, and the bound is seldom reached: half a code of a converter whose steps no
@@ -448,17 +466,25 @@ scatters a third more than its interval says.
 
 def main() -> None:
     """Do what is not done yet, and write the page."""
-    words = [word for word in sys.argv[1:] if word != "--table"]
-    number = next((int(word) for word in words if word.isdigit()), REPEATS)
-    names = [n for n in CASES if any(word in n for word in words if not word.isdigit())]
-    version = commit()
-    done = {(r["case"], r["seed"]) for r in kept() if r["commit"] == version}
+    asked = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
+    asked.add_argument("words", nargs="*", help="of the names of cases; all if none")
+    asked.add_argument("--repeats", type=int, default=REPEATS, help="seeds of each")
+    asked.add_argument("--since", default="", help="rows of this commit on count")
+    asked.add_argument("--table", action="store_true", help="only write the page")
+    given = asked.parse_args()
+    if given.since and git("cat-file", "-e", f"{given.since}^{{commit}}").returncode:
+        asked.error(f"--since {given.since}: no commit of this repository")
+    names = [n for n in CASES if any(w in n for w in given.words)] or list(CASES)
+    version = git("rev-parse", "--short", "HEAD").stdout.strip()
+    done = {
+        (r["case"], r["seed"])
+        for r in kept(given.since)
+        if given.since or r["commit"] == version
+    }
     KEPT.parent.mkdir(exist_ok=True)
     began = time.monotonic()
-    wanted = [(n, seed) for seed in range(number) for n in names or CASES]
-    left = [pair for pair in wanted if pair not in done]
-    if "--table" in sys.argv:
-        left = []
+    wanted = [(n, seed) for seed in range(given.repeats) for n in names]
+    left = [] if given.table else [pair for pair in wanted if pair not in done]
     for i, (name, seed) in enumerate(left):
         row = repeat(name, seed) | {"commit": version}
         with KEPT.open("a", encoding="utf-8") as file:
@@ -467,7 +493,7 @@ def main() -> None:
             rate = (time.monotonic() - began) / (i + 1)
             says = f"{i + 1} of {len(left)}, {rate * (len(left) - i - 1) / 60:.0f} min"
             print(f"{says} left", file=sys.stderr, flush=True)
-    page = table(kept())
+    page = table(kept(given.since))
     (DOCS / "bench-coverage.md").write_text(page, encoding="utf-8")
     print(page)
 

@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "make_bench_coverage.py"
 def test_one_number_repeated_is_no_share_of_hits(values, share):
     rows = [
         {
-            "case": "wiring_check", "seed": seed, "commit": "0000000",
+            "case": "wiring_check", "seed": seed, "commit": "0000000", "cpu": 1.0,
             "told": [["offset of a channel", value, value - 1, value + 1, 0.0]],
         }
         for seed, value in enumerate(values)
