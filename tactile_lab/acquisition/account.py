@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -89,7 +90,8 @@ class Account:
         self._rate = Rate()
         self._waiting: list[tuple[str, str]] = []
         self.edges: list[Edge] = []
-        self._current: list[Applied] = []
+        self._steps: list[Applied] = []
+        self._applied = array("d")  # clock time, A; read back for hours, it stays small
         self._unwritten: list[Applied] = []
         self._written = float("-inf")
         self._fields: list[Reading] = []
@@ -171,7 +173,11 @@ class Account:
             for text in coil.take_warnings():
                 self.warn(text)
             for applied in coil.take_applied():
-                self._current.append(applied)
+                if not self._steps or self._steps[-1].setpoint != applied.setpoint:
+                    self._steps.append(applied)
+                seen = applied.measured
+                flows = applied.setpoint if seen is None else seen
+                self._applied.extend((applied.time, flows))
                 self._unwritten.append(applied)
                 row = (self.axis(applied.time), applied.setpoint, applied.measured)
                 self.emit(events.CoilCurrent(*row, asked=self.axis(applied.asked)))
@@ -224,7 +230,7 @@ class Account:
     def note_edges(self, shunt: Trace) -> None:
         """Find the newest set-points' edges in the binned coil current."""
         if self._origin is not None:
-            found = find_edges(self._current, self._origin, shunt)
+            found = find_edges(self._steps, self._origin, shunt)
             # the first and the newest fix the clocks; those between add nothing
             del self.edges[CLUSTER:-CLUSTER]
             self.edges.extend(found)
@@ -283,10 +289,6 @@ class Account:
 
     def applied_since(self, begin: float) -> NDArray[np.float64]:
         """Current applied since clock time `begin`: shape (n, 2), s after it and A."""
-        rows = [
-            (a.time - begin, a.setpoint if a.measured is None else a.measured)
-            for a in self._current
-            if a.time >= begin
-        ]
-        self._current = []
-        return np.array(rows, dtype=np.float64).reshape(-1, 2)
+        rows = np.array(self._applied).reshape(-1, 2)
+        self._steps, self._applied = [], array("d")
+        return rows[rows[:, 0] >= begin] - (begin, 0.0)

@@ -38,6 +38,7 @@ class LiveModel:
         self._later: tuple[float, float] | None = None
         self._state = start or rest(circuit)
         self._amperes, self._field = 0.0, (0.0, 0.0)
+        self._told: float | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> LiveModel:
@@ -56,8 +57,10 @@ class LiveModel:
         return self._state.time
 
     def add(self, at: float, amperes: float) -> None:
-        """The current `amperes` A was applied at run time `at` s."""
-        self._points.put((at, amperes))
+        """The current `amperes` A was applied at run time `at` s, and flows on."""
+        if amperes != self._told:  # a hold of a day is read back 300,000 times
+            self._points.put((at, amperes))
+            self._told = amperes
 
     def until(self, end: float) -> Outputs:
         """Advance to `end` s, at least `reached`.
