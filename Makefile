@@ -8,6 +8,8 @@ DEV_STAMP := $(VENV)/.installed-dev
 SYSTEM_STAMP := $(VENV)/.installed-system
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_ROOT_USER_ACTION := ignore
+# where it is set, every one of the programs that tests start compiles all it imports
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo gui test check fast search reports screenshots clean help
 
