@@ -1,26 +1,35 @@
-"""The hardware checklist itself runs, on served instruments in real time."""
+"""The hardware checklists themselves run, on served instruments in real time."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 from sim_backend.serve import ServedBench
 
 ROOT = Path(__file__).parents[2]
 
+TOLD = {
+    "coil_source": ("FACT answer after 99 A: -222", "2 skipped"),  # need a person
+    "teslameter": ("FACT their standard deviation, T",),
+    "voltage_source": ("FACT left: V_GS at",),
+}
+"""What is read in the answer of each."""
 
-def rehearse(which: str, port: str, state: Path) -> str:
-    done = subprocess.run(
+
+def begun(which: str, port: str, state: Path) -> subprocess.Popen[str]:
+    """The checklist of one instrument, in a process of its own."""
+    return subprocess.Popen(
         [
             *(sys.executable, "-m", "pytest", "-q", "-s", "-p", "no:cacheprovider"),
             f"tests/hardware/test_{which}.py",
         ],
         cwd=ROOT,
-        check=False,
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         env=os.environ
         | {
@@ -29,20 +38,22 @@ def rehearse(which: str, port: str, state: Path) -> str:
             "XDG_STATE_HOME": str(state),
         },
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 def test_the_checklists_pass_on_served_instruments(tmp_path: Path) -> None:
+    """All at once: they wait for their instruments, not for each other."""
     bench = ServedBench(coil="pty", teslameter="tcp:0", voltage_source="pty")
     bench.start()
-    try:
-        told = rehearse("coil_source", bench.addresses["coil"], tmp_path)
-        assert "FACT answer after 99 A: -222" in told
-        assert "2 skipped" in told  # those that need a person
-        told = rehearse("teslameter", bench.addresses["teslameter"], tmp_path)
-        assert "FACT their standard deviation, T" in told
-        told = rehearse("voltage_source", bench.addresses["voltage_source"], tmp_path)
-        assert "FACT left: V_GS at" in told
-    finally:
-        bench.close()
+    ports = bench.addresses | {"coil_source": bench.addresses["coil"]}
+    running = {}
+    with ExitStack() as ending:
+        ending.callback(bench.close)
+        for which in TOLD:
+            process = ending.enter_context(begun(which, ports[which], tmp_path))
+            ending.callback(process.kill)
+            running[which] = process
+        for which, process in running.items():
+            said, _ = process.communicate()
+            assert process.returncode == 0, said
+            for words in TOLD[which]:
+                assert words in said
