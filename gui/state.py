@@ -10,6 +10,10 @@ from tactile_lab.quantity import printed, show
 STALE = 1.5
 """Seconds without a word from a live coil's source after which its state is unknown."""
 
+LAGS, MOVED = 0.3, 5e-3
+"""Age of a read-back, s, from which on it says nothing of a set-point that has moved
+by so much since, A."""
+
 
 class WindowState(Enum):
     """The one state of the window."""
@@ -58,6 +62,7 @@ class CoilView:
         setpoint: last sent, A.
         age: of the source's last acknowledgement, s.
         read_age: of the read-back, s.
+        under: set-point that stood when it was read back, A.
         verified_off: result of the last switching off; None before any.
         limit: largest current allowed, A.
     """
@@ -67,8 +72,19 @@ class CoilView:
     setpoint: float | None = None
     age: float = 0.0
     read_age: float = 0.0
+    under: float | None = None
     verified_off: bool | None = None
     limit: float | None = None
+
+    @property
+    def told(self) -> float | None:
+        """What is known to flow, A; None where it was read too long ago to say.
+
+        A moving set-point leaves a read-back behind within moments, one that stands
+        does not.
+        """
+        moved = abs((self.setpoint or 0.0) - (self.under or 0.0)) > MOVED
+        return None if self.read_age > (LAGS if moved else STALE) else self.current
 
 
 @dataclass(frozen=True)
@@ -184,7 +200,7 @@ def stop_text(state: WindowState, coil: CoilView | None) -> StopText:
     if what is CoilKnowledge.FALLING:
         return StopText("STOPPING", f"{now} → 0")
     if what is CoilKnowledge.LIVE:
-        if coil.current is None or coil.read_age > STALE:
+        if coil.told is None:
             sent = milliamperes(coil.setpoint)
             return StopText("STOP · COIL OFF", f"{sent} sent, not read back")
         return StopText("STOP · COIL OFF", f"{now} live")

@@ -93,6 +93,8 @@ class Chips:
             CoilKnowledge.OFF: Lamp.BAD if state is WindowState.FAULT else idle,
         }[what]
         value = "—" if coil.current is None else milliamperes(coil.current)
+        if what is CoilKnowledge.LIVE and coil.told is None:
+            value = f"→ {milliamperes(coil.setpoint)}"
         if what is CoilKnowledge.UNKNOWN:
             return InstrumentView(name, lamp, "state unknown", "?")
         if what is CoilKnowledge.OFF and not self._bench.known:

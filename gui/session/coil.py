@@ -22,10 +22,10 @@ class CoilWatch:
     def __init__(self) -> None:
         self.limits: CoilLimits | None = None
         self._off: OffReport | None = None
-        self._seen: tuple[float | None, float | None] = (None, None)
         self._since = time.monotonic()
         self._sign = time.monotonic()
-        self._current: float | None = None
+        self._read: float | None = None
+        self._under: float | None = None
 
     def use(self, limits: CoilLimits | None) -> None:
         """Another bench, or none: nothing is known of its coil yet."""
@@ -37,11 +37,9 @@ class CoilWatch:
         if off is not None:
             self._off = off
 
-    def sign_of_life(self, *, read_back: bool) -> None:
+    def sign_of_life(self) -> None:
         """The source acknowledged a set-point or was read back just now."""
         self._sign = time.monotonic()
-        if read_back:
-            self._since = self._sign
 
     def view(self, state: CoilState | None) -> CoilView | None:
         """What may be shown; `state` is None while nobody drives the coil."""
@@ -58,13 +56,15 @@ class CoilWatch:
         if not state.live:
             return self.view(None)  # nothing was switched on: as it was left before
         now = time.monotonic()
-        if state.measured != self._current:
-            self._current, self._since, self._sign = state.measured, now, now
+        if state.read != self._read:
+            self._read, self._since, self._sign = state.read, now, now
+            self._under = state.setpoint
         return CoilView(
             True,
             state.measured,
             state.setpoint,
             age=now - self._sign,
             read_age=now - self._since,
+            under=self._under,
             limit=limit,
         )

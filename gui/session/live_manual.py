@@ -52,8 +52,7 @@ class LiveManual(LiveTask):
         if isinstance(event, StateChanged):
             self.opened = self.opened or event.state is RunState.READY
         elif isinstance(event, CoilCurrent):
-            read = event.measured is not None
-            self._status.coil.sign_of_life(read_back=read)
+            self._status.coil.sign_of_life()
             self._see(event)
         elif isinstance(event, Samples):
             self.say(renew)

@@ -168,7 +168,7 @@ class LiveRun(LiveTask):
             case events.SpikesSeen(times=times):
                 source.add_spikes(times)
             case events.CoilCurrent(time=at, setpoint=sent, measured=read):
-                coil.sign_of_life(read_back=read is not None)
+                coil.sign_of_life()
                 source.add_current(at, sent if read is None else read)
             case events.FieldRead(time=at, field=field):
                 self._field_read(field)
@@ -257,7 +257,7 @@ class LiveRun(LiveTask):
             self._log.add(Severity.INFO, "store", f"Recording to {event.folder}")
         self.expected = plan.estimate.duration if plan else None
         coil.limits = event.limits or coil.limits
-        coil.sign_of_life(read_back=True)
+        coil.sign_of_life()
         preview = plan.preview if plan else None
         self.source = LiveSource(preview, event.newtons_per_ampere)
         for warning in plan.warnings if plan else ():

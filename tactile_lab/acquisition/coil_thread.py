@@ -136,7 +136,8 @@ class CoilThread(InstrumentThread):
     def state(self) -> CoilState:
         """What is known of the coil now."""
         sent = None if self.last is None else self.last.setpoint
-        return CoilState(self.live, sent, self.measured, self.off)
+        read = None if self.measured is None else self._read
+        return CoilState(self.live, sent, self.measured, self.off, read)
 
     def energise(self) -> None:
         """Ask for the output to be switched on at 0 A; `live` tells when it is."""

@@ -20,12 +20,14 @@ class CoilState:
         setpoint: last sent, A.
         measured: last read back, A.
         off: how it was left; None while the run lasts.
+        read: clock time of that read-back, s; None before any.
     """
 
     live: bool = False
     setpoint: float | None = None
     measured: float | None = None
     off: OffReport | None = None
+    read: float | None = None
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ LIVE = CoilView(True, 0.374, 0.374, limit=2.0)
 
 
 def test_stop_tells_the_read_back_not_the_command() -> None:
-    coil = CoilView(True, current=0.112, setpoint=0.9)
+    coil = CoilView(True, current=0.112, setpoint=0.9, under=0.9)
     assert stop_text(WindowState.RUNNING, coil).detail == "112 mA live"
 
 
@@ -48,6 +48,14 @@ def test_silent_source_is_unknown() -> None:
 def test_old_read_back_is_said_to_be_old() -> None:
     coil = CoilView(True, 0.1, 0.5, age=0.1, read_age=STALE + 1)
     assert stop_text(WindowState.RUNNING, coil).detail == "500 mA sent, not read back"
+
+
+def test_read_back_of_another_set_point_is_not_called_live() -> None:
+    # a ramp is read back once a second; what flowed before it says nothing of now
+    coil = CoilView(True, 0.0, 0.6, age=0.01, read_age=0.6, under=0.0)
+    assert stop_text(WindowState.RUNNING, coil).detail == "600 mA sent, not read back"
+    resting = CoilView(True, 0.598, 0.6, age=0.6, read_age=0.6, under=0.6)
+    assert stop_text(WindowState.RUNNING, resting).detail == "598 mA live"
 
 
 @pytest.mark.parametrize("state", list(WindowState))
