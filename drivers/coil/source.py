@@ -9,7 +9,7 @@ from __future__ import annotations
 from drivers.coil.guard import Guard, in_process
 from drivers.coil.interlock import GENERATOR, Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, check_points, load
-from drivers.coil.wire import CoilWire
+from drivers.coil.wire import CATCH_UP, CoilWire
 from drivers.serial_line.instrument import SerialInstrument
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading, SeenOutput
@@ -18,9 +18,6 @@ from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError, InterlockError, LimitError, UnsafeError
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
-
-CATCH_UP = 0.05
-"""Time after a late set-point, s, that one step may make up for at the slew limit."""
 
 
 class CoilSource(SerialInstrument[CoilWire]):
@@ -349,6 +346,7 @@ class CoilSource(SerialInstrument[CoilWire]):
         # a set-point of what flows would double it
         report = self._wire.switch_off(
             setpoint=self._setpoint,
+            rested=self._clock.now() - self._commanded,
             slew=self._limits.slew,
             exchange=self._interval / MARGIN,
             ramp=ramp and not (self._analogue and self._setpoint is None),

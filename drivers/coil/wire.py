@@ -26,6 +26,9 @@ LONGEST_RAMP = 0.5
 SHORTEST_REST, LONGEST_REST = 0.005, 0.2
 """Time from an answer to the next step of a ramp, s; the guard wants a heartbeat."""
 
+CATCH_UP = 0.05
+"""Time after a late set-point, s, that one step may make up for at the slew limit."""
+
 SETTLE = 0.02
 """Time the current has to die away before it is read back, s."""
 
@@ -99,6 +102,7 @@ class CoilWire(SourceWire[CoilDialect]):
         self,
         *,
         setpoint: float | None,
+        rested: float,
         slew: float,
         exchange: float,
         ramp: bool,
@@ -107,6 +111,7 @@ class CoilWire(SourceWire[CoilDialect]):
 
         Args:
             setpoint: last known, A; None when unknown.
+            rested: time since it was taken, s.
             slew: of the ramp, A/s.
             exchange: typical time of a verified set-point, s.
             ramp: False goes to 0 A at once.
@@ -115,7 +120,7 @@ class CoilWire(SourceWire[CoilDialect]):
         if not self.reconnected(trouble, RECONNECT):
             return OffReport(False, None, UNKNOWN + " | ".join(trouble))
         if ramp and setpoint != 0.0:
-            self._ramp_down(setpoint, slew, exchange, trouble)
+            self._ramp_down(setpoint, rested, slew, exchange, trouble)
         row = self.dialect
         steps = (*row.stop_lines, row.set_line(0.0), *row.off)
         current: float | None = None
@@ -157,6 +162,7 @@ class CoilWire(SourceWire[CoilDialect]):
     def _ramp_down(
         self,
         setpoint: float | None,
+        rested: float,
         slew: float,
         exchange: float,
         trouble: list[str],
@@ -165,15 +171,19 @@ class CoilWire(SourceWire[CoilDialect]):
 
         A step is as large as the time since the last one was answered allows. The
         source took that one before it answered, so no delay on the way can bring two
-        steps closer together at the source than the limit allows. Resting for two
-        exchanges makes the whole ramp take one and a half times its nominal time.
+        steps closer together at the source than the limit allows. Resting for four
+        exchanges makes the whole ramp take a quarter longer than its nominal time, for
+        two, where that is more than a step may make up for, half as long again. After
+        a hold the first step is taken at once.
         """
         try:
             current = self._taken_over() if setpoint is None else setpoint
             slew = max(slew, abs(current) / LONGEST_RAMP)
-            answered = self.link.now
+            answered = self.link.now - (0.0 if setpoint is None else rested)
             while True:
-                rest = min(max(2 * exchange, SHORTEST_REST), LONGEST_REST)
+                rest = max(2 * exchange, min(4 * exchange, CATCH_UP), SHORTEST_REST)
+                rest = min(rest, LONGEST_REST)
+                answered = max(answered, self.link.now - rest)
                 self.link.sleep_until(answered + min(rest, abs(current) / slew))
                 sent = self.link.now
                 left = abs(current) - slew * (sent - answered)

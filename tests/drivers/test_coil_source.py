@@ -5,7 +5,8 @@ import pytest
 
 from drivers.coil.source import CoilSource
 from drivers.teslameter import Teslameter
-from sim_backend.serial_line.wires import plug_in
+from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.wires import plug_in, unplug
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
@@ -122,6 +123,32 @@ def test_safe_off_ramps_and_verifies_and_may_be_repeated(bench):
     assert clock.now() - begun < 0.6
     assert len(far.changes) - seen > 4
     assert coil.safe_off().verified
+
+
+def test_a_hold_is_left_as_fast_as_the_slew_limit_allows(resistor):
+    """From 1 A by 5 A/s, 0.2 s; 0.1 s more to answer and be read back off."""
+    clock = SimulatedClock()
+    source = SimCoilSource(resistor, KEPCO.id, clock)
+    settings = {"baud": 4_000_000, "latency": 5e-3}
+    end = plug_in(source, KEPCO.serial.model_copy(update=settings), clock, "coil")
+    coil = CoilSource(KEPCO, end.url, CoilLimits(), clock, baud=4_000_000)
+    with clock.taking_part("test"):
+        coil.open()
+        coil.energise()
+        for _ in range(20):
+            clock.sleep_until(clock.now() + coil.update_interval)
+            coil.set_current(1.0)
+        clock.sleep_until(clock.now() + 1.0)
+        begun, seen = clock.now(), len(source.changes)
+        report = coil.safe_off()
+        assert report.verified
+        assert clock.now() - begun < 0.3
+        changes = [one for one in source.changes[seen - 1 :] if one.what == "set"]
+        for before, after in itertools.pairwise(changes):
+            fall = before.value - after.value
+            assert fall <= coil.limits.slew * (after.time - before.time) + 3e-3
+        coil.close()
+    unplug(end)
 
 
 def test_heat_budget_trips_and_stays_latched(bench):
