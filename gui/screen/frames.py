@@ -53,6 +53,7 @@ class Frames(QObject):
         begun = time.perf_counter()
         panels, session = self._panels, self._panels.session
         moved = session.poll()
+        panels.header.stop.show_coil(session.state, session.coil_view())
         now = time.monotonic()
         source, seen = self._screen.live, not panels.centre.window().isMinimized()
         if source is not None and seen and not self.frozen:

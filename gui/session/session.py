@@ -192,7 +192,6 @@ class Session(QObject):
 
         Runs that wait in the queue are held until somebody resumes it.
         """
-        self.queue.hold()
         self._after_monitor = None
         if self.manual.alive:
             self.manual.stop(reason)
@@ -208,6 +207,7 @@ class Session(QObject):
         elif self.state is WindowState.READY and self.bench.request is not None:
             self._log_stop("Coil off sent again")
             self.bench.check()
+        self.queue.hold()
 
     def acknowledge(self) -> None:
         """The user has read the fault; who is still there, and the coil, is asked."""
@@ -285,11 +285,6 @@ class Session(QObject):
         """Whether something may begin to use the bench."""
         ready = self.state is WindowState.READY and not self.manual.alive
         return ready and self._after_monitor is None
-
-    @property
-    def _idle(self) -> bool:
-        """Whether nothing uses the bench."""
-        return self._free and not self.monitor.alive
 
     @property
     def _planner(self) -> Link:

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
 
 from gui.dialogs.help import Help
 from gui.lanes.source import PlanSource
-from gui.state import CoilKnowledge, WindowState
+from gui.state import CoilKnowledge, WindowState, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
 
@@ -62,6 +62,24 @@ def test_run_moves_lanes_and_gives_results(lab) -> None:
     assert [f.label for f in window.screen_.results.steps] == ["80 mN", "120 mN"]
     assert window.review.results.mark.text().startswith("final")
     lab.until(lambda: window.header.stop.truth is CoilKnowledge.OFF)
+
+
+def test_stop_says_what_is_known_of_the_coil_in_the_same_frame(
+    lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    monkeypatch.setattr(window.frames, "_numbers", float("inf"))  # they come later
+    session.stop()
+    said = []
+
+    def over() -> bool:
+        state, coil = session.state, session.coil_view()
+        said.append((window.header.stop.truth, truth(state, coil)))
+        return not session.busy
+
+    lab.until(over)
+    assert [told for told, known in said if told is not known] == []
 
 
 @pytest.mark.parametrize("how", ["click", "Esc", "F12"])
