@@ -24,13 +24,16 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).resolve()
+PROGRAM = Path(__file__).resolve().with_name("window_watched.py")
 SIZE = 1366, 768
 LIE, STOPPED = 2.0, 5.0
+LINES = 30
+"""Of the window's log that are told where the session was lost."""
 KEYS = (
     "space f a z c 1 2 m shift+m plus minus BackSpace shift+BackSpace x Left Right "
     "period comma Home End n F1 F5 F7 F8 F11 ctrl+1 ctrl+2 ctrl+3 ctrl+4 ctrl+z ctrl+y "
@@ -62,6 +65,7 @@ class Session:
         self.folder = folder
         self.problems: list[str] = []
         self.reports: list[dict] = []
+        self.log: deque[str] = deque(maxlen=LINES)
         self.done: dict[str, int] = {}
         read, write = os.pipe()
         screen = "x".join(map(str, (*SIZE, 24)))
@@ -83,7 +87,7 @@ class Session:
             subprocess.Popen(["openbox"], env=self.env, stderr=subprocess.DEVNULL)
         )
         self.program = subprocess.Popen(
-            [sys.executable, str(HERE), "--inside", str(folder)],
+            [sys.executable, str(PROGRAM), str(folder)],
             env=self.env, cwd=folder, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )  # fmt: skip
@@ -96,8 +100,10 @@ class Session:
     def _listen(self) -> None:
         for line in self.program.stdout:
             told = json.loads(line)
-            if "exception" in told:
-                self.problems.append(told["exception"])
+            if "problem" in told:
+                self.problems.append(told["problem"])
+            elif "log" in told:
+                self.log.append(told["log"])
             else:
                 self.reports.append(told)
 
@@ -284,7 +290,7 @@ def drive(seed: int, seconds: float) -> tuple[str, bool]:
             while time.monotonic() < end:
                 session.round()
         except LostError as lost:
-            session.problems.append(str(lost))
+            session.problems += [str(lost), *session.log]
         finally:
             session.close()
     session.problems += lies(session.reports)
@@ -306,127 +312,11 @@ def drive(seed: int, seconds: float) -> tuple[str, bool]:
     return "\n".join([row, *session.problems]), not session.problems
 
 
-# --- the program
-
-
-def inside(folder: Path) -> None:
-    """The window; every tenth of a second it tells what it says, and what is true."""
-    import traceback
-
-    from PySide6.QtCore import QPoint, QTimer
-    from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu
-
-    from gui.app import application, begin
-    from gui.dialogs.overlay import Overlay
-    from gui.look.theme import Theme
-    from gui.session.session import Session as Behind
-    from gui.window import Window
-    from sim_backend.serial_line import wires
-    from sim_backend.serial_line.faults import SerialFault
-
-    def tell(what: object) -> None:
-        sys.stdout.write(json.dumps(what) + "\n")
-        sys.stdout.flush()
-
-    def failed(kind, error, trace) -> None:
-        tell({"exception": "".join(traceback.format_exception(kind, error, trace))})
-
-    sys.excepthook = failed
-    threading.excepthook = lambda a: failed(a.exc_type, a.exc_value, a.exc_traceback)
-    sys.setswitchinterval(1e-3)
-    scene = folder / "short.toml"
-    scene.write_text(
-        '[protocol]\nname = "pulses"\nlevels = ["120 mN", "160 mN"]\nhold = "4 s"\n'
-        'rest = "1 s"\n[record]\nsample_rate = "100 kS/s"\n'
-    )
-    app = application(["session"])
-    theme = Theme("light")
-    theme.apply()
-    behind = Behind(folder / "runs", separate=False)
-    behind.run.reports = False
-    window = Window(behind, theme)
-    window.resize(SIZE[0] - 8, SIZE[1] - 40)
-    window.show()
-    begin(window, str(scene), "sim")
-
-    def coils():
-        ends = [far for name, far in wires._far_ends.items() if "coil" in name]
-        # a bench connected anew has a source of its own; one unplugged stays as it was
-        return [far for far in ends if hasattr(far.instrument, "output_on")][-1:]
-
-    def buttons() -> dict[str, list[int]]:
-        found = {}
-        for one in app.allWidgets():
-            if not (isinstance(one, QAbstractButton) and one.isVisible()):
-                continue
-            middle = one.mapToGlobal(QPoint(one.width() // 2, one.height() // 2))
-            if one.isEnabled() and app.widgetAt(middle) is one:
-                name = one.accessibleName() or one.text()
-                found.setdefault(name, [middle.x(), middle.y()])
-        return found
-
-    count, names = 0, {}
-
-    def report() -> None:
-        nonlocal count, names
-        if count % 5 == 0:
-            names = buttons()
-        count += 1
-        stop = window.header.stop
-        at = stop.mapToGlobal(QPoint(60, 25))
-        pages = Path("/proc/self/statm").read_text().split()[1]
-        cards = [c for c in window.findChildren(Overlay) if c.isVisible()]
-        top = [w for w in app.topLevelWidgets() if w.isVisible()]
-        menus = [w for w in top if isinstance(w, QMenu)]
-        dialogs = [w for w in top if isinstance(w, QDialog)]
-        tell(
-            {
-                "at": time.monotonic(), "state": behind.state.value,
-                "truth": stop.truth.value, "manual": behind.manual.alive,
-                "output": any(far.instrument.output_on for far in coils()),
-                "open": len(cards) + len(menus), "dialogs": len(dialogs),
-                "stop": [at.x(), at.y()],
-                "memory": int(pages) * 4096 / 1e6, "buttons": names,
-            }
-        )  # fmt: skip
-
-    def act(word: str) -> None:
-        what, _, kind = word.strip().partition(" ")
-        if what == "fault":
-            amount = {"late": 1.0, "unplug": 2.0}.get(kind, 0.0)
-            for far in coils():
-                far.faults.add(SerialFault(kind=kind, times=None, amount=amount))
-        elif what == "mend":
-            for far in coils():
-                far.faults.clear()
-        elif what == "connect":
-            behind.connect_bench("sim")
-        elif what == "scene":
-            window.fold(window.setup, False)
-            window.screen_.open_scene(str(scene))
-
-    def listen() -> None:
-        for word in sys.stdin:
-            QTimer.singleShot(0, app, lambda word=word: act(word))
-
-    threading.Thread(target=listen, daemon=True).start()
-    timer = QTimer()
-    timer.timeout.connect(report)
-    timer.start(100)
-    QApplication.setQuitOnLastWindowClosed(True)
-    app.exec()
-    behind.close()
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("seed", type=int, nargs="?", default=1)
     parser.add_argument("seconds", type=float, nargs="?", default=600.0)
-    parser.add_argument("--inside", type=Path)
     options = parser.parse_args()
-    if options.inside:
-        inside(options.inside)
-        return
     row, well = drive(options.seed, options.seconds)
     print(row)
     sys.exit(not well)
