@@ -172,17 +172,15 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         wide, tall = self.width(), self.height()
         frame = self._frame(wide)
         on = Drawing(painter, frame, stage.source, stage.tokens)
-        painter.save()
-        painter.setClipRect(QRectF(0, -5, wide, tall + 9))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
-        if len(runs) > 1:
-            self._runs(on, runs)
-        else:
-            self._beyond(on)
-            self._threshold(on)
-            self._traces(on, runs[0], self._twin)
-        self._levels(on)
-        painter.restore()
+        with paint.clipped(painter, QRectF(0, -5, wide, tall + 9)):
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+            if len(runs) > 1:
+                self._runs(on, runs)
+            else:
+                self._beyond(on)
+                self._threshold(on)
+                self._traces(on, runs[0], self._twin)
+            self._levels(on)
         if len(runs) == 1:
             self._tag(on)
 

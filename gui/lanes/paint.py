@@ -7,6 +7,8 @@ wider antialiased polylines cost tens of times more.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
@@ -84,6 +86,17 @@ def polygon(x: FloatArray, y: FloatArray) -> QPolygonF:
         memory[:, 0] = x
         memory[:, 1] = y
     return made
+
+
+@contextmanager
+def clipped(painter: QPainter, area: QRectF) -> Iterator[None]:
+    """Draw within an area; afterwards the painter is as before, whatever was raised."""
+    painter.save()
+    try:
+        painter.setClipRect(area)
+        yield
+    finally:
+        painter.restore()
 
 
 @lru_cache(maxsize=256)

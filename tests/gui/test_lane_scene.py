@@ -4,7 +4,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, QRectF, Qt
+from PySide6.QtCore import (
+    QEvent,
+    QPoint,
+    QPointF,
+    QRect,
+    QRectF,
+    Qt,
+    qInstallMessageHandler,
+)
 from PySide6.QtGui import QImage, QMouseEvent, QPainter, QWheelEvent
 from PySide6.QtSvg import QSvgGenerator, QSvgRenderer
 from PySide6.QtTest import QTest
@@ -304,7 +312,8 @@ def pixels(image: QImage) -> np.ndarray:
 
 
 def test_lanes_that_cannot_be_painted_leave_the_window_alive(app, stack, qtbot):
-    lane = box(stack, "V_C1")
+    lane, complaints = box(stack, "V_C1"), []
+    before = qInstallMessageHandler(lambda *words: complaints.append(words[-1]))
     with qtbot.captureExceptions() as told:
         for one in (lane, box(stack, "V_K")):
             one._traces = lambda *_: 1 / 0
@@ -313,6 +322,8 @@ def test_lanes_that_cannot_be_painted_leave_the_window_alive(app, stack, qtbot):
         for one in (lane, box(stack, "V_K")):
             del one._traces
         settle(app)
+    qInstallMessageHandler(before)
+    assert complaints == [], "Painter ended with 2 saved states"
     assert len(told) >= 4 and {one[0] for one in told} == {ZeroDivisionError}
     assert not stack.scene.grab().isNull()
 
