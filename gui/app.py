@@ -18,6 +18,7 @@ from gui.plots import on_demand as _before_pyqtgraph  # noqa: F401
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips
+from tactile_lab.engine.memory import share_heap
 from tactile_lab.engine.threads import start
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def main(
     """
     # Python threads hand over every 5 ms by default: too long for a frame of 33 ms
     sys.setswitchinterval(1e-3)
+    share_heap()
     app = application(["tactile-lab"])
     chosen = Theme(theme)
     chosen.apply()

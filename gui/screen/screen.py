@@ -17,6 +17,7 @@ from gui.screen.panels import Panels
 from gui.screen.records import Records
 from gui.session.log import Severity
 from gui.state import WindowState
+from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.quantity import count, show
@@ -244,6 +245,7 @@ class Screen(QObject):
             self._ended = done.folder
             self._records.exchange(done.folder)
         QTimer.singleShot(LATER, self.list_runs)
+        QTimer.singleShot(LATER, trim)
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""

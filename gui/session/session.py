@@ -29,6 +29,9 @@ from tactile_lab.errors import TactileLabError
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
 
+REST = 120.0
+"""Time after which a desk of which nothing is asked ends, s; it takes 100 MB."""
+
 
 class Session(QObject):
     """The parts, and the rules between them.
@@ -63,7 +66,7 @@ class Session(QObject):
         self.log = Log()
         self.status = Status(self.log)
         self.link = Link(separate=separate, realtime=realtime, lost=self._engine_lost)
-        self.desk = Link(separate=separate, lost=self._desk_lost)
+        self.desk = Link(separate=separate, lost=self._desk_lost, rest=REST)
         parts = self.link, self.status, self.log
         self.bench = ConnectedBench(
             *parts, lambda: self._free and not self.monitor.alive

@@ -26,6 +26,7 @@ from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import CoilCurrent, Event, RunState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine.events import Begun, Ended, PersonAsked, Samples, TaskEvent
+from tactile_lab.engine.memory import give_back, share_heap
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RefusedError, TactileLabError
 
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Act = Callable[..., Any]
+
+QUIET = 2.0
+"""Pause, s, in which what ended tasks have left is looked for."""
 
 LEAVE = 60.0
 """Longest wait for tasks to end after the pipe's other end has gone, s."""
@@ -73,15 +77,18 @@ class Engine:
     Args:
         pipe: to whoever looks.
         realtime: pace a simulated bench by the wall clock.
+        alone: in a process of its own, whose memory it gives back.
 
     Attributes:
-        tasks: by number; those that have ended go when another begins.
+        tasks: by number; those that have ended go when another begins, or in a pause.
         instruments: held by whoever uses them: a task waits while somebody asks who
             is there.
     """
 
-    def __init__(self, pipe: Connection, *, realtime: bool = True) -> None:
-        self._pipe, self.realtime = pipe, realtime
+    def __init__(
+        self, pipe: Connection, *, realtime: bool = True, alone: bool = False
+    ) -> None:
+        self._pipe, self.realtime, self._alone = pipe, realtime, alone
         self._sending = threading.Lock()
         self.tasks: dict[int, ServedTask] = {}
         self.instruments = threading.Lock()
@@ -89,7 +96,7 @@ class Engine:
     def serve(self) -> None:
         """Do what is asked until the other end has gone; then leave every coil off."""
         try:
-            while (asked := self._pipe.recv()) is not None:
+            while (asked := self._next()) is not None:
                 number, how, act, arguments, named = asked
                 how(self, number, act, *arguments, **named)
         except (EOFError, OSError):
@@ -101,9 +108,21 @@ class Engine:
                 task.thread.join(LEAVE)
             self._pipe.close()
 
+    def _next(self) -> Any:
+        """What is asked next; memory is given back where nobody asks for a while."""
+        while self._alone and not self._pipe.poll(QUIET):
+            self._forget_ended()
+            if not self.tasks:
+                give_back()
+                break
+        return self._pipe.recv()
+
+    def _forget_ended(self) -> None:
+        self.tasks = {n: t for n, t in self.tasks.items() if t.thread.is_alive()}
+
     def begin(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         """Have `act(served, ...)` make a task, and run it in a thread of its own."""
-        self.tasks = {n: t for n, t in self.tasks.items() if t.thread.is_alive()}
+        self._forget_ended()
         self.tasks[number] = ServedTask(
             lambda served: act(served, *arguments, **named),
             lambda told: self.tell(number, told),
@@ -300,7 +319,8 @@ def main(pipe: Connection, realtime: bool = True) -> None:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
-    Engine(pipe, realtime=realtime).serve()
+    share_heap()
+    Engine(pipe, realtime=realtime, alone=True).serve()
 
 
 def _leave(number: int, frame: object) -> None:

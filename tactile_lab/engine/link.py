@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from multiprocessing.connection import Connection
@@ -100,6 +101,8 @@ class Link:
             the simulated far ends.
         realtime: pace a simulated bench by the wall clock.
         lost: told why where the engine has died, when the link is polled.
+        rest: time, s, after which an engine of which nothing is asked ends, when the
+            link is polled; what is asked next starts another. None keeps it.
     """
 
     def __init__(
@@ -108,7 +111,9 @@ class Link:
         separate: bool = True,
         realtime: bool = True,
         lost: Callable[[str], None] = lambda why: None,
+        rest: float | None = None,
     ) -> None:
+        self._rest, self._used = rest, time.monotonic()
         self._separate, self._realtime, self._lost = separate, realtime, lost
         self._pipe: Connection | None = None
         self._process: BaseProcess | threading.Thread | None = None
@@ -170,8 +175,10 @@ class Link:
             try:
                 take, told = self._inbox.get_nowait()
             except Empty:
-                return
+                break
             take(told)
+        if self._rest is not None and time.monotonic() - self._used > self._rest:
+            self._let_rest()
 
     @property
     def idle(self) -> bool:
@@ -207,8 +214,16 @@ class Link:
         with self._lock:
             self._number()
 
+    def _let_rest(self) -> None:
+        """Have an engine end that has nothing to do."""
+        with self._lock:
+            if not self._tasks and not self._asked:
+                self._write(None)
+                self._pipe = self._process = None
+
     def _number(self) -> int:
         """A number for what is asked next, and an engine to ask."""
+        self._used = time.monotonic()
         if self._pipe is None:
             self._open()
         self._last += 1
@@ -252,6 +267,8 @@ class Link:
             why = f"{type(error).__name__}: {error}"
         with self._lock:
             pipe.close()
+            if pipe is not self._pipe:
+                return  # it was let rest
             self._pipe = None
             tasks, asked = list(self._tasks), list(self._asked)
         if not self._closing:
@@ -264,6 +281,7 @@ class Link:
             self._take(number, Reply(None, f"The engine ended: {why}", lost=True))
 
     def _take(self, number: int, told: Any) -> None:
+        self._used = time.monotonic()
         if isinstance(told, Reply):
             self._inbox.put((self._asked.pop(number), told))
         elif (task := self._tasks.get(number)) is not None:

@@ -1,9 +1,18 @@
 """A plain script at the pipe: no window, no Qt."""
 
+import gc
+import os
 import subprocess
 import sys
+import threading
+import time
+import weakref
+from multiprocessing import Pipe
+
+import pytest
 
 from tactile_lab.acquisition.events import RunState, SpikesSeen
+from tactile_lab.engine import engine as module
 from tactile_lab.engine.commands import begin_monitor, begin_run
 from tactile_lab.engine.engine import Engine, Reply
 from tactile_lab.engine.events import Begun, Ended, Samples
@@ -107,3 +116,53 @@ def test_a_question_is_answered_even_where_it_breaks(tmp_path):
         assert "KeyError: 'nothing'" in polled(link, breaks).problem
         gone = polled(link, check_bench, Request("gone.toml"))
         assert gone.value is None and "gone.toml" in gone.problem
+
+
+def pid_of(engine: Engine) -> int:
+    return os.getpid()
+
+
+def answered(link: Link) -> Reply[int]:
+    """What the engine says when asked for its process."""
+    told: list[Reply[int]] = []
+    link.ask(told.append, pid_of)
+    while not told:
+        link.poll()
+        time.sleep(0.001)
+    return told[0]
+
+
+def test_an_engine_of_which_nothing_is_asked_ends_and_the_next_question_starts_one():
+    lost: list[str] = []
+    with Link(lost=lost.append, rest=0.0) as link:
+        first = answered(link)
+        while link.pid is not None:
+            link.poll()
+        second = answered(link)
+    assert not first.lost and not second.lost and lost == []
+    assert first.value != second.value
+
+
+def test_an_engine_gives_back_what_ended_tasks_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Left:
+        """Refers to itself, as what a run leaves does."""
+
+        def __init__(self) -> None:
+            self.own = self
+
+    monkeypatch.setattr(module, "QUIET", 0.001)
+    gc.collect()
+    gc.disable()  # of its own accord
+    left = weakref.ref(Left())
+    ours, theirs = Pipe()
+    serving = threading.Thread(target=Engine(theirs, alone=True).serve)
+    serving.start()
+    end = time.monotonic() + 60
+    while left() is not None and time.monotonic() < end:
+        time.sleep(0.001)
+    gc.enable()
+    ours.send(None)
+    serving.join(60)
+    assert left() is None
