@@ -16,7 +16,7 @@ from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 from tactile_lab.scene.overrides import Overrides
 from tactile_lab.scene.scene import Scene
-from tactile_lab.store.catalogue import catalogue
+from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.run import Run
 from tactile_lab.store.summary import RunSummary
 from tactile_lab.waveform import Waveform
@@ -225,17 +225,23 @@ def design(what: str | Path | Mapping[str, Any]) -> Chosen:
     return choose(load_specification(what))
 
 
-def runs(out: str | Path = "runs", *, protocol: str | None = None) -> list[RunSummary]:
+def runs(
+    out: str | Path = "runs", *, protocol: str | None = None, where: str = ""
+) -> list[RunSummary]:
     """The runs in a folder, oldest first; each entry's `load()` opens its run.
 
     Args:
         out: holds run folders.
         protocol: only runs of this protocol.
+        where: a condition, such as "protocol.levels > 100 mN and tag = cal"
+            (docs/how-to/find-and-compare-runs.md).
 
     Raises:
         RunFolderError: there is no such folder.
+        SceneError: `where` cannot be read.
     """
-    return catalogue(Path(out), protocol=protocol)
+    with Catalogue(Path(out)) as found:
+        return found.runs(protocol=protocol, where=where)
 
 
 def latest(out: str | Path = "runs", *, protocol: str | None = None) -> Run:

@@ -22,7 +22,7 @@ from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.quantity import count, show
 from tactile_lab.signals import AVERAGED
-from tactile_lab.store.catalogue import catalogue
+from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.folder import DATA
 from tactile_lab.store.summary import RunSummary
 from tactile_lab.trial import Outcome
@@ -380,6 +380,7 @@ class Screen(QObject):
 def _runs_in(out: Path) -> list[RunSummary]:
     """The runs in a folder, oldest first; none where it is not made yet."""
     try:
-        return catalogue(out)
+        with Catalogue(out) as found:
+            return found.runs()
     except RunFolderError:
         return []

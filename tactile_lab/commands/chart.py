@@ -30,21 +30,23 @@ def command(key: str, root: Path, where: str, out: Path | None, as_json: bool) -
     """
     with refusing():
         from tactile_lab.report.over_runs import OverRuns, Point
-        from tactile_lab.store.catalogue import catalogue, known
+        from tactile_lab.store.catalogue import Catalogue
 
-        entries = catalogue(root, where=where)
         points, unit = [], ""
-        for entry, facts in zip(entries, known(root, entries), strict=True):
-            numbers = [f for f in facts.get(key, ()) if f.number is not None]
+        with Catalogue(root) as listed:
+            entries = listed.runs(where=where)
+            known = listed.known(entries)
+        for entry, facts in zip(entries, known, strict=True):
+            told = facts.get(key, [])
+            numbers = [one.number for one in told if one.number is not None]
             if numbers and entry.started:
-                unit = numbers[0].unit or unit
-                values = [f.number for f in numbers if f.number is not None]
+                unit = told[0].unit or unit
                 points.append(
                     Point(
                         entry.name,
                         datetime.fromisoformat(entry.started),
                         entry.sensor,
-                        sum(values) / len(values),
+                        sum(numbers) / len(numbers),
                         bool(entry.simulated),
                     )
                 )

@@ -38,7 +38,7 @@ DAY = click.DateTime(["%Y-%m-%d"])
     "--where",
     default="",
     metavar="CONDITION",
-    help="Only runs for which this holds: 'protocol.level > 100 mN and note ~ cal'.",
+    help="Only runs for which this holds: 'protocol.levels > 100 mN and note ~ cal'.",
 )
 @click.option(
     "--sort",
@@ -70,18 +70,18 @@ def command(
     = != > >= < <= and ~ (contains). Values may have units.
     """
     with refusing():
-        from tactile_lab.store.catalogue import catalogue, known
+        from tactile_lab.store.catalogue import Catalogue
 
-        entries = catalogue(
-            root,
-            protocol=protocol,
-            sensor=sensor,
-            since=since.date() if since else None,
-            until=until.date() if until else None,
-            words=search,
-            where=where,
-        )
-        facts = known(root, entries) if sort or keys or as_csv else []
+        with Catalogue(root) as found:
+            entries = found.runs(
+                protocol=protocol,
+                sensor=sensor,
+                since=since.date() if since else None,
+                until=until.date() if until else None,
+                words=search,
+                where=where,
+            )
+            facts = found.known(entries) if sort or keys or as_csv else []
         if sort:
             order = ordered(facts, sort)
             entries, facts = [entries[i] for i in order], [facts[i] for i in order]

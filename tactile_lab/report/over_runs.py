@@ -86,6 +86,12 @@ class OverRuns:
         of = count(len(values), "run")
         known = "" if math.isnan(error) else f" ± {show(error, self.unit)}"
         said = [f"{self.key}: {show(mean, self.unit)}{known} (standard error, {of})."]
+        simulated = sum(one.simulated for one in self.points)
+        if 0 < simulated < len(self.points):
+            said.append(
+                f"{simulated} of them are simulated and count as the others: "
+                "--where 'simulated = no' leaves them out."
+            )
         if self.chart is None:
             return [*said, f"{LEAST} runs or more say what is usual."]
         chart = self.chart

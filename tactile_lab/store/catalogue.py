@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
 from dataclasses import replace
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.facts import Fact, facts, grouped
@@ -32,83 +31,84 @@ SENSOR_KEYS = ("sensor", "sample")
 """Notes that name the sensor measured on."""
 
 
-def catalogue(
-    root: Path,
-    *,
-    protocol: str | None = None,
-    sensor: str | None = None,
-    since: date | None = None,
-    until: date | None = None,
-    words: str = "",
-    where: str = "",
-) -> list[RunSummary]:
-    """Runs in folder `root` that match, oldest first.
+class Catalogue:
+    """The runs in a folder, and what is known of them; a context manager.
 
     Args:
-        root: holds run folders.
-        protocol: name of the protocol.
-        sensor: part of the noted sensor, any case.
-        since: first day on which the run started.
-        until: last day.
-        words: each stands somewhere in its names, notes or parameters.
-        where: a condition on keys, see `where`.
-
-    Raises:
-        RunFolderError: `root` is no folder.
-        SceneError: `where` cannot be read.
-    """
-    chosen = []
-    for entry in _all(root, where):
-        day = datetime.fromisoformat(entry.started).date() if entry.started else None
-        if protocol is not None and entry.protocol != protocol:
-            continue
-        if sensor is not None and sensor.casefold() not in entry.sensor.casefold():
-            continue
-        if since is not None and (day is None or day < since):
-            continue
-        if until is not None and (day is None or day > until):
-            continue
-        if not entry.says(words):
-            continue
-        chosen.append(entry)
-    return sorted(chosen, key=lambda entry: (entry.started, entry.name))
-
-
-def known(root: Path, entries: Sequence[RunSummary]) -> list[dict[str, list[Fact]]]:
-    """All that is known of these runs, by key; of a key with a list each item.
+        root: holds run folders; looked at once, when the catalogue is made.
 
     Raises:
         RunFolderError: `root` is no folder.
     """
-    with closing(_index(root)) as index:
-        found = index.facts([entry.name for entry in entries])
-    return [grouped(found[entry.name]) for entry in entries]
 
+    def __init__(self, root: Path) -> None:
+        def read(name: str) -> tuple[dict[str, Any], list[Fact]]:
+            entry = summary(root / name)
+            return entry.to_dict(), facts(entry)
 
-def _all(root: Path, where: str) -> list[RunSummary]:
-    """Every run that fits, from the index where its folder has not changed since."""
-    with closing(_index(root)) as index:
-        found = index.entries(where)
-    entries = []
-    for name, told in found:
-        entry = RunSummary(folder=root / name, **told)
-        if entry.status == "running" and not is_live(entry.folder):
-            entry = replace(entry, status="cut short")
-        entries.append(entry)
-    return entries
+        stamps = dict(_folders(root))
+        self._root = root
+        self._index = Index(root, keep=bool(stamps))
+        self._index.update(stamps, read)
 
+    def __enter__(self) -> Self:
+        return self
 
-def _index(root: Path) -> Index:
-    """The index of a folder, up to date."""
+    def __exit__(self, *error: object) -> None:
+        self._index.close()
 
-    def read(name: str) -> tuple[dict[str, Any], list[Fact]]:
-        entry = summary(root / name)
-        return entry.to_dict(), facts(entry)
+    def runs(
+        self,
+        *,
+        protocol: str | None = None,
+        sensor: str | None = None,
+        since: date | None = None,
+        until: date | None = None,
+        words: str = "",
+        where: str = "",
+    ) -> list[RunSummary]:
+        """Runs that match, oldest first.
 
-    stamps = dict(_folders(root))
-    index = Index(root, keep=bool(stamps))
-    index.update(stamps, read)
-    return index
+        Args:
+            protocol: name of the protocol.
+            sensor: part of the noted sensor, any case.
+            since: first day on which the run started.
+            until: last day.
+            words: each stands somewhere in its names, notes or parameters.
+            where: a condition on keys, see `where`.
+
+        Raises:
+            SceneError: `where` cannot be read.
+        """
+        chosen = []
+        for entry in self._fitting(where):
+            day = (
+                datetime.fromisoformat(entry.started).date() if entry.started else None
+            )
+            if protocol is not None and entry.protocol != protocol:
+                continue
+            if sensor is not None and sensor.casefold() not in entry.sensor.casefold():
+                continue
+            if since is not None and (day is None or day < since):
+                continue
+            if until is not None and (day is None or day > until):
+                continue
+            if not entry.says(words):
+                continue
+            chosen.append(entry)
+        return sorted(chosen, key=lambda entry: (entry.started, entry.name))
+
+    def known(self, entries: Sequence[RunSummary]) -> list[dict[str, list[Fact]]]:
+        """All that is known of these runs, by key; of a key with a list each item."""
+        found = self._index.facts([entry.name for entry in entries])
+        return [grouped(found[entry.name]) for entry in entries]
+
+    def _fitting(self, where: str) -> Iterator[RunSummary]:
+        for name, told in self._index.entries(where):
+            entry = RunSummary(folder=self._root / name, **told)
+            if entry.status == "running" and not is_live(entry.folder):
+                entry = replace(entry, status="cut short")
+            yield entry
 
 
 def _folders(root: Path) -> Iterator[tuple[str, list[int]]]:

@@ -22,6 +22,14 @@ TEXTS = (
 _QUANTITY = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?) (\S.*)")
 _UNITS = ("N", "s", "V", "A", "T", "Hz", "K", "Ohm", "m")
 """Units that end the name of a result, such as critical_force_N."""
+_OF_TRIALS = (
+    ("rest_V_C1", "", "rest_V_C1_V"),
+    ("peak_rate", "", "peak_rate_Hz"),
+    ("first_spike", "", "latency_s"),
+    ("tau", "circuit_adaptation", "tau_s"),
+    ("time_constant", "adaptation", "time_constant_s"),
+)
+"""Keys of the trials, unless the protocol concludes them: table of the trial, name."""
 
 
 class Fact(NamedTuple):
@@ -93,13 +101,13 @@ def _bare(text: str) -> float:
 
 
 def _parameter(key: str, value: Any) -> Iterator[Fact]:
-    # lists stand as texts of their items with commas between
-    for item in str(value).split(", ") if isinstance(value, str) else [value]:
-        if isinstance(item, bool):
-            yield Fact(key, float(item))
-        elif isinstance(item, int | float):
-            yield Fact(key, float(item))
-        elif isinstance(item, str):
+    if isinstance(value, list):
+        for item in value:
+            yield from _parameter(key, item)
+    elif isinstance(value, bool | int | float):
+        yield Fact(key, float(value))
+    elif isinstance(value, str):
+        for item in value.split(", "):  # older runs hold their lists as texts
             match = _QUANTITY.fullmatch(item)
             if match is None:
                 yield Fact(key, None, item)
@@ -108,18 +116,14 @@ def _parameter(key: str, value: Any) -> Iterator[Fact]:
 
 
 def _results(results: Mapping[str, Any]) -> Iterator[Fact]:
-    yield from _numbers(results.get("conclusion") or {})
-    trials = results.get("trials") or []
-    for key, name in (
-        ("rest_V_C1", "rest_V_C1_V"),
-        ("peak_rate", "peak_rate_Hz"),
-        ("first_spike", "latency_s"),
-    ):
-        for trial in trials:
-            yield from _number(key, trial.get(name), name)
-    for trial in trials:
-        law = trial.get("circuit_adaptation") or trial.get("adaptation") or {}
-        yield from _number("tau", law.get("time_constant_s"), "tau_s")
+    concluded = list(_numbers(results.get("conclusion") or {}))
+    yield from concluded
+    told = {fact.key for fact in concluded}
+    for trial in results.get("trials") or []:
+        for key, table, name in _OF_TRIALS:
+            if key not in told:
+                found = trial if not table else trial.get(table) or {}
+                yield from _number(key, found.get(name), name)
 
 
 def _numbers(values: Mapping[str, Any]) -> Iterator[Fact]:

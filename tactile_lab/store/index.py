@@ -17,7 +17,7 @@ from tactile_lab.store.facts import Fact
 from tactile_lab.store.where import Condition, condition
 
 FILE = ".index.sqlite"
-VERSION = 1
+VERSION = 2
 """Of the tables; another one is thrown away."""
 PATIENCE = 2.0
 """Longest wait for another program that writes the index, s."""

@@ -1,4 +1,4 @@
-"""A condition on runs, such as ``protocol.level > 100 mN and note ~ cal``, as SQL."""
+"""A condition on runs, such as ``protocol.levels > 100 mN and note ~ cal``, as SQL."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import NamedTuple
 from tactile_lab.errors import QuantityError, SceneError, choices
 from tactile_lab.store.facts import quantity
 
-SIGNS = {"=": "=", "!=": "<>", ">": ">", ">=": ">=", "<": "<", "<=": "<=", "~": "LIKE"}
-EXAMPLE = "--where 'protocol.level > 100 mN and note ~ cal'"
+EXAMPLE = "--where 'protocol.levels > 100 mN and note ~ cal'"
 _TOKEN = re.compile(
     r"\s*(?:(?P<sign>!=|>=|<=|=|>|<|~)|(?P<bracket>[()])"
-    r"|\"(?P<quoted>[^\"]*)\"|(?P<word>[^\s()=<>~!\"]+))"
+    r"|(?P<quoted>\"[^\"]*\"|'[^']*')|(?P<word>[^\s()=<>~!\"]+))"
 )
 
 
@@ -56,7 +55,8 @@ class _Reader:
             if match is None:
                 raise self._wrong(f"{text[at:].strip()[:20]!r} cannot be read")
             kind = match.lastgroup or ""
-            self._tokens.append((kind, match[kind]))
+            found = match[kind]
+            self._tokens.append((kind, found[1:-1] if kind == "quoted" else found))
             at = match.end()
         self._at = 0
 
@@ -121,7 +121,7 @@ class _Reader:
             except QuantityError as reason:
                 wrong = reason
                 continue
-            sql = f"key = ? AND unit = ? AND number {SIGNS[sign]} ?"
+            sql = f"key = ? AND unit = ? AND number {sign} ?"
             found.append(_exists(sql, key, unit, number))
         if not found:
             raise SceneError(f"--where: {key} {sign} {value}: {wrong}")

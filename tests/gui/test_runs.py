@@ -7,10 +7,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 
+import tactile_lab
 from gui.lanes.compare import MARKS
 from gui.look.theme import Theme
 from gui.review.runs import PAGE, RunsView
-from tactile_lab.store.catalogue import catalogue
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.summary import RunSummary
 
@@ -90,9 +90,9 @@ def test_a_run_whose_program_died_is_listed_as_cut_short(
     app: QApplication, tmp_path: Path
 ) -> None:
     run = RunFolder.create(tmp_path, "pulses", {"title": "Pulses"})
-    assert [entry.status for entry in catalogue(tmp_path)] == ["running"]
+    assert [entry.status for entry in tactile_lab.runs(tmp_path)] == ["running"]
     run._log.close()  # what the kernel does when the process dies
-    found = catalogue(tmp_path)
+    found = tactile_lab.runs(tmp_path)
     assert [entry.status for entry in found] == ["cut short"]
     view = RunsView(Theme("light"))
     view.show_entries(found)

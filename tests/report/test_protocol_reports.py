@@ -22,10 +22,13 @@ from tactile_lab.report.canvas import draw
 from tactile_lab.report.findings import find
 from tactile_lab.report.identified import identify_run, settled
 from tactile_lab.report.overview import overview
-from tactile_lab.report.results import as_json
+from tactile_lab.report.results import as_json, results
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.report.write import write
+from tactile_lab.store.facts import facts, grouped
+from tactile_lab.store.folder import write_json
+from tactile_lab.store.summary import RunSummary
 from tactile_lab.waveform import Waveform
 
 NEWTONS_PER_AMPERE = 0.2
@@ -412,6 +415,17 @@ def test_too_few_spikes_to_fit_are_said(rate_force, tmp_path):
     assert found["conclusion"]["time_constant_s"] is None
     assert found["trials"][0]["spikes"] > 3, "what there is, is kept"
     assert "Not determined" in report.html.read_text(encoding="utf-8")
+
+
+def test_what_a_report_says_of_adaptation_finds_its_run(demo, tmp_path):
+    held = Waveform.pulse(0.16, ramp=0.01, hold=10.0)
+    pushed = modelled("pulses", [("160 mN", 0.16, held, False)])
+    trials = results(find(pushed))["trials"] + results(find(demo))["trials"]
+    write_json(tmp_path / "results.json", {"trials": trials})
+    found = grouped(facts(RunSummary(folder=tmp_path, name="demo")))
+    law, fit = trials[0]["circuit_adaptation"], trials[-1]["adaptation"]
+    assert found["tau"] == [("tau", law["tau_s"]["value"], "", "s")]
+    assert found["time_constant"][-1].number == fit["time_constant_s"]["value"]
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,15 @@ from click.testing import CliRunner
 
 from tactile_lab.cli import cli
 from tactile_lab.errors import RunFolderError, SceneError
-from tactile_lab.store.catalogue import catalogue, known
+from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.folder import RunFolder, read_info, write_json
 from tactile_lab.store.index import FILE as INDEX
 from tactile_lab.store.remarks import add_note
+
+
+def catalogue(root, **asked):
+    with Catalogue(root) as found:
+        return found.runs(**asked)
 
 
 @pytest.fixture
@@ -80,13 +85,17 @@ def test_a_run_that_is_gone_is_forgotten(root):
 @pytest.fixture
 def levels(tmp_path):
     for force, tau, note in (("0.05 N", 2.0, "calibrated"), ("0.2 N", 9.5, "CAL 50%")):
-        parameters = {"level": force, "levels": "0.1 N, 0.3 N", "order": "given"}
+        parameters = {"level": force, "levels": ["0.1 N", "0.3 N"], "order": "given"}
         told = {"protocol": "hold", "parameters": parameters, "title": "A hold"}
         folder = RunFolder.create(tmp_path, "hold", told)
         folder.finish("complete", spikes_online=int(tau))
         add_note(folder.path, note)
         conclusion = {"critical_force_N": {"value": 0.09 + tau / 1000}, "fine": True}
-        trial = {"rest_V_C1_V": 4.3, "adaptation": {"time_constant_s": tau}}
+        trial = {
+            "rest_V_C1_V": 4.3,
+            "circuit_adaptation": {"tau_s": tau},
+            "adaptation": None,
+        }
         results = {"conclusion": conclusion, "trials": [trial, {"rest_V_C1_V": None}]}
         write_json(folder.path / "results.json", results)
     return tmp_path
@@ -101,6 +110,7 @@ def levels(tmp_path):
         ("protocol.levels > 250 mN", [2.0, 9.5]),
         ("protocol.levels > 350 mN", []),
         ("note ~ cal and not protocol.level < 100 mN", [9.5]),
+        ("note ~ 'cal 50%'", [9.5]),
         ("note ~ 50%", [9.5]),
         ("note ~ 5_%", []),
         ('title = "a hold" and spikes = 2', [2.0]),
@@ -110,8 +120,9 @@ def levels(tmp_path):
     ],
 )
 def test_runs_are_found_by_what_they_are(levels, where, taus):
-    found = catalogue(levels, where=where)
-    assert [table["tau"][0].number for table in known(levels, found)] == taus
+    with Catalogue(levels) as found:
+        fitting = found.known(found.runs(where=where))
+    assert [table["tau"][0].number for table in fitting] == taus
 
 
 @pytest.mark.parametrize(

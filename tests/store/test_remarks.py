@@ -5,7 +5,7 @@ import json
 import pytest
 
 from tactile_lab.errors import RunFolderError
-from tactile_lab.store.catalogue import catalogue
+from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.remarks import (
     REMARKS,
@@ -15,6 +15,11 @@ from tactile_lab.store.remarks import (
     read_remarks,
     write_remarks,
 )
+
+
+def _runs(root, **asked):
+    with Catalogue(root) as found:
+        return found.runs(**asked)
 
 
 @pytest.fixture
@@ -41,12 +46,12 @@ def test_remarks_are_changed_and_read_back_the_same(run):
 
 
 def test_the_catalogue_follows_remarks_and_searches_them(run):
-    assert catalogue(run.parent, words="moved magnet") == []
+    assert _runs(run.parent, words="moved magnet") == []
     add_note(run, "moved the MAGNET", 1.5)
-    (found,) = catalogue(run.parent, words="moved magnet")
+    (found,) = _runs(run.parent, words="moved magnet")
     assert found.notes == ["1.5 s: moved the MAGNET"]
     write_remarks(run, Remarks(title="best", tags=["paper"]))
-    (found,) = catalogue(run.parent, words="paper")
+    (found,) = _runs(run.parent, words="paper")
     assert found.title == "best" and found.tags == ["paper"]
 
 
@@ -67,5 +72,5 @@ def test_damaged_remarks_are_refused_with_what_to_do(run, rubbish):
     (run / REMARKS).write_text(rubbish)
     with pytest.raises(RunFolderError, match="delete it"):
         read_remarks(run)
-    (entry,) = catalogue(run.parent)
+    (entry,) = _runs(run.parent)
     assert "remarks" in entry.trouble
