@@ -85,7 +85,7 @@ class RunFolder:
             }
             write_info(path, content)
             log = (path / LOG).open("a", encoding="utf-8")
-        _lock(log)
+        lock(log, wait=True)
         return cls(path, content, log)
 
     def update(self, **entries: Any) -> None:
@@ -224,7 +224,7 @@ def is_live(path: Path) -> bool:
     """Whether a process still writes the run in folder `path`."""
     try:
         with (path / LOG).open(encoding="utf-8") as log:
-            return not _lock(log, shared=True)
+            return not lock(log, shared=True)
     except OSError:
         return False  # no log, or none that may be read: nobody here can be its writer
 
@@ -263,13 +263,13 @@ def _plain(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9-]+", "-", name).strip("-")[:60] or "run"
 
 
-def _lock(file: IO[str], *, shared: bool = False) -> bool:
-    """Lock the open log until it is closed or its process dies; False if taken.
+def lock(file: IO[str], *, shared: bool = False, wait: bool = False) -> bool:
+    """Lock an open file until it is closed or its process dies; False if taken.
 
     Args:
-        file: the log.
-        shared: as a reader does who looks whether a writer has it; a writer waits for
-            such a look to end.
+        file: such as a run's log.
+        shared: as a reader does who looks whether a writer has it.
+        wait: for such a look to end, as a writer does.
     """
     if sys.platform == "win32":
         import msvcrt
@@ -283,7 +283,8 @@ def _lock(file: IO[str], *, shared: bool = False) -> bool:
     import fcntl
 
     try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB if shared else fcntl.LOCK_EX)
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        fcntl.flock(file, kind if wait else kind | fcntl.LOCK_NB)
     except OSError:
         return False
     return True

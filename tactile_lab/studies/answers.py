@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.analysis.control_chart import mean_and_error
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.plot import Panel, Plot, Series
@@ -21,6 +23,8 @@ FloatArray = NDArray[np.float64]
 
 CURVES = 8
 """Most curves in one panel."""
+ROWS = 60
+"""Most rows of a table of values; more are only drawn."""
 DOTS = 3000
 """Most dots in one panel."""
 RESAMPLES = 200
@@ -40,7 +44,7 @@ def conclude(found: Gathered) -> Conclusion:
     values: dict[str, Any] = {"points": design.size, "failed": failed}
     for name, column in found.numbers().items():
         known = column[np.isfinite(column)]
-        if known.size and design.drawn and design.method not in ("indices", "tornado"):
+        if known.size and design.sampled:
             low, high = np.quantile(known, (0.025, 0.975))
             sentences.append(
                 f"{name}: median {_told(found, name, np.median(known))}, 95 % of the "
@@ -51,14 +55,10 @@ def conclude(found: Gathered) -> Conclusion:
                 "low": float(low),
                 "high": float(high),
             }
+    if not design.drawn and found.numbers():
+        tables += _every(found)
     if study.require:
-        good, share = _yield(found)
-        told = ", ".join(f"{name} {limit}" for name, limit in study.require.items())
-        sentences.append(
-            f"{good} of {design.size} points are good ({told}): {share.value:.1%} "
-            f"({share.low:.1%} to {share.high:.1%}, Wilson's 95 % interval)."
-        )
-        values["yield"] = share
+        tables += _yield(found, sentences, values, missing)
     if design.method == "indices" and design.drawn:
         tables += _indices(found, values, missing)
     if design.method == "tornado" and design.drawn:
@@ -81,7 +81,7 @@ def plots(found: Gathered) -> Iterator[Plot]:
         if not axis.numeric or dimension != key:
             continue
         yield _response(found, axis, number, np.array(values, dtype=np.float64))
-    if design.drawn and design.method not in ("indices", "tornado"):
+    if design.sampled:
         for number, axis in enumerate(design.drawn):
             yield _scatter(found, axis, number)
 
@@ -93,22 +93,30 @@ def _response(found: Gathered, axis: Axis, number: int, at: FloatArray) -> Plot:
     along = dimensions.index(axis.key)
     others = [g[0] for g in design.groups if g[0].key != axis.key]
     by = min(others, key=lambda one: len(one.values)) if others else None
+    if by is not None and len(by.values) > CURVES:
+        by = None
+    sampled = len(others) == (by is not None) and (
+        design.sampled if design.drawn else design.repeat > 1
+    )
     panels = []
     for name, column in found.numbers().items():
-        if by is None or len(by.values) > CURVES:
-            series = _mean(np.moveaxis(column, along, 0), at, "")
+        if design.drawn and design.repeat > 1:
+            column = _known_mean(column)  # one number of each draw
+        if by is None:
+            series = _mean(np.moveaxis(column, along, 0), at, "", sampled=sampled)
             panels.append(Panel(label=name, unit=found.unit(name), series=series))
             continue
         moved = np.moveaxis(column, (along, dimensions.index(by.key)), (0, 1))
         curves: list[Series] = []
         for i, value in enumerate(by.values):
-            curves += _mean(moved[:, i], at, by.shown(value), i)
+            curves += _mean(moved[:, i], at, by.shown(value), i, sampled=sampled)
         panels.append(Panel(label=name, unit=found.unit(name), series=tuple(curves)))
+    of = "draws" if design.drawn else "repeats"
     return Plot(
         name=f"response_{number}",
         title=f"response to {axis.key}",
-        caption=f"Means over all other axes and repeats against {axis.key}; bars are "
-        "95 % intervals of the mean where there are several.",
+        caption=f"Means over all other axes and repeats against {axis.key}"
+        + (f"; bars are 95 % intervals of the mean over {of}." if sampled else "."),
         x_label=axis.key,
         x_unit=axis.unit,
         panels=tuple(panels),
@@ -118,21 +126,35 @@ def _response(found: Gathered, axis: Axis, number: int, at: FloatArray) -> Plot:
 COLOURS = ("V_C1", "V_C2", "V_K", "force", "rate", "model", "ink", "quiet")
 
 
+def _known_mean(column: FloatArray) -> FloatArray:
+    """Mean along the last axis of what is known there; NaN where nothing is."""
+    known = np.isfinite(column)
+    size = known.sum(axis=-1)
+    total = np.where(known, column, 0.0).sum(axis=-1)
+    none = np.full(size.shape, np.nan)
+    mean: FloatArray = np.divide(total, size, out=none, where=size > 0)
+    return mean
+
+
 def _mean(
-    column: FloatArray, at: FloatArray, name: str, number: int = 0
+    column: FloatArray,
+    at: FloatArray,
+    name: str,
+    number: int = 0,
+    *,
+    sampled: bool,
 ) -> tuple[Series, ...]:
-    """Mean of everything but the first axis, with its 95 % interval."""
+    """Mean of everything but the first axis; its 95 % interval where it is a sample."""
     rows = column.reshape(at.size, -1)
+    mean, error = _known_mean(rows), None
     known = np.isfinite(rows)
     size = known.sum(axis=1)
-    total = np.where(known, rows, 0.0).sum(axis=1)
-    mean = np.divide(total, size, out=np.full(at.size, np.nan), where=size > 0)
-    error = None
-    if np.max(size, initial=0) > 1:
+    if sampled and np.max(size, initial=0) > 1:
         off = np.where(known, rows - mean[:, None], 0.0)
         variance = (off**2).sum(axis=1) / np.maximum(size - 1, 1)
         wide = np.array([student_95(int(max(n - 1, 1))) for n in size])
         error = wide * np.sqrt(variance / np.maximum(size, 1))
+        error[size < 2] = np.nan
     return (
         Series(
             x=at,
@@ -173,19 +195,98 @@ def _each(size: int) -> str:
     return "Each point" if step == 1 else f"One point in {step}"
 
 
-def _yield(found: Gathered) -> tuple[int, Estimate]:
-    """How many points meet every requirement; one that failed does not."""
-    numbers, size = found.numbers(), found.study.design.size
-    good = np.ones(found.study.design.shape, dtype=bool)
+def _every(found: Gathered) -> Iterator[Table]:
+    """What was found at each combination of values, where they are few."""
+    design, columns = found.study.design, found.numbers()
+    together = math.prod(len(group[0].values) for group in design.groups)
+    if together > ROWS:
+        return
+    wide = {name: c.reshape(together, design.repeat) for name, c in columns.items()}
+    rows = []
+    for i, shown in enumerate(_combinations(found)):
+        told = (_with_error(found, name, column[i]) for name, column in wide.items())
+        rows.append((*shown, *told))
+    repeats = f"mean and standard error of {design.repeat} repeats"
+    yield Table(
+        title="What was found",
+        headings=(*(axis.key for g in design.groups for axis in g), *wide),
+        rows=tuple(rows),
+        note=f"Where it is known of several: {repeats}." if design.repeat > 1 else "",
+    )
+
+
+def _with_error(found: Gathered, name: str, values: FloatArray) -> str:
+    """Mean of what is known, with its standard error where it is known of several."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return "none"
+    mean, error = mean_and_error(known.tolist())
+    of = "" if math.isnan(error) else f" ± {show(error, found.unit(name))}"
+    return f"{_told(found, name, mean)}{of}"
+
+
+def _combinations(found: Gathered) -> Iterator[tuple[str, ...]]:
+    """The values of each combination of the axes that have some, for a person."""
+    groups = found.study.design.groups
+    for places in itertools.product(*(range(len(g[0].values)) for g in groups)):
+        yield tuple(
+            axis.shown(axis.values[place])
+            for group, place in zip(groups, places, strict=True)
+            for axis in group
+        )
+
+
+def _yield(
+    found: Gathered,
+    sentences: list[str],
+    values: dict[str, Any],
+    missing: list[str],
+) -> Iterator[Table]:
+    """How many points meet every requirement; one that failed does not.
+
+    Only of independent draws is the share known to an interval; at each combination
+    of values by itself.
+    """
+    numbers, design = found.numbers(), found.study.design
+    good = np.ones(design.shape, dtype=bool)
     for name, limit in found.study.require.items():
-        column = numbers[name]
-        good &= np.isfinite(column)
-        if limit.least is not None:
-            good &= column >= limit.least
-        if limit.most is not None:
-            good &= column <= limit.most
-    number = int(good.sum())
-    return number, Estimate.share(number, size)
+        if name not in numbers:
+            missing.append(f"[require.{name}]: it is a row of numbers, no number.")
+            return
+        good &= limit.hold(numbers[name])
+    told = ", ".join(f"{name} {limit}" for name, limit in found.study.require.items())
+    said = f"{int(good.sum())} of {design.size} points are good ({told})"
+    shares = None
+    if design.sampled and design.repeat == 1:
+        shares = [
+            Estimate.share(int(row.sum()), row.size)
+            for row in good.reshape(-1, design.shape[-1])
+        ]
+    if shares is not None and len(shares) == 1:
+        (share,) = shares
+        sentences.append(f"{said}: {_share(share)}, Wilson's 95 % interval).")
+        values["yield"] = share
+        return
+    values["yield"] = float(good.mean())
+    sentences.append(
+        f"{said}. They are no sample of anything: how many depends on the values that "
+        "were chosen, and there is no interval."
+    )
+    if shares is not None and len(shares) <= ROWS:
+        yield Table(
+            title="Yield",
+            headings=(*(axis.key for g in design.groups for axis in g), "good"),
+            rows=tuple(
+                (*shown, f"{_share(share)})")
+                for shown, share in zip(_combinations(found), shares, strict=True)
+            ),
+            note=f"Of {design.shape[-1]} draws each; in brackets Wilson's 95 % "
+            "interval, as of independent draws.",
+        )
+
+
+def _share(one: Estimate) -> str:
+    return f"{one.value:.1%} ({one.low:.1%} to {one.high:.1%}"
 
 
 def _indices(

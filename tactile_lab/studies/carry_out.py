@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import plan
+from tactile_lab.store.folder import lock
 from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
 from tactile_lab.studies.points import Points, Task
@@ -28,6 +30,10 @@ FIRST = 3
 """Points whose time tells what the others will take."""
 SHELF = "points"
 """Folder of finished points, shared by all studies beside it."""
+LOCK = ".lock"
+"""File in a study's folder that whoever carries it out holds."""
+PATIENCE = 2.0
+"""Longest wait for the workers of one that was killed to end, s."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +120,44 @@ def carry_out(
         tell: told of each finished batch.
 
     Raises:
-        RecordingError: the folder cannot be written.
+        RecordingError: the folder cannot be written, or another process carries
+            the study out.
         UnsafeError: a coil's state could not be verified: nothing goes on.
         NotFoundError, SceneError: the scheduler cannot be used.
     """
+    with _alone(out / study.name):
+        return _carried_out(study, out, count, scheduler, tell)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Let nobody else carry out the study of this folder meanwhile."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / LOCK).open("w", encoding="utf-8")
+    except OSError as reason:
+        raise RecordingError(
+            f"{folder} cannot be written: {reason.strerror}. Name another folder."
+        ) from reason
+    with file:
+        late = time.monotonic() + PATIENCE
+        while not lock(file):
+            if time.monotonic() > late:
+                raise RecordingError(
+                    f"Another process carries out the study of {folder}. Wait for it, "
+                    "or give this study another file name; finished points are shared."
+                )
+            time.sleep(PATIENCE / 20)
+        yield
+
+
+def _carried_out(
+    study: Study,
+    out: Path,
+    count: int | None,
+    scheduler: str | None,
+    tell: Callable[[Progress], None],
+) -> Gathered:
     points, shelf = study_points(study, out), Shelf(out / SHELF)
     named = addresses(study)
     missing = _missing(study, named, shelf)

@@ -74,6 +74,11 @@ class Design:
         return tuple(axis for axis in self.axes if axis.spread is not None)
 
     @property
+    def sampled(self) -> bool:
+        """Whether its draws are a sample of how the parts are distributed."""
+        return bool(self.drawn) and self.method not in ("indices", "tornado")
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Number of values of each group, of draws if there are any, of repeats."""
         grid = tuple(len(group[0].values) for group in self.groups)

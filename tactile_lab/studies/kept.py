@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import builtins
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -36,6 +38,13 @@ NAMED = {
 """Names that stand for one of these or an expression, and its unit."""
 OF_A_POINT = frozenset({"result", "run", "answer", "circuit", "scene"})
 """What an expression may use of a point beside its spikes and the force."""
+_ALWAYS = frozenset({"spikes", "circuit", "scene", "critical_force", "np", "nan"})
+USABLE = {
+    "model": _ALWAYS | {"result", "force"},
+    "simulated": _ALWAYS | {"run", "answer"},
+    "bench": _ALWAYS | {"run", "answer"},
+}
+"""Names that an expression may use, by what a study is computed on."""
 _FUNCTION = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]*)")
 
 
@@ -122,23 +131,27 @@ def _function(kept: Kept) -> Callable[[Any], Any]:
     return called
 
 
-def kept(asked: tuple[str, ...] | Mapping[str, str], folder: Path) -> tuple[Kept, ...]:
+def kept(
+    asked: tuple[str, ...] | Mapping[str, str], folder: Path, on: str
+) -> tuple[Kept, ...]:
     """What a study asks to keep: names of `NAMED`, or expressions by name.
 
     Args:
         asked: names, or expression (or ``file.py:function``) by name.
         folder: what files are relative to.
+        on: what the study is computed on.
 
     Raises:
-        SceneError: no such name, an expression that is not Python, no such file.
+        SceneError: no such name, an expression that is not Python or uses a name
+            that is not there, no such file.
     """
     if not asked:
         raise SceneError("keep is empty: a study that keeps nothing computes nothing.")
     pairs = asked if isinstance(asked, Mapping) else {name: name for name in asked}
-    return tuple(_kept(name, text, folder) for name, text in pairs.items())
+    return tuple(_kept(name, text, folder, on) for name, text in pairs.items())
 
 
-def _kept(name: str, text: str, folder: Path) -> Kept:
+def _kept(name: str, text: str, folder: Path, on: str) -> Kept:
     if not name.isidentifier():
         raise SceneError(f'keep: "{name}" is no name; use letters, digits and _.')
     function = _FUNCTION.fullmatch(text)
@@ -162,4 +175,17 @@ def _kept(name: str, text: str, folder: Path) -> Kept:
         raise SceneError(
             f'keep.{name} = "{text}" is no Python expression: {reason}.'
         ) from reason
+    for used in _free(expression):
+        if used not in USABLE[on] and not hasattr(builtins, used):
+            told = choices(used, sorted(USABLE[on]), f'With on = "{on}" there are')
+            raise SceneError(f'keep.{name} = "{text}": there is no {used}; {told}')
     return Kept(name, expression, unit=unit)
+
+
+def _free(expression: str) -> list[str]:
+    """Names that an expression takes from outside, in their order."""
+    nodes = list(ast.walk(ast.parse(expression.strip(), mode="eval")))
+    names = [one for one in nodes if isinstance(one, ast.Name)]
+    own = {one.id for one in names if isinstance(one.ctx, ast.Store)}
+    own |= {one.arg for one in nodes if isinstance(one, ast.arg)}
+    return [one.id for one in names if one.id not in own]

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.conclusion import Conclusion
+from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import show
+from tactile_lab.store.folder import replacing, write_json
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import MADE_OF, Gathered, is_written
@@ -25,8 +27,18 @@ def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
         The page, and what it concludes.
 
     Raises:
-        OSError: the folder cannot be written.
+        RecordingError: the folder cannot be written.
     """
+    try:
+        return _written(found, folder)
+    except OSError as reason:
+        raise RecordingError(
+            f"The report cannot be written into {folder}: {reason}. All points are "
+            "kept; make room and start the study again."
+        ) from reason
+
+
+def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     # heavy, and a study that is finished needs neither
     from tactile_lab.report.canvas import draw, save
     from tactile_lab.report.html import picture, rendered
@@ -60,11 +72,11 @@ def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
         made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
     )
     html = folder / REPORT
-    html.write_text(text, encoding="utf-8")
+    with replacing(html) as new:
+        new.write_text(text, encoding="utf-8")
     # last, for `told_before`
     results = {MADE_OF: study_digest(study), "text": said.text, **said.plain}
-    whole = json.dumps(results, indent=2, allow_nan=False)
-    (folder / RESULTS).write_text(whole + "\n", encoding="utf-8")
+    write_json(folder / RESULTS, results)
     return html, said
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -157,7 +157,8 @@ class Part:
         unit: SI.
         least, most: SI.
         values: that can be bought, within these; empty for what is set by hand.
-        tolerance: two standard deviations: relative, of a voltage in V.
+        tolerance: two standard deviations: a part of the value, or SI.
+        relative: which of them.
     """
 
     name: str
@@ -166,6 +167,7 @@ class Part:
     most: float
     values: tuple[float, ...]
     tolerance: float
+    relative: bool
 
     @property
     def by_hand(self) -> bool:
@@ -174,7 +176,7 @@ class Part:
 
     def spread(self, value: float) -> float:
         """Standard deviation of the part where its nominal value is this, SI."""
-        return self.tolerance / 2 * (1.0 if self.by_hand else value)
+        return self.tolerance / 2 * (value if self.relative else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -283,15 +285,23 @@ def _part(name: str, given: PartTable, circuit: Circuit, origin: str) -> Part:
             f"{where}: {series} has no value from {show(least, unit)} to "
             f"{show(most, unit)}; widen the range."
         )
-    return Part(name, unit, least, most, values, _tolerance(given, unit, read))
+    return Part(name, unit, least, most, values, *_tolerance(where, given, unit, read))
 
 
-def _tolerance(given: PartTable, unit: str, read: Any) -> float:
+def _tolerance(
+    where: str, given: PartTable, unit: str, read: Callable[[str], float]
+) -> tuple[float, bool]:
+    """Two standard deviations, and whether they are a part of the value."""
     if given.tolerance is None:
-        return {"Ohm": 0.01, "F": 0.05, "V": 2e-3}[unit]
-    percent = _PERCENT.fullmatch(given.tolerance)
-    found = float(percent[1]) / 100 if percent and unit != "V" else None
-    return read(given.tolerance) if found is None else found
+        return {"Ohm": 0.01, "F": 0.05, "V": 2e-3}[unit], unit != "V"
+    percent = _PERCENT.fullmatch(given.tolerance) if unit != "V" else None
+    found = float(percent[1]) / 100 if percent else read(given.tolerance)
+    if not 0 < found < math.inf or (percent and found > 1):
+        raise SceneError(
+            f"{where}: tolerance = {given.tolerance!r} is no tolerance; give more than "
+            "0 and at most 100 %, or leave it out."
+        )
+    return found, percent is not None
 
 
 def _quantity(where: str, unit: str, text: str) -> float:

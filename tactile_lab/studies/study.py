@@ -7,11 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.complaint import validated
-from tactile_lab.errors import SceneError, choices, nearest
+from tactile_lab.errors import QuantityError, SceneError, choices, nearest
 from tactile_lab.plugins import study_names, study_path
+from tactile_lab.quantity import parse, show
 from tactile_lab.scene.load import load, read_toml, tuples
 from tactile_lab.scene.overrides import from_text
 from tactile_lab.scene.scene import Scene
@@ -64,19 +67,39 @@ class Requirement(SceneTable):
     """``[require.NAME]``: what a kept number must be for a point to be good.
 
     Attributes:
-        least, most: inclusive, SI; None for no limit.
+        least, most: inclusive, SI or a quantity ("20 mN"); None for no limit.
     """
 
-    least: float | None = None
-    most: float | None = None
+    least: float | str | None = None
+    most: float | str | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Between which a kept number of a good point lies.
+
+    Attributes:
+        least, most: inclusive, SI; None for no limit.
+        unit: SI; "" without one.
+    """
+
+    least: float | None
+    most: float | None
+    unit: str
 
     def __str__(self) -> str:
         parts = [
-            f"{word} {limit:g}"
+            f"{word} {show(limit, self.unit)}"
             for word, limit in (("at least", self.least), ("at most", self.most))
             if limit is not None
         ]
-        return " and ".join(parts) or "any number"
+        return " and ".join(parts)
+
+    def hold(self, column: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which numbers lie between, of the same shape; NaN never does."""
+        low = -np.inf if self.least is None else self.least
+        high = np.inf if self.most is None else self.most
+        return np.isfinite(column) & (column >= low) & (column <= high)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +143,7 @@ class Study:
     on: On
     design: Design
     kept: tuple[Kept, ...]
-    require: Mapping[str, Requirement]
+    require: Mapping[str, Limits]
     order: Order
     source: Mapping[str, Any]
 
@@ -188,18 +211,19 @@ def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
         repeat=table.repeat,
         seed=table.seed,
     )
+    keeping = kept(table.keep, folder, table.on)
     study = Study(
         name=name,
         title=table.title or name,
         scene=scene,
         on=table.on,
         design=checked(design),
-        kept=kept(table.keep, folder),
-        require=dict(table.require),
+        kept=keeping,
+        require=_limits(table.require, keeping, origin),
         order=table.order,
         source=data,
     )
-    _check(study, origin)
+    _check(study)
     return study
 
 
@@ -216,16 +240,50 @@ def _scene(table: StudyFile, folder: Path) -> Scene:
     return base.sensor_alone if table.on == "model" else base
 
 
-def _check(study: Study, origin: str) -> None:
-    """Refuse keys and requirements that no point could use."""
-    names = [one.name for one in study.kept]
-    for name in study.require:
-        if name not in names:
-            hint = nearest(name, names)
+def _limits(
+    asked: Mapping[str, Requirement], keeping: tuple[Kept, ...], origin: str
+) -> dict[str, Limits]:
+    """What is required, in SI.
+
+    Raises:
+        SceneError: of something that is not kept or is a row, or no number can be so.
+    """
+    by_name = {one.name: one for one in keeping}
+    found = {}
+    for name, table in asked.items():
+        where = f"{origin}: [require.{name}]"
+        if name not in by_name:
+            hint = nearest(name, by_name)
             raise SceneError(
-                f"{origin}: [require.{name}]: nothing of that name is kept"
-                f"{'; ' + hint if hint else '.'} Kept: {', '.join(names)}."
+                f"{where}: nothing of that name is kept"
+                f"{'; ' + hint if hint else '.'} Kept: {', '.join(by_name)}."
             )
+        if by_name[name].expression == "spike_times":
+            raise SceneError(
+                f"{where}: spike_times is a row of numbers; require a number, such "
+                "as spike_count."
+            )
+        unit = by_name[name].unit
+        try:
+            least, most = (
+                parse(limit, unit) if isinstance(limit, str) else limit
+                for limit in (table.least, table.most)
+            )
+        except QuantityError as reason:
+            raise SceneError(f"{where}: {reason}") from reason
+        if least is None and most is None:
+            raise SceneError(f"{where} asks for nothing; give least or most.")
+        if least is not None and most is not None and least > most:
+            raise SceneError(
+                f"{where}: least = {show(least, unit)} lies above most = "
+                f"{show(most, unit)}; no number can be both."
+            )
+        found[name] = Limits(least, most, unit)
+    return found
+
+
+def _check(study: Study) -> None:
+    """Refuse keys that no point could use."""
     for one in study.design.axes:  # each key alone, so that the message names it
         first = one.values[0] if one.values else one.spread and one.spread.centre
         load(study.scene, changed([one], [first]))
@@ -248,16 +306,17 @@ def short(scene: Scene, sweeps: tuple[str, ...], repeat: int) -> Study:
         ranged = values.count(":") == 2
         listed = values if ranged else [from_text(v.strip()) for v in values.split(",")]
         axes.append(axis(key.strip(), {"values": listed}, scene))
+    on: On = "simulated" if scene.bench.simulated else "bench"
     study = Study(
         name=f"{scene.name}_sweep",
         title=f"{scene.name}: {', '.join(one.key for one in axes) or 'repeats'}",
         scene=scene,
-        on="simulated" if scene.bench.simulated else "bench",
+        on=on,
         design=checked(Design(axes=tuple(axes), repeat=repeat)),
-        kept=kept(ALWAYS, Path.cwd()),
+        kept=kept(ALWAYS, Path.cwd(), on),
         require={},
         order="random",
         source={"scene": scene.name, "sweep": list(sweeps), "repeat": repeat},
     )
-    _check(study, "--sweep")
+    _check(study)
     return study

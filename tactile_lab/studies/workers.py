@@ -33,6 +33,8 @@ AHEAD = 2
 """Batches that wait at each worker, so that none stands idle."""
 ANSWER = 60.0
 """For which a Dask worker is waited for to tell its version, s."""
+SCHEMES = ("tcp://", "inproc://", "tls://", "ucx://", "ws://", "wss://")
+"""With which an address of a scheduler may begin."""
 MOST_ENDED = 3
 """So often in a row workers may be ended from outside before a batch is finished."""
 
@@ -199,7 +201,7 @@ def _client(address: str) -> Iterator[Any]:
         raise NotFoundError(
             "--scheduler needs Dask: pip install 'tactile-lab[cluster]'."
         ) from reason
-    if "://" not in address:
+    if not address.startswith(SCHEMES):
         raise NotFoundError(
             f"--scheduler {address}: write its address, such as tcp://HOST:8786."
         )

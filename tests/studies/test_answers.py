@@ -1,7 +1,9 @@
 """What a study says, against what can be computed by hand."""
 
 import json
+import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +12,8 @@ from click.testing import CliRunner
 from tactile_lab import Circuit
 from tactile_lab.cli import cli
 from tactile_lab.model.equations import critical_force
-from tactile_lab.quantity import parse, typed
-from tactile_lab.studies.answers import conclude
+from tactile_lab.quantity import parse, show, typed
+from tactile_lab.studies.answers import conclude, plots
 from tactile_lab.studies.carry_out import carry_out
 from tactile_lab.studies.study import load_study
 
@@ -93,6 +95,57 @@ def test_the_yield_counts_what_is_good_with_an_interval(tmp_path: Path) -> None:
     assert share.high - share.low == pytest.approx(
         2 * 1.96 * (0.25 / 200) ** 0.5, rel=0.1
     )
+
+
+@pytest.mark.parametrize("most", [0.0926, "92.6 mN"])
+def test_draws_at_several_values_have_a_yield_at_each_and_none_together(
+    tmp_path: Path, most: float | str
+) -> None:
+    given = tomllib.loads(STUDY)
+    given["axis"][2] = {"key": "sensor.V_th", "values": ["2.55 V", "2.56 V", "2.57 V"]}
+    given |= {"draw": {"points": 50}, "require": {"critical_force": {"most": most}}}
+    found = conclude(carry_out(load_study(given), tmp_path, count=1))
+    assert isinstance(found.values["yield"], float)
+    assert "there is no interval" in found.text and "at most 92.6 mN" in found.text
+    (table,) = found.tables
+    assert table.title == "Yield" and len(table.rows) == 3
+    assert "% (" in table.rows[0][-1]
+
+
+def test_values_without_draws_are_told_one_by_one(tmp_path: Path) -> None:
+    given: dict[str, Any] = {"scene": "demo", "keep": ["critical_force"]}
+    given["axis"] = [
+        {"key": "sensor.V_GS", "values": ["1.38 V", "1.4 V"]},
+        {"key": "sensor.R1", "values": ["9 MOhm", "10 MOhm", "11 MOhm"]},
+    ]
+    given["require"] = {"critical_force": {"most": "90 mN"}}
+    found = conclude(carry_out(load_study(given), tmp_path, count=1))
+    (table,) = found.tables
+    assert table.headings == ("sensor.V_GS", "sensor.R1", "critical_force")
+    here = critical_force(Circuit(V_GS=1.4, R1=9e6))
+    assert ("1.4 V", "9 MOhm", show(float(here), "N")) in table.rows
+    assert "interval" not in found.text.replace("there is no interval", "")
+
+
+def test_bars_stand_where_something_was_drawn_and_not_over_a_grid(
+    tmp_path: Path,
+) -> None:
+    drawn = {"key": "sensor.R1", "normal": "1 %"}
+    grid = [
+        {"key": f"sensor.{key}", "values": [f"{at} {unit}" for at in values]}
+        for key, values, unit in (
+            ("V_GS", (1.38, 1.4), "V"),
+            ("C1", (200, 220), "pF"),
+            ("R2", (1, 2), "MOhm"),
+        )
+    ]
+    for axes, bars in (([*grid[:2], drawn], True), (grid, False)):
+        draw = {"draw": {"points": 8}} if bars else {}
+        asked = {"scene": "demo", "keep": ["critical_force"], "axis": axes, **draw}
+        found = carry_out(load_study(asked, f"bars {bars}"), tmp_path, count=1)
+        first = next(plots(found))
+        assert ("95 %" in first.caption) is bars
+        assert (first.panels[0].series[0].y_error is not None) is bars
 
 
 def test_from_the_command_line_to_a_page(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from tactile_lab.errors import (
 from tactile_lab.studies.addresses import code_digests
 from tactile_lab.studies.carry_out import Progress, carry_out, forecast
 from tactile_lab.studies.dataset import Gathered
+from tactile_lab.studies.page import write_page
 from tactile_lab.studies.study import Study, load_study
 from tactile_lab.studies.workers import _check_versions
 
@@ -207,6 +208,7 @@ def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
     assert numbers["noise"][0] != numbers["noise"][1]
 
 
+TIMES = {"spike_times": {"most": 1}}
 ZIPPED = {"key": "sensor.R1", "normal": "1 %", "zip": "a"}
 VAST = {"key": "sensor.R1", "values": "1 MOhm : 2 MOhm : 1 mOhm"}
 LARGE = {"key": "sensor.R1", "values": "1 MOhm : 2 MOhm : 100 Ohm"}
@@ -224,6 +226,15 @@ BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
         ({"keep": {"a": "len("}}, "no Python expression"),
         ({"keep": {"a": "no.py:f"}}, "cannot be read"),
         ({"keep": []}, "keeps nothing"),
+        ({"keep": {"a": "len(spiks)"}}, 'did you mean "spikes"'),
+        ({"keep": {"a": "run.duration"}}, 'there is no run; With on = "model"'),
+        (
+            {"keep": ["spike_times"], "require": {"spike_times": {"most": 1}}},
+            "is a row",
+        ),
+        ({"require": {"first_spike": {"most": "1 N"}}}, "s is needed"),
+        ({"require": {"spike_count": {"least": 3, "most": 2}}}, "lies above most"),
+        ({"require": {"spike_count": {}}}, "asks for nothing"),
         ({"repeat": 2}, "the model gives the same"),
         ({"on": "bench"}, "needs real instruments"),
         ({"require": {"spikes": {"least": 1}}}, "nothing of that name is kept"),
@@ -303,6 +314,8 @@ def test_workers_that_would_compute_something_else_are_refused(
 def test_an_address_without_a_scheme_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match="such as tcp://HOST:8786"):
         done(load_study(LEVELS), tmp_path, count=None, scheduler="there:8786")
+    with pytest.raises(NotFoundError, match="such as tcp://HOST:8786"):
+        done(load_study(LEVELS), tmp_path, count=None, scheduler="http://there:8786")
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
@@ -310,9 +323,26 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be written"):
         done(load_study(SHORT), tmp_path)
     (tmp_path / "points").unlink()
-    (tmp_path / "study").write_text("in the way")
+    found, _ = done(load_study(SHORT), tmp_path)
+    (tmp_path / "study" / "report.html").mkdir()
     with pytest.raises(RecordingError, match="All points are kept"):
-        done(load_study(SHORT), tmp_path)
+        write_page(found, tmp_path / "study")
+    (tmp_path / "other").write_text("in the way")
+    with pytest.raises(RecordingError, match="other cannot be written"):
+        done(load_study(SHORT, "other"), tmp_path)
+
+
+def test_two_at_once_are_told_of_each_other(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("tactile_lab.studies.carry_out.PATIENCE", 0.01)
+    asked, told = load_study(SHORT), []
+
+    def tell(progress: Progress) -> None:
+        with pytest.raises(RecordingError, match="Another process carries out"):
+            carry_out(asked, tmp_path, count=1)
+        told.append(progress)
+
+    found = carry_out(asked, tmp_path, count=1, tell=tell)
+    assert told and same(found, done(asked, tmp_path)[0])
 
 
 def test_a_worker_that_is_killed_is_replaced(tmp_path: Path) -> None:

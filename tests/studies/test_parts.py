@@ -88,9 +88,18 @@ def test_what_cannot_be_had_is_named_and_ends_with_1(tmp_path: Path) -> None:
             "E96 has no value from",
         ),
         ({"parts": {"V_GS": {"series": "E24"}}}, "set by hand"),
+        ({"parts": {"R1": {"tolerance": "-1 %"}}}, "is no tolerance"),
+        ({"parts": {"R1": {"tolerance": "500 %"}}}, "is no tolerance"),
+        ({"parts": {"R1": {"tolerance": "0 Ohm"}}}, "is no tolerance"),
         ({"scene": "dmeo"}, 'did you mean "demo"'),
     ],
 )
 def test_what_cannot_be_used_is_refused(change: dict, told: str) -> None:
     with pytest.raises(SceneError, match=told):
         load_specification({**ONE, **change})
+
+
+@pytest.mark.parametrize("tolerance", ["1 %", "100 kOhm"])
+def test_a_tolerance_is_a_part_of_the_value_or_a_quantity(tolerance: str) -> None:
+    asked = load_specification({**ONE, "parts": {"R1": {"tolerance": tolerance}}})
+    assert asked.parts[0].spread(10e6) == pytest.approx(50e3)
