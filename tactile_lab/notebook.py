@@ -7,14 +7,15 @@ from html import escape
 
 
 def facts(title: str, rows: Iterable[tuple[str, object]]) -> str:
-    """A title over a table of names and values; empty values are left out."""
+    """A title, if any, over a table of names and values; empty values are left out."""
     cells = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th>'
         f'<td style="text-align:left">{escape(str(value))}</td></tr>'
         for name, value in rows
         if value not in (None, "")
     )
-    return f"<p><b>{escape(title)}</b></p><table>{cells}</table>"
+    head = f"<p><b>{escape(title)}</b></p>" if title else ""
+    return f"{head}<table>{cells}</table>"
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

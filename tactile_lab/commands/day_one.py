@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
 from datetime import datetime
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +24,7 @@ if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
 
 STATE, BENCH, PAGE = "day-one.json", "bench.toml", "day-one.html"
+FIGURE, REPORT = "figure.png", "report.html"
 
 Results = Mapping[str, Any]
 
@@ -176,9 +181,10 @@ def command(
             say(f"\n{number} of {len(STEPS)}  {step.title}")
             signals.look()
             if step.wrong is None:
-                say(f"  $ tactile-lab {step.name}")
-                wrong = _verb(step.name)
-                day.did(step, wrong)
+                words = [step.name, *day.words(step)]
+                say(f"  $ tactile-lab {' '.join(words)}")
+                printed, wrong = _verb(words)
+                day.did(step, printed, wrong)
             else:
                 if step.before and not day.simulated:
                     _ask(person, step.before)
@@ -235,7 +241,7 @@ class Day:
                     "Name your bench file with --bench FILE, or try it all out with "
                     "--bench sim. docs/scenes.md says what a bench file holds."
                 )
-            return cls(out, chosen if chosen == "sim" else str(Path(chosen)), {})
+            return cls(out, _absolute(chosen), {})
         try:
             held = json.loads(state.read_text(encoding="utf-8"))
             kept, done = held["bench"], dict(held["done"])
@@ -244,7 +250,7 @@ class Day:
         for name in names[names.index(again) :] if again else ():
             done.pop(name, None)
         if bench is not None and "calibrate_field" not in done:
-            kept = bench
+            kept = _absolute(bench)
         return cls(out, kept, done)
 
     @property
@@ -264,9 +270,14 @@ class Day:
 
         return load(step.name, (*step.changes, *changes), self.bench)
 
-    def did(self, step: Step, wrong: str) -> None:
-        """A verb was called; what it found is for a person to judge."""
-        self.done[step.name] = {"at": _now(), "said": [wrong or "no problem"]}
+    def words(self, step: Step) -> tuple[str, ...]:
+        """What a verb is told beside its name."""
+        return ("--bench", self.bench) if step.name == "doctor" else ()
+
+    def did(self, step: Step, printed: str, wrong: str) -> None:
+        """A verb was called; what it printed is for a person to judge."""
+        said = [wrong] if wrong else []
+        self.done[step.name] = {"at": _now(), "said": said, "printed": printed}
         self._keep()
 
     def ran(self, step: Step, done: Executed) -> str:
@@ -286,8 +297,8 @@ class Day:
             self._calibrate(done.folder)
         self.done[step.name] = {
             "at": _now(),
-            "run": str(done.folder),
-            "said": [*results["statements"], *results["missing"]],
+            "run": os.path.relpath(done.folder, self.out),
+            "said": [*results["statements"], *results["missing"]] or _levels(results),
         }
         self._keep()
         return ""
@@ -302,6 +313,7 @@ class Day:
             SceneError: it cannot be written.
         """
         from html import escape
+        from urllib.parse import quote
 
         from tactile_lab.errors import SceneError
         from tactile_lab.notebook import facts
@@ -314,7 +326,8 @@ class Day:
         head = [
             ("Bench", f"{spec.name} ({kind}), {self.bench}"),
             ("Calibration", "" if calibration is None else calibration.path),
-            *notes.items(),
+            *self._instruments(),
+            *((name.capitalize(), value) for name, value in notes.items()),
             ("Written", _now()),
         ]
         parts = ["<h1>Day one</h1>", facts("The bench", head)]
@@ -323,12 +336,20 @@ class Day:
             parts.append(f"<h2>{number}. {escape(step.title)}</h2>")
             run = found.get("run", "")
             where = [("When", found["at"]), ("Step", step.name), ("Run", run)]
-            parts.append(facts("", where).replace("<p><b></b></p>", ""))
+            parts.append(facts("", where))
+            if printed := found.get("printed"):
+                parts.append(f"<pre>{escape(printed)}</pre>")
             parts += [f"<p>{escape(line)}</p>" for line in found["said"]]
-            if run and (Path(run) / "report.html").exists():
-                link = (Path(run) / "report.html").resolve().as_uri()
-                parts.append(f'<p><a href="{escape(link)}">report</a></p>')
-        look = "body{font-family:sans-serif;max-width:50em;margin:2em auto}"
+            folder = quote(Path(run).as_posix())
+            if run and (self.out / run / FIGURE).exists():
+                parts.append(f'<p><img alt="{step.name}" src="{folder}/{FIGURE}"></p>')
+            if run and (self.out / run / REPORT).exists():
+                parts.append(f'<p><a href="{folder}/{REPORT}">report</a></p>')
+        look = (
+            "body{font-family:sans-serif;max-width:50em;margin:2em auto;padding:0 1em}"
+            "th{vertical-align:top;padding-right:1em}img{max-width:100%}"
+            "pre{overflow-x:auto;font-size:85%}"
+        )
         page = self.out / PAGE
         try:
             with replacing(page) as new:
@@ -341,6 +362,20 @@ class Day:
             raise SceneError(f"{page} cannot be written: {reason}.") from reason
         return page
 
+    def _instruments(self) -> list[tuple[str, str]]:
+        """What answered in any of the runs, by its role."""
+        from tactile_lab.errors import RunFolderError
+        from tactile_lab.store.folder import read_info
+
+        found: dict[str, str] = {}
+        for run in (
+            self.out / one["run"] for one in self.done.values() if "run" in one
+        ):
+            with suppress(RunFolderError):
+                for role, told in read_info(run).get("instruments", {}).items():
+                    found[role.replace("_", " ").capitalize()] = told["identity"]
+        return list(found.items())
+
     def _calibrate(self, run: Path) -> None:
         """From now on the force rests on the calibration that `run` measured."""
         from tactile_lab.scene.calibrated_bench import write_calibrated_bench
@@ -350,7 +385,7 @@ class Day:
             target = self.out / BENCH
             spec = load_bench(self.bench)
             write_calibrated_bench(spec, run / "calibration.csv", target)
-        self.bench = str(target)
+        self.bench = str(target.resolve())
 
     def _keep(self) -> None:
         from tactile_lab.store.folder import write_json
@@ -360,14 +395,46 @@ class Day:
             write_json(self.out / STATE, {"bench": self.bench, "done": self.done})
 
 
-def _verb(name: str) -> str:
-    """Call a verb of the command line; what it found wrong, "" if nothing."""
+class _Both(StringIO):
+    """Keeps what is printed, and prints it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._shown = sys.stdout
+
+    def write(self, text: str, /) -> int:
+        """Take a text."""
+        self._shown.write(text)
+        return super().write(text)
+
+
+def _verb(words: list[str]) -> tuple[str, str]:
+    """Call a verb of the command line: what it printed, and what it found wrong."""
     verbs = click.get_current_context().find_root().command
-    try:
-        code = verbs.main([name], prog_name="tactile-lab", standalone_mode=False)
-    except click.ClickException as refused:
-        return refused.format_message()
-    return f"it ended with {code}" if code else ""
+    with redirect_stdout(_Both()) as printed:
+        try:
+            code = verbs.main(words, prog_name="tactile-lab", standalone_mode=False)
+        except click.ClickException as refused:
+            return printed.getvalue(), refused.format_message()
+    return printed.getvalue(), f"it ended with {code}" if code else ""
+
+
+def _levels(results: Results) -> list[str]:
+    """What each trial gave, of a run that says no more of it."""
+    from tactile_lab.quantity import show
+
+    told = []
+    for trial in results["trials"]:
+        text = f"{trial['label']}: {trial['spikes']} spikes"
+        peak, final = trial["peak_rate_Hz"], trial["final_rate_Hz"]
+        if peak is not None and final is not None:
+            text += f", from {show(peak, 'Hz', 3)} down to {show(final, 'Hz', 3)}"
+        told.append(f"{text} in the hold." if trial["spikes"] else f"{text}.")
+    return told
+
+
+def _absolute(bench: str) -> str:
+    return bench if bench == "sim" else str(Path(bench).resolve())
 
 
 def _ask(person: Callable[[str], str] | None, text: str) -> None:

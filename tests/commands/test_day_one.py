@@ -1,11 +1,16 @@
 """The first day works whole on the simulated bench, and goes on where it was."""
 
 import json
+import re
 
+import click
 import pytest
 
+from tactile_lab import cli
 from tactile_lab.commands import day_one
 from tactile_lab.scene.load import load_bench
+
+VERB = day_one._verb
 
 SHORT = {
     "wiring_check": ("protocol.hold=0.5 s",),
@@ -43,7 +48,8 @@ ASKED = tuple(
 
 @pytest.fixture
 def first_day(tactile_lab, tmp_path, monkeypatch):
-    monkeypatch.setattr(day_one, "_verb", lambda name: "")  # they have tests of theirs
+    # they have tests of theirs
+    monkeypatch.setattr(day_one, "_verb", lambda words: (f"asked {words[0]}\n", ""))
 
     def run(*arguments):
         return tactile_lab("day-one", "--out", tmp_path / "day", *ASKED, *arguments)
@@ -68,13 +74,18 @@ def test_the_first_day_ends_with_bench_calibration_and_page(first_day, tmp_path)
     spec = load_bench(tmp_path / "day" / "bench.toml")
     assert spec.magnet.calibration is not None
     demo = held["done"]["demo"]["run"]
-    with open(f"{demo}/run.json") as file:
-        info = json.load(file)
+    info = json.loads((tmp_path / "day" / demo / "run.json").read_text())
     assert info["notes"]["operator"] == "Ada"
     page = (tmp_path / "day" / "day-one.html").read_text()
     for step in day_one.STEPS:
         assert step.title.replace("'", "&#x27;") in page
     assert "Critical force: between" in page
+    assert "asked devices" in page
+    assert "KEPCO" in page
+    assert "150 mN: " in page  # what the demo gave
+    assert "file://" not in page
+    for link in re.findall(r'(?:href|src)="([^"]*)"', page):
+        assert (tmp_path / "day" / link).exists(), link
 
     runs = sorted((tmp_path / "day" / "runs").iterdir())
     assert first_day().code == 0
@@ -95,3 +106,13 @@ def test_a_day_that_cannot_begin_is_refused(first_day, tmp_path, arguments, told
     assert answer.code == 2
     assert told in answer.err
     assert not (tmp_path / "day").exists()
+
+
+def test_what_a_verb_prints_is_shown_and_kept(first_day, capsys):
+    with click.Context(cli.cli, info_name="tactile-lab"):
+        printed, wrong = VERB(["plan", "none.toml"])
+        assert wrong == "it ended with 2"
+        printed, wrong = VERB(["runs", "--help"])
+    assert "Usage" in printed
+    assert not wrong
+    assert capsys.readouterr().out == printed
