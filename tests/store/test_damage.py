@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -291,10 +292,19 @@ def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, tmp_path, after):
         recover(path)
 
 
+@pytest.fixture(scope="module")
+def killed_late(tmp_path_factory):
+    """Path and acknowledged samples of a killed run, to be copied and not changed."""
+    return killed(tmp_path_factory.mktemp("killed"), after=150 * 1024)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 @pytest.mark.parametrize("byte", [3, 25, 33, 37, 200])
-def test_a_run_whose_ledger_is_damaged_is_recovered_from_its_file(tmp_path, byte):
-    path, acknowledged = killed(tmp_path, after=150 * 1024)
+def test_a_run_whose_ledger_is_damaged_is_recovered_from_its_file(
+    killed_late, tmp_path, byte
+):
+    killed_run, acknowledged = killed_late
+    path = shutil.copytree(killed_run, tmp_path / killed_run.name)
     ledger = bytearray((path / "ledger.bin").read_bytes())
     ledger[byte] ^= 0x10
     (path / "ledger.bin").write_bytes(ledger)
@@ -322,8 +332,10 @@ def test_a_killed_run_without_a_ledger_is_recovered_from_its_file(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
-def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(tmp_path):
-    path, _ = killed(tmp_path, after=150 * 1024)
+def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(
+    killed_late, tmp_path
+):
+    path = shutil.copytree(killed_late[0], tmp_path / killed_late[0].name)
     (path / "ledger.bin").unlink()
     data = bytearray((path / "data.h5").read_bytes())
     data[:64] = bytes(64)
@@ -336,8 +348,9 @@ def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
-def test_one_damaged_entry_of_the_ledger_does_not_end_it(tmp_path):
-    path, acknowledged = killed(tmp_path, after=60 * 1024)
+def test_one_damaged_entry_of_the_ledger_does_not_end_it(killed_late, tmp_path):
+    path, acknowledged = killed_late
+    path = shutil.copytree(path, tmp_path / path.name)
     ledger = bytearray((path / "ledger.bin").read_bytes())
     at = ledger.index(b"current".ljust(24, b"\0"))  # the first row of a table
     ledger[at + 40] ^= 0x10
