@@ -36,7 +36,7 @@ VERBS = {
     "chart": "One number over many runs: what is usual, what drifts, by specimen.",
     "verify": "Check every sample and spike of a run; exit code 1 if damaged.",
     "recover": "Make a run whole that was cut short by a crash.",
-    "export": "A run as CSV, MATLAB, netCDF, Parquet, NWB or RO-Crate.",
+    "export": "A run, or a skin's spikes: CSV, MATLAB, NWB, Neo, Tonic and others.",
     "report": "Figure, page and numbers of a run, again from its data.",
     "trust": "Let the code that a run from elsewhere holds be executed here.",
     "identify": "Fit parameters of the sensor to a run, with intervals.",

@@ -1,38 +1,34 @@
-"""``tactile-lab export``: a run for other programs."""
+"""``tactile-lab export``: a run, or the spikes of a skin, for other programs."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from tactile_lab.commands.options import json_option, run_argument
 from tactile_lab.commands.terminal import fail, print_json, progress, reading, say
+from tactile_lab.errors import ParameterError
+from tactile_lab.neuro.formats import FORMATS, SPIKES, module_of, write
 
-FILES = {
-    "csv": "csv",
-    "mat": "{run}.mat",
-    "netcdf": "{run}.nc",
-    "nwb": "{run}.nwb",
-    "parquet": "parquet",
-    "ro-crate": "ro-crate-metadata.json",
-}
-"""What each format writes beside the run's data: a file, or a folder."""
+if TYPE_CHECKING:
+    from tactile_lab.store.selection import Selection
+
 LARGE = 100_000_000
 """Bytes that are announced beforehand wherever the output goes."""
 
 
 @click.command()
 @run_argument
-@click.option("--to", "form", type=click.Choice(tuple(FILES)), required=True)
+@click.option("--to", "form", type=click.Choice(tuple(FORMATS)), required=True)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     metavar="PATH",
-    help="Folder (csv, parquet), file (mat, netcdf, nwb) or .zip (ro-crate); beside "
-    "the run's data unless given.",
+    help="Folder (csv, parquet), file or .zip (ro-crate); beside the run's data unless "
+    "given.",
 )
 @click.option(
     "--signal",
@@ -57,11 +53,11 @@ def command(
     """Export RUN for other programs, in SI units.
 
     Signals with the force, rate and I_DS derived from them, spikes, trials with their
-    holds, and the settings. An RO-Crate describes the run's folder itself.
+    holds, and the settings. An RO-Crate describes the run's folder itself. Formats of
+    spikes alone (neo, tonic, aedat4) also take the folder of a skin, as csv and nwb do.
     """
     with reading(run):
-        from tactile_lab.quantity import bytes_text
-        from tactile_lab.store.run import Run
+        from tactile_lab.skin.events import FILE
         from tactile_lab.store.selection import Selection
 
         selection = Selection(
@@ -70,27 +66,70 @@ def command(
             end=_quantity("--until", end, "s"),
             rate=_quantity("--rate", rate, "S/s"),
         )
-        target = out or run / FILES[form].format(run=run.resolve().name)
-        exporter = _exporter(form)
-        with Run.load(run) as loaded:
-            selection.check(loaded)
-            size = exporter.size(loaded, selection)
-            text = f"writing {target.name}, up to {bytes_text(size)}"
-            if size >= LARGE:
-                say(text, sys.stderr)
-            with progress(text) as update:
-                try:
-                    written = exporter.export(loaded, target, selection, update)
-                except OSError as error:
-                    if error.errno is None:
-                        raise  # HDF5 could not read
-                    fail(f"{target} cannot be written: {error.strerror}.", 2)
-                    return
+        try:
+            if (run / FILE).exists():
+                written = _of_skin(run, form, out, selection)
+            else:
+                written = _of_run(run, form, out, selection)
+        except OSError as error:
+            if error.errno is None:
+                raise  # HDF5 could not read
+            fail(f"{out or run} cannot be written: {error.strerror}.", 2)
+            return
+    from tactile_lab.quantity import bytes_text
+
     if as_json:
         print_json({"run": str(run), "files": [str(file) for file in written]})
     else:
         for file in written:
             say(f"{file}  {bytes_text(file.stat().st_size)}")
+
+
+def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> list[Path]:
+    from tactile_lab.neuro.of_run import events_of
+    from tactile_lab.quantity import bytes_text
+    from tactile_lab.store.run import Run
+
+    target = out or run / FORMATS[form].beside(run.resolve().name)
+    with Run.load(run) as loaded:
+        selection.check(loaded)
+        if not FORMATS[form].run:
+            _refuse_samples(form, selection)
+            with progress(f"writing {target.name}"):
+                return write(events_of(loaded, selection), target, form)
+        module = module_of(form, run=True)
+        size = module.size(loaded, selection)
+        text = f"writing {target.name}, up to {bytes_text(size)}"
+        if size >= LARGE:
+            say(text, sys.stderr)
+        with progress(text) as update:
+            written: list[Path] = module.export(loaded, target, selection, update)
+    return written
+
+
+def _of_skin(
+    skin: Path, form: str, out: Path | None, selection: Selection
+) -> list[Path]:
+    from tactile_lab.skin.events import Events
+
+    if form not in SPIKES:
+        raise ParameterError(
+            f"{skin} is a skin and holds spikes only; choose --to {', '.join(SPIKES)}."
+        )
+    _refuse_samples(form, selection)
+    if selection.start or selection.end is not None:
+        raise ParameterError("A skin is exported whole; leave out --from and --until.")
+    events = Events.read(skin)
+    target = out or skin / f"{skin.resolve().name}{FORMATS[form].ending}"
+    with progress(f"writing {target.name}, {len(events.time):,} spikes"):
+        return write(events, target, form)
+
+
+def _refuse_samples(form: str, selection: Selection) -> None:
+    if selection.signals or selection.rate:
+        raise ParameterError(
+            f"{form} holds spikes alone; leave out --signal and --rate."
+        )
 
 
 def _quantity(option: str, text: str | None, unit: str) -> float | None:
@@ -101,11 +140,3 @@ def _quantity(option: str, text: str | None, unit: str) -> float | None:
         return None if text is None else parse(text, unit)
     except QuantityError as reason:
         raise QuantityError(f"{option}: {reason}") from reason
-
-
-def _exporter(form: str) -> Any:
-    """The module of that format, with `size` and `export`; loads its own libraries."""
-    import importlib
-
-    name = form.replace("-", "_")
-    return importlib.import_module(f"tactile_lab.store.export.{name}")

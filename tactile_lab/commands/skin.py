@@ -16,6 +16,7 @@ from tactile_lab.commands.terminal import (
     warn,
     working,
 )
+from tactile_lab.neuro.formats import SPIKES
 
 if TYPE_CHECKING:
     from tactile_lab.skin.press import Pressed
@@ -47,7 +48,8 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, dir_okay=False),
     multiple=True,
     metavar="FILE",
-    help="Also write the events as FILE: .csv, or .npy as Tonic reads it.",
+    help="Also write the spikes as FILE, whose ending says how: "
+    f"{', '.join(one.ending for one in SPIKES.values())}; repeatable.",
 )
 @json_option
 def command(
@@ -63,12 +65,14 @@ def command(
     Writes the spikes of all taxels in order of time, and a page with a film of them.
     """
     with refusing():
+        from tactile_lab.neuro.formats import format_of, write
         from tactile_lab.skin.events import Events
-        from tactile_lab.skin.formats import export
         from tactile_lab.skin.page import write_page
         from tactile_lab.skin.press import highest, press
         from tactile_lab.skin.skin import load_skin
 
+        for file in exports:
+            format_of(file)
         asked = load_skin(skin)
         force, warnings = highest(asked)
         for text in warnings:
@@ -84,7 +88,7 @@ def command(
             page = write_page(asked, events, done, folder)
         for file in exports:
             with working(f"writing {file}"):
-                export(events, file)
+                write(events, file)
     if as_json:
         print_json(
             {

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -174,3 +175,16 @@ class Events:
         """Spike times of one taxel, s."""
         found: FloatArray = self.time[:][self.taxel[:] == taxel]
         return found
+
+    def trains(self) -> list[FloatArray]:
+        """Spike times of each taxel, s."""
+        order = np.argsort(self.taxel[:], kind="stable")
+        return np.split(self.time[:][order], np.cumsum(self.count)[:-1])
+
+    @property
+    def made(self) -> datetime:
+        """When the run began, or the skin's file was written, with its time zone."""
+        if started := self.about.get("started"):
+            return datetime.fromisoformat(started).astimezone()
+        written = Path(self.time.file.filename).stat().st_mtime
+        return datetime.fromtimestamp(written).astimezone()

@@ -5,11 +5,10 @@ import pytest
 from click.testing import CliRunner
 
 from tactile_lab.cli import cli as command_line
-from tactile_lab.errors import ParameterError, RunFolderError, SolverError
+from tactile_lab.errors import ParameterError, SolverError
 from tactile_lab.skin import kernel
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
-from tactile_lab.skin.formats import export, tonic
 from tactile_lab.skin.press import highest, press
 from tactile_lab.skin.single import force_of, simulate_taxel
 from tactile_lab.skin.skin import load_skin
@@ -144,23 +143,6 @@ def test_what_no_model_describes_is_refused_beforehand(pressed):
     assert highest(pressed[0])[1] == ()
     with pytest.raises(ParameterError, match="numbered 0 to 89"):
         force_of(pressed[0], 90)
-
-
-def test_events_leave_as_csv_and_as_tonic_reads_them(pressed, tmp_path):
-    _, done, events, _ = pressed
-    export(events, tmp_path / "e.csv")
-    rows = np.loadtxt(tmp_path / "e.csv", delimiter=",", skiprows=1)
-    assert np.array_equal(rows[:, 0], events.time[:])
-    assert np.array_equal(rows[:, 1], events.taxel[:])
-    export(events, tmp_path / "e.npy")
-    array = np.load(tmp_path / "e.npy")
-    assert array.dtype.names == ("x", "y", "t", "p") and array.size == done.events
-    assert np.array_equal(array, tonic(events))
-    assert np.array_equal(array["y"] * 10 + array["x"], events.taxel[:])
-    with pytest.raises(ParameterError, match=r"\.csv or \.npy"):
-        export(events, tmp_path / "e.xyz")
-    with pytest.raises(RunFolderError, match="holds no events"):
-        Events.read(tmp_path)
 
 
 def test_from_the_command_line_to_a_page(tmp_path, monkeypatch):

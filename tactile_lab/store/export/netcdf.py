@@ -8,7 +8,6 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.export.content import (
     about,
@@ -16,6 +15,7 @@ from tactile_lab.store.export.content import (
     tables,
     unit,
 )
+from tactile_lab.store.export.library import library
 from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
@@ -43,13 +43,7 @@ def export(
         RecordingError: there is no room.
         OSError: the file cannot be written.
     """
-    try:
-        import h5netcdf
-    except ImportError as error:
-        raise RunFolderError(
-            "h5netcdf is not installed; `pip install tactile-lab[netcdf]`, or export "
-            "--to csv or mat."
-        ) from error
+    h5netcdf = library("h5netcdf")
     selection.check(run)
     rows, names = selection.rows(run), selection.names(run)
     with (

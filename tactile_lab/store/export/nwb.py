@@ -16,6 +16,7 @@ from tactile_lab.store.export.content import (
     about,
     tables,
 )
+from tactile_lab.store.export.library import library
 from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
@@ -54,12 +55,7 @@ def export(
         RecordingError: there is no room.
         OSError: the file cannot be written.
     """
-    try:
-        import pynwb
-    except ImportError as error:
-        raise RunFolderError(
-            "pynwb is not installed; `pip install pynwb`, or export --to csv or mat."
-        ) from error
+    pynwb = library("pynwb")
     if selection.rate is not None:
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
     selection.check(run)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export.content import (
     UNITS,
     about,
@@ -15,6 +14,7 @@ from tactile_lab.store.export.content import (
     tables,
     unit,
 )
+from tactile_lab.store.export.library import library
 from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
@@ -41,14 +41,8 @@ def export(
         RecordingError: there is no room.
         OSError: the folder cannot be written.
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError as error:
-        raise RunFolderError(
-            "pyarrow is not installed; `pip install tactile-lab[parquet]`, or export "
-            "--to csv or mat."
-        ) from error
+    pa = library("pyarrow")
+    parquet = library("pyarrow.parquet", "pyarrow")
     selection.check(run)
     rows, names = selection.rows(run), selection.names(run)
     told = {key: str(value) for key, value in about(run, names).items()}

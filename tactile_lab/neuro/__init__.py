@@ -1,0 +1,1 @@
+"""Spikes and circuits in the formats of neuromorphic software."""

@@ -1,0 +1,102 @@
+"""The one table of formats that runs and skins are exported in.
+
+Light: the command line reads it for its help. Each format's module has either ``size``
+and ``export`` (a run with its signals) or ``write`` (spikes alone, of a run or skin).
+"""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tactile_lab.errors import ParameterError, choices
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tactile_lab.skin.events import Events
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format.
+
+    Attributes:
+        ending: of an exported file's name.
+        run: module that writes a run with its signals, in `tactile_lab.store.export`.
+        spikes: module that writes spikes alone, in `tactile_lab.neuro`.
+        fixed: what a run is written to beside its data, where it is not called like it.
+    """
+
+    ending: str
+    run: str = ""
+    spikes: str = ""
+    fixed: str = ""
+
+    def beside(self, run: str) -> str:
+        """Name of the file or folder that a run of this name is written to."""
+        return self.fixed or f"{run}{self.ending}"
+
+
+FORMATS = {
+    "csv": Format(".csv", run="csv", spikes="lines", fixed="csv"),
+    "mat": Format(".mat", run="mat"),
+    "netcdf": Format(".nc", run="netcdf"),
+    "parquet": Format(".parquet", run="parquet", fixed="parquet"),
+    "ro-crate": Format(".zip", run="ro_crate", fixed="ro-crate-metadata.json"),
+    "nwb": Format(".nwb", run="nwb", spikes="nwb"),
+    "neo": Format(".nix", spikes="neo"),
+    "tonic": Format(".npy", spikes="tonic"),
+    "aedat4": Format(".aedat4", spikes="aedat4"),
+}
+"""By the name that ``export --to`` takes; `skin --export` goes by the ending."""
+SPIKES = {name: one for name, one in FORMATS.items() if one.spikes}
+
+
+def module_of(name: str, *, run: bool) -> Any:
+    """The module that writes this format, for a run with its signals or for spikes."""
+    one = FORMATS[name]
+    if run and one.run:
+        return importlib.import_module(f"tactile_lab.store.export.{one.run}")
+    return importlib.import_module(f"tactile_lab.neuro.{one.spikes}")
+
+
+def format_of(file: Path) -> str:
+    """The format of spikes that a file's ending names.
+
+    Raises:
+        ParameterError: no format has that ending.
+    """
+    for name, one in SPIKES.items():
+        if file.name.endswith(one.ending) and file.name != one.ending:
+            return name
+    known = [f"{one.ending} ({name})" for name, one in SPIKES.items()]
+    raise ParameterError(
+        f"{file}: no format of spikes ends so. {choices(file.suffix, known, 'Endings')}"
+    )
+
+
+def write(events: Events, file: Path, name: str | None = None) -> list[Path]:
+    """Write spikes in a format, the one that the file's ending names unless given.
+
+    Args:
+        events: of a skin, or of a run by `of_run.events_of`.
+        file: takes its name once it is whole.
+        name: of the format, one of `SPIKES`.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ParameterError: no such format, or one that cannot hold these.
+        RunFolderError: the format's library is not installed.
+        RecordingError: there is no room.
+        OSError: it cannot be written.
+    """
+    from tactile_lab.store.folder import replacing
+
+    module = module_of(name or format_of(file), run=False)
+    with replacing(file) as part:
+        more: list[Path] | None = module.write(events, part)
+    return [file, *(more or ())]

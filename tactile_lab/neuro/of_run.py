@@ -1,0 +1,59 @@
+"""The spikes of one run as those of an array with a single taxel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.skin.events import Events
+from tactile_lab.store.derived import derivable
+from tactile_lab.store.export.content import about, tables
+from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+
+
+def events_of(run: Run, selection: Selection | None = None) -> Events:
+    """Spikes of a measured or simulated run, its force and trials in `about`.
+
+    Args:
+        run: its times stay those of the run's axis.
+        selection: only the spikes of this part.
+
+    Raises:
+        RunFolderError: no spikes were detected in it.
+    """
+    selection = selection or Selection()
+    if run.detection is None:
+        raise RunFolderError(
+            f'{run.path} has no spikes: none were detected. Add "spikes" to '
+            "record.signals, or export its signals, such as with --to csv."
+        )
+    time = selection.of(run.spikes)["time"].astype(np.float64)
+    trials = tables(run, selection).get("trials")
+    told = {key: value for key, value in about(run).items() if key != "scene.toml"}
+    told |= {"name": run.path.resolve().name, "signal": run.detection.signal}
+    told.setdefault("title", str(told["name"]))
+    force = None
+    if "force" in derivable(run):
+        force = run.force.time, run.force.value
+    most = float(np.max(force[1])) if force else np.nan
+    return Events(
+        time=time,
+        taxel=np.zeros(time.size, np.int32),
+        places=np.zeros((1, 2)),
+        count=np.array([time.size]),
+        role=np.zeros(1, np.uint8),
+        largest_force=np.array([most]),
+        about=told
+        | ({"force": force} if force else {})
+        | {
+            "trials": []
+            if trials is None
+            else list(
+                zip(
+                    *(trials.columns[n].tolist() for n in ("label", "start", "end")),
+                    strict=True,
+                )
+            )
+        },
+    )
