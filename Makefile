@@ -73,6 +73,7 @@ $(RUN_STAMP): pyproject.toml | $(BIN)/python
 $(DEV_STAMP): pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install -q --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install -q -e ".[gui]" --group dev
+	$(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/simulators --group simulators
 	@touch $@ $(RUN_STAMP)
 
 $(SYSTEM_STAMP): .ci/system-packages | $(BIN)/python

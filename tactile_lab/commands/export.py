@@ -11,7 +11,7 @@ import click
 from tactile_lab.commands.options import json_option, run_argument
 from tactile_lab.commands.terminal import fail, print_json, progress, reading, say
 from tactile_lab.errors import ParameterError
-from tactile_lab.neuro.formats import FORMATS, SPIKES, module_of, write
+from tactile_lab.neuro.formats import FORMATS, SPIKES, of_whole_run, write
 
 if TYPE_CHECKING:
     from tactile_lab.store.selection import Selection
@@ -54,7 +54,8 @@ def command(
 
     Signals with the force, rate and I_DS derived from them, spikes, trials with their
     holds, and the settings. An RO-Crate describes the run's folder itself. Formats of
-    spikes alone (neo, tonic, aedat4) also take the folder of a skin, as csv and nwb do.
+    spikes alone (neo, tonic, aedat4, and scripts for brian2, nest and snntorch) also
+    take the folder of a skin, as csv and nwb do.
     """
     with reading(run):
         from tactile_lab.skin.events import FILE
@@ -93,11 +94,11 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
     target = out or run / FORMATS[form].beside(run.resolve().name)
     with Run.load(run) as loaded:
         selection.check(loaded)
-        if not FORMATS[form].run:
+        module = of_whole_run(form)
+        if module is None:
             _refuse_samples(form, selection)
             with progress(f"writing {target.name}"):
                 return write(events_of(loaded, selection), target, form)
-        module = module_of(form, run=True)
         size = module.size(loaded, selection)
         text = f"writing {target.name}, up to {bytes_text(size)}"
         if size >= LARGE:

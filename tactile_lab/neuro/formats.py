@@ -26,12 +26,14 @@ class Format:
         ending: of an exported file's name.
         run: module that writes a run with its signals, in `tactile_lab.store.export`.
         spikes: module that writes spikes alone, in `tactile_lab.neuro`.
+        script: whether it is a script that plays the spikes, with a file of them.
         fixed: what a run is written to beside its data, where it is not called like it.
     """
 
     ending: str
     run: str = ""
     spikes: str = ""
+    script: bool = False
     fixed: str = ""
 
     def beside(self, run: str) -> str:
@@ -49,17 +51,20 @@ FORMATS = {
     "neo": Format(".nix", spikes="neo"),
     "tonic": Format(".npy", spikes="tonic"),
     "aedat4": Format(".aedat4", spikes="aedat4"),
+    "brian2": Format(".brian2.py", script=True),
+    "nest": Format(".nest.py", script=True),
+    "snntorch": Format(".snntorch.py", script=True),
 }
 """By the name that ``export --to`` takes; `skin --export` goes by the ending."""
-SPIKES = {name: one for name, one in FORMATS.items() if one.spikes}
+SPIKES = {name: one for name, one in FORMATS.items() if one.spikes or one.script}
 
 
-def module_of(name: str, *, run: bool) -> Any:
-    """The module that writes this format, for a run with its signals or for spikes."""
-    one = FORMATS[name]
-    if run and one.run:
-        return importlib.import_module(f"tactile_lab.store.export.{one.run}")
-    return importlib.import_module(f"tactile_lab.neuro.{one.spikes}")
+def of_whole_run(name: str) -> Any:
+    """The module that writes a run with its signals in this format; None if none."""
+    found = FORMATS[name].run
+    return (
+        importlib.import_module(f"tactile_lab.store.export.{found}") if found else None
+    )
 
 
 def format_of(file: Path) -> str:
@@ -96,7 +101,18 @@ def write(events: Events, file: Path, name: str | None = None) -> list[Path]:
     """
     from tactile_lab.store.folder import replacing
 
-    module = module_of(name or format_of(file), run=False)
+    name = name or format_of(file)
+    one = SPIKES[name]
+    if one.script:
+        from tactile_lab.neuro.scripts import script, write_spikes
+
+        spikes = file.with_name(file.name.removesuffix(one.ending) + ".spikes.npz")
+        with replacing(spikes) as part:
+            write_spikes(events, part)
+        with replacing(file) as part:
+            part.write_text(script(name), encoding="utf-8")
+        return [file, spikes]
+    module = importlib.import_module(f"tactile_lab.neuro.{one.spikes}")
     with replacing(file) as part:
-        more: list[Path] | None = module.write(events, part)
-    return [file, *(more or ())]
+        module.write(events, part)
+    return [file]

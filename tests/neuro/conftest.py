@@ -1,5 +1,10 @@
 """A small skin and a short run, computed once."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from tactile_lab.engine.execution import Execution
@@ -49,3 +54,24 @@ def run_folder(tmp_path_factory):
 def run(run_folder):
     with Run.load(run_folder) as loaded:
         yield loaded
+
+
+@pytest.fixture
+def simulate_script(tmp_path):
+    """Runs a script with Brian2 and NEST; gives what it printed."""
+    simulators = Path(sys.prefix) / "simulators"
+    if not simulators.exists() and "CI" not in os.environ:
+        pytest.skip("`make test` installs Brian2 and NEST")
+    # compiling takes longer than these scripts
+    (tmp_path / "brian_preferences").write_text("codegen.target = 'numpy'\n")
+
+    def run(script, *words):
+        done = subprocess.run(
+            [sys.executable, str(script), *words],
+            cwd=tmp_path, capture_output=True, text=True,
+            env={**os.environ, "PYTHONPATH": str(simulators)},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
