@@ -28,30 +28,55 @@ def connected(server):
     return socket.create_connection((host, int(port)), timeout=60)
 
 
-def test_the_client_of_the_how_to_watches_a_run_and_stops_it(tmp_path):
-    (client,) = re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), flags=re.S)
-    (tmp_path / "client.py").write_text(client)
+def stopped_by(number, folder, *given, level="60 mN", rate="20 kS/s", asked=()):
+    """A run that the how-to's client `number` stops: its result, what the client said.
+
+    The client is given the status address, the source of LSL's streams where `asked`
+    for, and what is `given`.
+    """
+    clients = re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), flags=re.S)
+    (folder / "client.py").write_text(clients[number])
     verb = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime", "--json"]
-    verb += ["--status", "tcp://127.0.0.1:0", "--out", str(tmp_path / "runs")]
-    verb += ["--set", "protocol.hold=100 s", "--set", 'protocol.levels=["60 mN"]']
-    verb += ["--set", "record.sample_rate=20 kS/s", "--no-report"]
+    verb += ["--status", "tcp://127.0.0.1:0", "--out", str(folder / "runs"), *asked]
+    verb += ["--set", "protocol.hold=40 s", "--set", f'protocol.levels=["{level}"]']
+    verb += ["--set", f"record.sample_rate={rate}", "--no-report"]
     with subprocess.Popen(
         verb, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as run:
-        address = next(
-            line.split()[1] for line in run.stderr if line.startswith("status tcp")
-        )
+        told = (line.split() for line in run.stderr)
+        where = [
+            words[-1] for words, _ in zip(told, ["status", *asked[1:]], strict=False)
+        ]
         watched = subprocess.run(
-            [sys.executable, tmp_path / "client.py", address, "0.5"],
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
+            [sys.executable, folder / "client.py", *where, *given],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         out, _ = run.communicate()
     assert run.returncode == 130
     result = json.loads(out)
     assert result["status"] == "aborted"
     assert result["reason"] == "stopped by another program"
     assert result["coil_verified_off"]
-    assert f"aborted in {result['run']}" in watched.stdout
+    return result, watched.stdout
+
+
+def test_the_client_of_the_how_to_watches_a_run_and_stops_it(tmp_path):
+    result, said = stopped_by(0, tmp_path, "0.5")
+    assert f"aborted in {result['run']}" in said
+
+
+def test_the_subscriber_of_the_how_to_stops_pressing_after_the_tenth_spike(tmp_path):
+    result, said = stopped_by(
+        1, tmp_path, level="200 mN", rate="1 MS/s", asked=("--live", "lsl")
+    )
+    *heard, last = said.splitlines()
+    numbers = [int(line.split()[1]) for line in heard]
+    assert numbers == list(range(numbers[0], 11))  # it may come late, and misses none
+    assert last == f"stopped after {result['spikes']} spikes"
+    # spikes come every few tens of ms; the coil is ramped to zero meanwhile
+    assert 10 <= result["spikes"] < 100
 
 
 def test_who_comes_late_hears_the_newest_state_first(server):
