@@ -1,0 +1,165 @@
+"""From a spike to who hears of it by LSL, and what a killed subscriber misses.
+
+    python tests/benchmarks/live_lsl.py [--seconds 600] [--out docs/live-figures.md]
+
+The whole program in real time on the built-in bench, four channels at 1 MS/s stored,
+with two subscribers in processes of their own: one stays, the other is killed with
+SIGKILL every 30 s and started again. A delay is LSL's clock when a sample was heard,
+less the sample's time stamp: it holds the scope's polls, detection, LSL and the way to
+the other process. Takes --seconds and about a minute; the exit code is 1 where the
+run lost a sample or a spike, or a subscriber missed one while it was connected.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from provenance import provenance
+
+HOLD, REST = 4.0, 1.0
+KILL_EVERY = 30.0
+SUBSCRIBER = """
+import sys
+import pylsl
+from pylsl.util import LostError
+(found,) = pylsl.resolve_byprop("source_id", sys.argv[1], timeout=60)
+inlet = pylsl.StreamInlet(found, recover=False)
+inlet.open_stream()
+print("open", pylsl.local_clock(), 0, flush=True)
+try:
+    while True:
+        sample, stamp = inlet.pull_sample()
+        print(int(sample[0]), stamp, pylsl.local_clock(), flush=True)
+except LostError:
+    pass
+"""
+
+
+class Subscriber:
+    """Writes what it hears into a file of its own, in a process of its own."""
+
+    def __init__(self, folder: Path, name: str, source: str) -> None:
+        self.path = folder / name
+        with self.path.open("w") as told:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", SUBSCRIBER, f"{source}-spikes"],
+                stdout=told,
+                stderr=subprocess.DEVNULL,
+            )
+
+    def heard(self) -> NDArray[np.float64]:
+        """Number, time stamp (s) and LSL's time when heard (s); shape (n, 3)."""
+        lines = self.path.read_text().splitlines()[1:]
+        whole = [line.split() for line in lines if len(line.split()) == 3]
+        return np.array(whole, np.float64).reshape(-1, 3)
+
+
+def main() -> int:
+    """Measure, print, and write the table; 1 where something was lost."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--seconds", type=float, default=600.0)
+    options.add_argument("--out", type=Path)
+    chosen = options.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        table, sound = measured(chosen.seconds, Path(folder))
+    print(table)
+    if chosen.out is not None:
+        chosen.out.write_text(table, encoding="utf-8")
+    return 0 if sound else 1
+
+
+def measured(seconds: float, folder: Path) -> tuple[str, bool]:
+    """The page, and whether nothing was lost; `folder` takes the run."""
+    presses = round(seconds / (HOLD + REST + 0.5))
+    levels = json.dumps(["160 mN"] * presses)
+    verb = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime", "--json"]
+    verb += ["--live", "lsl", "--no-report", "--out", str(folder / "runs")]
+    for change in (
+        f"protocol.levels={levels}",
+        f"protocol.hold={HOLD} s",
+        f"protocol.rest={REST} s",
+        "record.sample_rate=1 MS/s",
+        'record.signals=["coil_current", "V_C1", "V_C2", "V_K", "spikes"]',
+    ):
+        verb += ["--set", change]
+    load = os.getloadavg()[0]
+    with (folder / "said").open("w+") as said:
+        run = subprocess.Popen(verb, stdout=subprocess.PIPE, stderr=said, text=True)
+        source = ""
+        while not source:
+            time.sleep(0.05)
+            words = (folder / "said").read_text().split()
+            if "lsl" in words[:-1]:
+                source = words[words.index("lsl") + 1]
+            if run.poll() is not None:
+                raise SystemExit((folder / "said").read_text())
+        stays = Subscriber(folder, "stays", source)
+        killed: list[Subscriber] = []
+        while run.poll() is None:
+            killed.append(Subscriber(folder, f"killed{len(killed)}", source))
+            end = time.monotonic() + KILL_EVERY
+            while run.poll() is None and time.monotonic() < end:
+                time.sleep(0.1)
+            if run.poll() is None:
+                killed[-1].process.send_signal(signal.SIGKILL)
+            killed[-1].process.wait()
+        stays.process.wait()
+        assert run.stdout is not None
+        result = json.loads(run.stdout.read())
+    heard = stays.heard()
+    number, delay = heard[:, 0], heard[:, 2] - heard[:, 1]
+    spikes = int(result["spikes"])
+    missed = spikes - len(set(number.tolist()))
+    gaps = sum(int(np.sum(np.diff(one.heard()[:, 0]) != 1)) for one in killed)
+    again = np.concatenate([one.heard() for one in killed])
+    away = spikes - len(set(again[:, 0].tolist()))
+    late = again[:, 2] - again[:, 1]
+    lost = result["loss"]
+    rows = [
+        ("run", f"{result['duration_s']:.0f} s, {result['status']}, {spikes} spikes"),
+        (
+            "samples and spikes lost of the record",
+            f"{lost['samples']}, {lost['spikes']}",
+        ),
+        ("missed by the subscriber that stays", str(missed)),
+        ("kills of the other", str(len(killed) - 1)),
+        ("gaps in what it heard while connected", str(gaps)),
+        ("spikes while it was dead, by their numbers", str(away)),
+        ("delay of the one that stays, ms", quantiles(delay)),
+        ("delay of the other, ms", quantiles(late)),
+    ]
+    sound = not (lost["samples"] or lost["spikes"] or missed or gaps)
+    lines = [
+        "# Spikes told live, in figures",
+        "",
+        f"{provenance()}, load {load:.1f} as it began. Made by "
+        f"`tests/benchmarks/live_lsl.py --seconds {seconds:g}`: the whole program in "
+        "real time on the built-in bench, four channels at 1 MS/s, simulated far ends "
+        "in the same process, `--live lsl`. A delay is from the sample of the spike, "
+        "by the run's first sample and the scope's clock, to the subscriber.",
+        "",
+        "| | |",
+        "|---|---|",
+        *(f"| {what} | {is_} |" for what, is_ in rows),
+    ]
+    return "\n".join(lines) + "\n", sound
+
+
+def quantiles(delay: NDArray[np.float64]) -> str:
+    """Median, 99th percentile and largest of delays in s, as ms."""
+    median, p99 = np.percentile(1e3 * delay, [50, 99])
+    return f"median {median:.1f}, p99 {p99:.1f}, largest {1e3 * delay.max():.1f}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
