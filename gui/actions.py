@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 
+from gui.ask_file import ask_file
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.menu import Acts, GearMenu
@@ -21,7 +23,9 @@ from gui.preferences import Preferences
 from gui.run_actions import RunActions
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
+from gui.session.log import Severity
 from gui.stop_anywhere import StopAnywhere
+from tactile_lab.errors import TactileLabError
 
 
 @dataclass(frozen=True)
@@ -223,6 +227,22 @@ class Actions(QObject):
 
         export_view(self.panels, self.screen)
 
+    def ask_skin(self) -> None:
+        """Ask for an array of sensors and show it in a window of its own."""
+        kinds = "Skin, or its events (*.toml *.h5)"
+        ask_file(self.window, "Open a skin", self.open_skin, kinds=kinds)
+
+    def open_skin(self, path: Path) -> None:
+        """Compute an array, or play its events; what prevents it is told in the log."""
+        from gui.skin.window import open_skin
+
+        panels = self.panels
+        out = panels.session.out.parent / "skins"
+        try:
+            open_skin(path, panels.theme, out, self.window).show()
+        except (TactileLabError, OSError) as error:
+            panels.session.log.add(Severity.ERROR, "skin", str(error))
+
     def show_help(self, topic: str = "", page: int = 0) -> None:
         """Show the help: 0 panels, at a topic; 1 shortcuts; 2 about the program."""
         from gui.dialogs.help import show_help
@@ -249,6 +269,7 @@ class Actions(QObject):
         acts = Acts(
             save_scene=self.save_scene,
             about_run=self.runs.about_shown,
+            open_skin=self.ask_skin,
             export_view=self.export_view,
             connect=self.connect_dialog,
             settings=self.show_preferences,

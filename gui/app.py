@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSettings, QSize, QTimer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from gui.look import fonts
 from gui.look.theme import Theme
@@ -79,7 +79,7 @@ def main(
     window = Window(session, chosen, settings)
     fit(window, window.screen().availableSize())
     window.show()
-    _close_on_signals(window)
+    _close_on_signals(lambda: window.leave() if window.session.busy else window.close())
     wanted = bench or wishes.bench
     wanted_bench = None if wanted == "none" else wanted
     QTimer.singleShot(0, lambda: begin(window, target or wishes.scene, wanted_bench))
@@ -89,7 +89,30 @@ def main(
     return 4 if left is not None and left.verified_off is False else 0
 
 
-def fit(window: Window, available: QSize) -> None:
+def show_skin(path: Path, out: Path, theme: str) -> None:
+    """Open the window of an array of sensors and stay until it is closed.
+
+    Args:
+        path: a skin's file, which is computed now, or the folder of its events.
+        out: where the folder of a skin that is computed is put.
+        theme: "system", "light" or "dark".
+
+    Raises:
+        SceneError, ParameterError, RunFolderError: it cannot be shown.
+    """
+    app = application(["tactile-lab"])
+    chosen = Theme(theme)
+    chosen.apply()
+    from gui.skin.window import open_skin
+
+    window = open_skin(path, chosen, out)
+    fit(window, window.screen().availableSize())
+    window.show()
+    _close_on_signals(window.close)
+    app.exec()
+
+
+def fit(window: QWidget, available: QSize) -> None:
     """Make a window as small as the room on a screen, with its frame, needs it to be.
 
     Args:
@@ -119,15 +142,8 @@ def _load_reader() -> None:
     importlib.import_module("gui.lanes.stored")
 
 
-def _close_on_signals(window: Window) -> None:
+def _close_on_signals(close: Callable[[], object]) -> None:
     """SIGINT, SIGTERM and SIGHUP end the window as its close button, without asking."""
-
-    def leave(number: int, frame: object) -> None:
-        if window.session.busy:
-            window.leave()
-        else:
-            window.close()
-
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
-            signal.signal(getattr(signal, name), leave)
+            signal.signal(getattr(signal, name), lambda number, frame: close())

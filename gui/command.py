@@ -28,11 +28,19 @@ INSTALL = 'pip install "PySide6-Essentials>=6.8,<6.12"'
     help="Where run folders are put; else as the settings say, at first runs.",
 )  # fmt: skip
 @click.option(
+    "--skin", type=click.Path(path_type=Path), metavar="FILE",
+    help="Open the window of an array of sensors alone: a skin's file, or its folder.",
+)  # fmt: skip
+@click.option(
     "--theme", type=click.Choice(["system", "light", "dark"]), default="system",
     show_default=True, help="Colours.",
 )  # fmt: skip
 def command(
-    target: str | None, bench: str | None, out: Path | None, theme: str
+    target: str | None,
+    bench: str | None,
+    out: Path | None,
+    skin: Path | None,
+    theme: str,
 ) -> None:
     """Open the bench window, on SCENE, PROTOCOL.py or a RUN folder if given."""
     if importlib.util.find_spec("PySide6") is None:
@@ -52,6 +60,10 @@ def command(
             f"Qt does not load: {error}. On Debian its libraries come with: apt-get "
             "install libegl1 libgl1 libxkbcommon0 libdbus-1-3 libfontconfig1"
         ) from error
+    if skin is not None:
+        with refusing():
+            app.show_skin(skin, out or Path("skins"), theme)
+        return
     with refusing():
         known = lab()
     sys.exit(app.main(target, out=out, bench=bench, theme=theme, lab=known))

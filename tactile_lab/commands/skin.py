@@ -51,6 +51,9 @@ if TYPE_CHECKING:
     help="Also write the spikes as FILE, whose ending says how: "
     f"{', '.join(one.ending for one in SPIKES.values())}; repeatable.",
 )
+@click.option(
+    "--window", is_flag=True, help="Show it in a window as it is computed; no page."
+)
 @json_option
 def command(
     skin: Path,
@@ -58,12 +61,16 @@ def command(
     out: Path,
     cores: int | None,
     exports: tuple[Path, ...],
+    window: bool,
     as_json: bool,
 ) -> None:
     """Press on the array of sensors that SKIN, a TOML file, describes.
 
     Writes the spikes of all taxels in order of time, and a page with a film of them.
     """
+    if window:
+        _show(skin, out, only_plan, cores, exports, as_json)
+        return
     with refusing():
         from tactile_lab.neuro.formats import format_of, write
         from tactile_lab.skin.events import Events
@@ -103,6 +110,17 @@ def command(
         )
         return
     _print(asked, done, page)
+
+
+def _show(skin: Path, out: Path, *others: object) -> None:
+    """Open the window, which computes by itself."""
+    if any(others):
+        raise click.UsageError("--window goes with --out alone.")
+    from tactile_lab.plugins import plugged_in
+
+    with refusing():
+        gui: click.Command = plugged_in("tactile_lab.verbs", "gui")
+    gui.main(["--skin", str(skin), "--out", str(out)], standalone_mode=False)
 
 
 def _print_plan(skin: Skin, force: float) -> None:

@@ -20,6 +20,7 @@ from tactile_lab.model.batch import certain, records
 from tactile_lab.model.circuit import (
     LARGEST_VOLTAGE,
     SUBTHRESHOLD_LIMIT,
+    FloatArray,
 )
 from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.model.specimen import parts
@@ -63,6 +64,7 @@ def press(
     *,
     cores: int | None = None,
     tell: Callable[[int], object] = lambda taxels: None,
+    watch: Callable[[int, NDArray[np.int64], FloatArray], object] | None = None,
 ) -> Pressed:
     """Compute all spikes and write them; the same to the last bit on any cores.
 
@@ -71,6 +73,7 @@ def press(
         folder: where `events.h5` is put.
         cores: threads; as many as cores unless given.
         tell: is told how many taxels are done.
+        watch: is given trains as they are written, as `EventWriter.add` takes them.
 
     Raises:
         ParameterError: the parts of a taxel make no circuit.
@@ -108,6 +111,8 @@ def press(
                 raise
             worst, pieces = max(worst, float(error.max())), pieces + int(found.sum())
             writer.add(part.start, count[part], times)
+            if watch is not None:
+                watch(part.start, count[part], times)
             tell(part.stop)
         names = ("fired", "silent", "left out", "dead", "stuck")
         told = {name: int((role == k).sum()) for k, name in enumerate(names)}

@@ -1,0 +1,1 @@
+"""An array of sensors in a window of its own: as it is computed, and played."""

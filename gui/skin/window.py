@@ -1,0 +1,227 @@
+"""The window of an array: map and raster while it is computed, and played after."""
+
+from __future__ import annotations
+
+import time as wall
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QProgressBar, QSlider, QSplitter, QWidget
+
+from gui.look.theme import Theme
+from gui.parts import Combo, Elided, IconButton, column, label, row, say
+from gui.skin.computing import Computing, Failed, Trains
+from gui.skin.film import Dots, Film
+from gui.skin.views import Raster, TaxelMap
+from tactile_lab.errors import RunFolderError
+from tactile_lab.quantity import count, show
+from tactile_lab.skin.events import FILE, Events
+from tactile_lab.skin.skin import Skin, load_skin
+
+FRAME = 33
+"""Time between two pictures, ms."""
+SPEEDS = {"1/100 speed": 0.01, "1/10 speed": 0.1, "real time": 1.0, "10 × faster": 10.0}
+STEPS = 2000
+"""Of the slider."""
+
+
+def open_skin(
+    path: Path, theme: Theme, out: Path, parent: QWidget | None = None
+) -> SkinWindow:
+    """A window on a skin file, which is computed now, or on events on disk.
+
+    Args:
+        path: a skin file (TOML), a folder with events, or their file.
+        theme: of the window.
+        out: where the folder of a skin that is computed is put.
+        parent: whose window it goes with.
+
+    Raises:
+        SceneError, ParameterError: the skin cannot be used as written.
+        RunFolderError: there are no events.
+    """
+    if not path.exists():
+        raise RunFolderError(f"{path} does not exist; give a skin's file or folder.")
+    if path.is_dir() or path.suffix == Path(FILE).suffix:
+        events = Events.read(path)
+        skin = load_skin(events.about["skin"], events.about["name"], folder=path)
+        return SkinWindow(skin, Computing(None, path), theme, parent)
+    from tactile_lab.skin.press import highest
+
+    skin = load_skin(path)
+    _, warnings = highest(skin)
+    computing = Computing(skin, out / skin.name)
+    return SkinWindow(skin, computing, theme, parent, warnings)
+
+
+class SkinWindow(QWidget):
+    """Map and raster of one array.
+
+    Args:
+        skin: what it is.
+        computing: tells its spikes.
+        theme: of the window.
+        parent: whose window it goes with.
+        warnings: about the skin, for people.
+
+    Attributes:
+        film: to be played; None while it is computed.
+    """
+
+    def __init__(
+        self,
+        skin: Skin,
+        computing: Computing,
+        theme: Theme,
+        parent: QWidget | None = None,
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self.setWindowTitle(f"{skin.title} · Tactile Lab")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setProperty("role", "page")
+        self.resize(1180, 640)
+        theme.dress(self)
+        self._skin, self._computing = skin, computing
+        self.film: Film | None = None
+        self._dots, self._rates = Dots(), np.full(skin.array.size, np.nan)
+        self._at, self._last = 0.0, 0.0
+        self.map = TaxelMap(theme, skin.array.places, skin.array.side)
+        self.raster = Raster(theme, skin.duration, skin.array.size)
+        self.play = IconButton(theme, "play", "Play (Space)", checkable=True)
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setRange(0, STEPS)
+        self.slider.setAccessibleName("Time")
+        self.speed = Combo()
+        self.speed.addItems(list(SPEEDS))
+        self.speed.setCurrentText("1/10 speed")
+        self.speed.setAccessibleName("Speed")
+        self.progress = QProgressBar()
+        self.progress.setRange(0, skin.array.size)
+        self.progress.setTextVisible(False)
+        self.when, self.numbers = label("", "value"), Elided("", "muted")
+        self.when.setMinimumWidth(150)
+        self.warning = label(" ".join(warnings), "warning", wrap=True)
+        self.warning.setVisible(bool(warnings))
+        about = f"{skin.array.size:,} taxels · {show(skin.duration, 's')} · simulated"
+        both = QSplitter(Qt.Orientation.Horizontal)
+        both.addWidget(self.map)
+        both.addWidget(self.raster)
+        both.setSizes([520, 640])
+        column(
+            self,
+            row(label(skin.title, "big"), 12, (label(about, "muted"), 1)),
+            self.warning,
+            (both, 1),
+            self.progress,
+            row(self.play, (self.slider, 1), self.when, self.speed),
+            self.numbers,
+            margin=14,
+            spacing=8,
+        )
+        self.slider.valueChanged.connect(self._slid)
+        self.raster.picked.connect(self.show_time)
+        self.play.toggled.connect(self._toggled)
+        QShortcut(QKeySequence("Space"), self).activated.connect(self.play.toggle)
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self._look)
+        self._timer.start(FRAME)
+        self._enable(False)
+        say(self.when, "computing …")
+
+    def show_time(self, at: float) -> None:
+        """Show the spikes in the stretch before `at` s."""
+        film = self.film
+        if film is None:
+            return
+        self._at = min(max(at, 0.0), self._skin.duration)
+        self.slider.blockSignals(True)
+        self.slider.setValue(round(self._at / self._skin.duration * STEPS))
+        self.slider.blockSignals(False)
+        self.raster.show_time(self._at)
+        counts = film.counts(self._at)
+        self.map.show_rates(counts / film.stretch, film.most / film.stretch)
+        say(self.when, f"{self._at:.3f} s of {show(self._skin.duration, 's')}")
+        self.numbers.set_whole(
+            f"{count(int(counts.sum()), 'spike')} of "
+            f"{count(int((counts > 0).sum()), 'taxel')} in the "
+            f"{show(film.stretch, 's')} before; {count(film.dots.seen, 'spike')} of "
+            f"{count(int((film.events.count > 0).sum()), 'taxel')} in all"
+            f"{self._thinned}"
+        )
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Stop computing."""
+        self._timer.stop()
+        self._computing.leave()
+        super().closeEvent(event)
+
+    @property
+    def _thinned(self) -> str:
+        every = (self.film.dots if self.film is not None else self._dots).every
+        return "" if every == 1 else f" · the raster draws one of {every}"
+
+    def _look(self) -> None:
+        """Show what has come, or the next picture."""
+        fresh = False
+        for told in self._computing.told():
+            if isinstance(told, Film):
+                self._computed(told)
+            elif isinstance(told, Failed):
+                self._enable(False)
+                self.progress.hide()
+                say(self.when, "not computed")
+                self.warning.setText(told.text)
+                self.warning.show()
+            else:
+                self._take(told)
+                fresh = True
+        if fresh and self.film is None:
+            self._show_computed()
+        if self.play.isChecked():
+            now = wall.monotonic()
+            speed = SPEEDS[self.speed.currentText()]
+            at = self._at + (now - self._last) * speed
+            self._last = now
+            if at >= self._skin.duration:
+                self.play.setChecked(False)
+            self.show_time(at)
+
+    def _take(self, told: Trains) -> None:
+        taxels = told.first + np.arange(told.count.size)
+        self._rates[taxels] = told.count / self._skin.duration
+        self._dots.add(told.time, np.repeat(taxels, told.count))
+        self.progress.setValue(int(taxels[-1]) + 1)
+
+    def _show_computed(self) -> None:
+        """Mean rates and spikes of the taxels that are computed so far."""
+        self.map.show_rates(self._rates, max(1.0, float(np.nanmax(self._rates))))
+        self.raster.show_dots(*self._dots.points)
+        self.numbers.set_whole(
+            f"{self.progress.value():,} of {self._skin.array.size:,} taxels computed, "
+            f"{self._dots.seen:,} spikes; the map shows the mean rate of each"
+            + self._thinned
+        )
+
+    def _computed(self, film: Film) -> None:
+        self.film = film
+        self.progress.hide()
+        self.raster.show_dots(*film.dots.points)
+        self._enable(True)
+        self.show_time(film.stretch)
+
+    def _enable(self, on: bool) -> None:
+        for part in (self.play, self.slider, self.speed):
+            part.setEnabled(on)
+
+    def _slid(self, value: int) -> None:
+        self.play.setChecked(False)
+        self.show_time(value / STEPS * self._skin.duration)
+
+    def _toggled(self, on: bool) -> None:
+        self.play.set_icon("freeze" if on else "play")
+        self._last = wall.monotonic()
+        if on and self._at >= self._skin.duration:
+            self.show_time(0.0)

@@ -1,0 +1,148 @@
+"""An array of sensors in a window of its own."""
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
+
+from gui.skin.computing import Computing
+from gui.skin.film import DOTS, Dots, pixels
+from gui.skin.window import open_skin
+from tactile_lab.errors import RunFolderError, SceneError
+from tactile_lab.skin.events import Events
+from tactile_lab.skin.press import press
+from tactile_lab.skin.skin import load_skin
+
+BALL = """
+title = "A ball"
+duration = "0.4 s"
+[array]
+grid = [5, 4]
+stuck = [3]
+stuck_rate = "100 Hz"
+[[stimulus]]
+kind = "sphere"
+force = "3 N"
+start = "0.1 s"
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("skin")
+    (path / "ball.toml").write_text(BALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def events(folder):
+    skin = load_skin(folder / "ball.toml")
+    press(skin, folder / "pressed")
+    return Events.read(folder / "pressed")
+
+
+def shown(lab, path, folder):
+    window = open_skin(path, lab.window.panels.theme, folder / "skins")
+    window.show()
+    lab.until(lambda: window.film is not None)
+    return window
+
+
+def test_trains_come_while_it_is_computed_and_are_played_after(lab, folder, events):
+    skin = load_skin(folder / "ball.toml")
+    computing = Computing(skin, folder / "again")
+    computing.thread.join()
+    told = computing.told()
+    assert [type(one).__name__ for one in told] == ["Trains", "Film"]
+    trains, film = told
+    assert trains.first == 0
+    np.testing.assert_array_equal(trains.count, events.count)
+    assert film.dots.seen == events.time.shape[0]
+
+
+def test_the_map_shows_the_spikes_before_the_moment(lab, folder, events):
+    window = shown(lab, folder / "pressed", folder)
+    film = window.film
+    for at in (film.stretch, 0.15, 0.25, 0.4):
+        window.show_time(at)
+        time, taxel = events.time[:], events.taxel[:]
+        inside = (time >= at - film.stretch) & (time < at)
+        counts = np.bincount(taxel[inside], minlength=20)
+        image = window.map.picture.image
+        which, _ = pixels(events.places, 1e-3)
+        rates = [np.nanmax(np.where(which == k, image, np.nan)) for k in range(20)]
+        np.testing.assert_allclose(rates, counts / film.stretch)
+        assert window.raster.now.value() == at
+    assert window.raster.dots.data.size == events.time.shape[0] > 40
+    assert f"{events.time.shape[0]} spikes" in window.numbers.toolTip() or (
+        f"{events.time.shape[0]} spikes" in window.numbers.text()
+    )
+    window.close()
+
+
+def test_play_moves_on_to_the_end_and_stops_there(lab, folder, events):
+    window = shown(lab, folder / "pressed", folder)
+    window.speed.setCurrentText("10 × faster")
+    QTest.keyClick(window, Qt.Key.Key_Space)
+    lab.until(lambda: not window.play.isChecked())
+    assert window.slider.value() == window.slider.maximum()
+    window.slider.setValue(0)
+    assert window.when.text().startswith("0.000 s of 400 ms")
+    window.close()
+
+
+def test_what_cannot_be_shown_is_refused_or_told(lab, folder, tmp_path):
+    theme = lab.window.panels.theme
+    with pytest.raises(RunFolderError, match="does not exist"):
+        open_skin(tmp_path / "none.toml", theme, tmp_path)
+    with pytest.raises(RunFolderError, match="holds no events"):
+        open_skin(tmp_path, theme, tmp_path)
+    (tmp_path / "bad.toml").write_text(BALL.replace("[5, 4]", "[5, 0]"))
+    with pytest.raises(SceneError):
+        open_skin(tmp_path / "bad.toml", theme, tmp_path)
+    (tmp_path / "file").write_text("in the way")
+    window = open_skin(folder / "ball.toml", theme, tmp_path / "file")
+    window.show()
+    lab.until(window.warning.isVisible)
+    assert "file" in window.warning.text()
+    window.close()
+
+
+def test_closing_the_window_ends_the_computing(folder, tmp_path):
+    skin = load_skin(folder / "ball.toml")
+    computing = Computing(skin, tmp_path / "left")
+    computing.leave()
+    computing.thread.join()
+    told = [type(one).__name__ for one in computing.told()]
+    assert told in ([], ["Trains", "Film"])  # it may have been done already
+
+
+def test_the_menu_opens_it_and_tells_what_prevents_it(lab, folder, tmp_path):
+    actions = lab.window.actions_
+    actions.ask_skin()
+    (dialog,) = lab.window.findChildren(QFileDialog)
+    dialog.close()
+    actions.open_skin(tmp_path / "none.toml")
+    assert "does not exist" in lab.session.log.lines[-1].text
+
+
+def test_dots_are_thinned_evenly():
+    dots, time = Dots(), np.arange(3.0 * DOTS)
+    for part in np.array_split(time, 7):
+        dots.add(part, part.astype(int))
+    kept, taxel = dots.points
+    assert dots.seen == time.size and kept.size <= DOTS
+    np.testing.assert_array_equal(kept, time[:: dots.every])
+    np.testing.assert_array_equal(taxel, kept)
+
+
+def test_every_taxel_has_its_pixels_where_it_lies():
+    places = np.array([[0.0, 0.0], [2e-3, 0.0], [1e-3, 1.8e-3]])
+    which, (left, low, wide, high) = pixels(places, 1e-3)
+    step = wide / which.shape[0]
+    assert step == pytest.approx(high / which.shape[1])
+    for taxel, place in enumerate(places):
+        at = np.argwhere(which == taxel).mean(axis=0) + 0.5
+        np.testing.assert_allclose((left, low) + at * step, place, atol=step)
+    assert (which < 0).any()
