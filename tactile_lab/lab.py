@@ -20,6 +20,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from tactile_lab.columns import read_text
@@ -28,6 +29,12 @@ from tactile_lab.errors import SceneError, choices
 KEYS = ("bench", "runs", "operator", "institution", "after_run")
 VARIABLE = "TACTILE_LAB_"
 RUN = "{run}"
+
+LONGEST = 3600.0
+"""Time that a program after a run may take, s: a night's sequence waits for it."""
+
+LAST_WORDS = 300
+"""Bytes of what it printed that are told where it fails."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,25 +79,32 @@ class Lab:
     def follow(self, run: Path) -> str:
         """Call what follows a run; what went wrong with it, "" if nothing did.
 
-        The run is on disk and its coil off: a program that fails or hangs (Ctrl-C ends
-        it) costs nothing but itself.
+        The run is on disk and its coil off: a program that fails costs nothing but
+        itself, and one that hangs is ended after `LONGEST` s, or by Ctrl-C. What it
+        leaves in the background is not waited for.
         """
         if not self.after_run:
             return ""
         words = [word.replace(RUN, str(run)) for word in self.after_run]
         if words == list(self.after_run):
             words.append(str(run))
-        try:
-            done = subprocess.run(
-                words, capture_output=True, text=True, check=False, errors="replace",
-                stdin=subprocess.DEVNULL,
-            )  # fmt: skip
-        except OSError as reason:
-            return f"after_run: {words[0]} cannot be started: {reason.strerror}."
-        if done.returncode == 0:
-            return ""
-        said = (done.stderr or done.stdout).strip()[-300:]
-        return f"after_run: {' '.join(words)} ended with {done.returncode}: {said}"
+        told = f"after_run: {' '.join(words)}"
+        # a file: a pipe would be waited for as long as any child of it holds it
+        with TemporaryFile() as said:
+            try:
+                done = subprocess.run(
+                    words, stdin=subprocess.DEVNULL, stdout=said,
+                    stderr=subprocess.STDOUT, check=False, timeout=LONGEST,
+                )  # fmt: skip
+            except OSError as reason:
+                return f"after_run: {words[0]} cannot be started: {reason.strerror}."
+            except subprocess.TimeoutExpired:
+                return f"{told} did not end within {LONGEST / 60:g} min and was ended."
+            if done.returncode == 0:
+                return ""
+            said.seek(max(0, said.seek(0, os.SEEK_END) - LAST_WORDS))
+            last = said.read().decode(errors="replace").strip()
+        return f"{told} ended with {done.returncode}: {last}"
 
 
 def config_file() -> Path:
@@ -128,6 +142,7 @@ def lab() -> Lab:
     for key in KEYS[:-1]:
         text = os.environ.get(VARIABLE + key.upper())
         if text:
+            text = os.path.expanduser(text) if key in ("bench", "runs") else text
             values[key] = Path(text).resolve() if key == "runs" else text
             origin[key] = f"from {VARIABLE}{key.upper()}"
     return Lab(**values, origin=origin)
@@ -145,10 +160,11 @@ def _checked(key: str, value: Any, file: Path) -> Any:
         return tuple(value)
     if not _is_text(value):
         raise SceneError(f"{file}: {key} = {value!r}: a text in quotes is needed.")
+    path = file.parent / os.path.expanduser(value)
     if key == "runs":
-        return file.parent / value
+        return path
     if key == "bench" and value != "sim":
-        return str((file.parent / value).resolve())
+        return str(path.resolve())
     return value
 
 

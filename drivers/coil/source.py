@@ -9,7 +9,7 @@ from __future__ import annotations
 from drivers.coil.guard import Guard, in_process
 from drivers.coil.interlock import GENERATOR, Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, check_points, load
-from drivers.coil.wire import CATCH_UP, CoilWire
+from drivers.coil.wire import CATCH_UP, UNKNOWN, CoilWire
 from drivers.serial_line.instrument import SerialInstrument
 from drivers.serial_line.link import SerialLink, Spy
 from tactile_lab.bench import CoilLimits, OffReport, Reading, SeenOutput
@@ -121,7 +121,8 @@ class CoilSource(SerialInstrument[CoilWire]):
                 self._setpoint = 0.0  # nothing flows, nothing to ramp
             report = self.safe_off()
             if not report.verified:
-                raise UnsafeError(report.text)
+                why = report.text.removeprefix(UNKNOWN)
+                raise UnsafeError(f"It could not be verified off when connected: {why}")
             wire.set_up("it might regulate a voltage instead of the current")
             self._interval = wire.measured_interval()
             if self._guard is not None:
@@ -394,4 +395,5 @@ class CoilSource(SerialInstrument[CoilWire]):
             return
         self._interlock.tripped = complaint
         report = self.safe_off()
-        raise InterlockError(f"{complaint} {report.text}")
+        left = "" if report.verified else "At once it could not be verified off: "
+        raise InterlockError(f"{complaint} {left}{report.text.removeprefix(UNKNOWN)}")

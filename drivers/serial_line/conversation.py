@@ -121,8 +121,17 @@ class Conversation(Generic[D]):
             return self.link.query(line, blank=blank)
         except (NoReplyError, BadReplyError):
             self.link.resynchronise()
-            self._empty_errors(self.link.query)
+            reported = self._empty_errors(self.link.query)
+        try:
             return self.link.query(line, blank=blank)
+        except NoReplyError as reason:
+            if not reported:
+                raise
+            raise NoReplyError(
+                f"The {self.dialect.role} at {self.link.port} did not answer {line!r} "
+                f"and reports {', '.join(reported)}. Look at its front panel: somebody "
+                "may have switched something there."
+            ) from reason
 
     def number(self, line: str, pattern: str | None = None) -> float:
         """The numeric answer to `line`: group 1 of `pattern`, or of the row's.
@@ -214,13 +223,16 @@ class Conversation(Generic[D]):
             if re.search(self.dialect.confirm[line], answer) is None
         ]
 
-    def _empty_errors(self, ask: Callable[[str], str]) -> None:
-        """Read the error queue until it is empty."""
+    def _empty_errors(self, ask: Callable[[str], str]) -> list[str]:
+        """Read the error queue until it is empty; what it held."""
+        found: list[str] = []
         if self.dialect.error is None:
-            return
+            return found
         for _ in range(MOST_ERRORS):
-            if re.search(self.dialect.error_ok, ask(self.dialect.error)):
-                return
+            answer = ask(self.dialect.error)
+            if re.search(self.dialect.error_ok, answer):
+                return found
+            found.append(answer)
         raise RefusedError(
             f"The instrument at {self.link.port} has no end of errors; switch it off "
             "and on."

@@ -67,7 +67,8 @@ class Ending:
         """How it ended and how the coil was left, in sentences."""
         reason = self.reason or ""
         stop = "" if not reason or reason.endswith((".", "!", "?")) else "."
-        return f"{self.state}: {reason}{stop} {self.off.text}"
+        left = "" if self.off.text in reason else self.off.text
+        return " ".join(f"{self.state}: {reason}{stop} {left}".split())
 
     @property
     def exit_code(self) -> int:

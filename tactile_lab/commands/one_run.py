@@ -19,6 +19,7 @@ from tactile_lab.commands.terminal import (
     say,
     somebody,
     warn,
+    working,
 )
 
 if TYPE_CHECKING:
@@ -232,7 +233,7 @@ def answer(
     }
 
 
-def write_report(done: Executed) -> Report | None:
+def write_report(folder: Path) -> Report | None:
     """Write the report of a run; None where it cannot be, which is told."""
     from tactile_lab.errors import TactileLabError
     from tactile_lab.report.from_run import read
@@ -240,7 +241,7 @@ def write_report(done: Executed) -> Report | None:
 
     try:
         with progress("writing the report") as update:
-            report = write(done.folder, read(done.folder), progress=update)
+            report = write(folder, read(folder), progress=update)
     except (TactileLabError, OSError) as error:
         warn(f"the report could not be written: {error}")
         return None
@@ -308,22 +309,48 @@ def concluded(
                 warn(text)
             if done.exit_code:
                 say(f"tactile-lab: {done.told}", sys.stderr)
-            report = None if no_report else write_report(done)
+            report = None if no_report else write_report(done.folder)
             tell(done, report)
-            from tactile_lab.lab import lab
-
-            if problem := lab().follow(done.folder):
-                warn(problem)
+            _follow(done.folder)
         except (Exception, KeyboardInterrupt) as failure:
-            _unreported(done, failure)
+            _unreported(done.folder, failure)
 
 
-def _unreported(done: Executed, failure: BaseException) -> None:
+def caught_up(folder: Path, *, no_report: bool) -> None:
+    """Do for a run that is complete what the program was killed before doing.
+
+    Nothing that fails in here is more than told.
+
+    Args:
+        folder: of the run.
+        no_report: leave the report out.
+    """
+    with interrupted():
+        try:
+            if not no_report and not (folder / "report.html").exists():
+                write_report(folder)
+            _follow(folder)
+        except (Exception, KeyboardInterrupt) as failure:
+            _unreported(folder, failure)
+
+
+def _follow(folder: Path) -> None:
+    """Call what the lab has follow each run; what goes wrong with it is told."""
+    from tactile_lab.lab import lab
+
+    said = lab()
+    with working(f"after_run: {' '.join(said.after_run[:1])}"):
+        problem = said.follow(folder)
+    if problem:
+        warn(problem)
+
+
+def _unreported(folder: Path, failure: BaseException) -> None:
     """Say that the run could not be told of to the end, if that can be said."""
     text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
     warn(
-        f"the report was cut short ({text}). The run is kept in {done.folder}; "
-        f"`tactile-lab report {done.folder}` writes it again."
+        f"the report was cut short ({text}). The run is kept in {folder}; "
+        f"`tactile-lab report {folder}` writes it again."
     )
 
 

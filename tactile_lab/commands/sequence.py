@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ import click
 
 from tactile_lab.commands.attended import Signals
 from tactile_lab.commands.one_run import (
+    caught_up,
     finished,
     prepared,
     tell_of,
@@ -50,8 +51,9 @@ class Step:
         scene: name or path, as `run` takes it.
         changes: of single keys.
         bench: bench file or "sim"; None for the scene's own.
-        status: how it ended; "" while it has not.
+        status: how it ended; "running" from its beginning, "" before.
         run: its folder, once there is one.
+        told: whether its report was written, and what follows a run was called.
     """
 
     scene: str
@@ -59,6 +61,7 @@ class Step:
     bench: str | None = None
     status: str = ""
     run: str = ""
+    told: bool = False
 
     def load(self) -> Scene:
         """The scene.
@@ -121,19 +124,31 @@ def command(
             _wait(start, signals)
         for number, step in enumerate(steps):
             if step.status == "complete":
+                if not step.told:
+                    caught_up(Path(step.run), no_report=no_report)
+                    steps[number] = replace(step, told=True)
+                    _keep(state, steps)
                 continue
+            if step.status == "running":
+                warn(
+                    f"{step.run} was not ended; `tactile-lab recover {step.run}` makes "
+                    "whole what it holds. It is done again."
+                )
             say(f"{number + 1} of {len(steps)}: {step.scene}", sys.stderr)
             with refusing():
                 execution, watchers = prepared(
                     step.load(), out, kept_notes, others, realtime=realtime
                 )
+            run = str(execution.folder.path)
+            steps[number] = replace(step, status="running", run=run)
+            _keep(state, steps)
             done = finished(execution, signals, watchers)
             signals.opened = False
-            steps[number] = Step(
-                step.scene, step.changes, step.bench, str(done.state), str(done.folder)
-            )
+            steps[number] = replace(step, status=str(done.state), run=run)
             _keep(state, steps)
             tell_of(done, watchers, no_report=no_report)
+            steps[number] = replace(steps[number], told=True)
+            _keep(state, steps)
             code = done.exit_code
             if code and not (go_on and code == 3):
                 break

@@ -1,6 +1,8 @@
 """What a lab sets once counts where nothing else is said, with where it came from."""
 
 import json
+import os
+import signal
 import sys
 from pathlib import Path
 
@@ -117,3 +119,30 @@ def test_a_file_that_is_named_must_be_there(monkeypatch, tmp_path):
     monkeypatch.setenv("TACTILE_LAB_CONFIG", str(tmp_path / "none.toml"))
     with pytest.raises(SceneError, match="does not exist"):
         lab()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a shell")
+def test_what_follows_a_run_holds_up_nothing(set_by_lab, monkeypatch, tmp_path):
+    monkeypatch.setattr("tactile_lab.lab.LONGEST", 0.2)
+    set_by_lab('after_run = ["sleep", "600", "{run}"]\n')
+    told = lab().follow(Path("0"))
+    assert "did not end within" in told
+    monkeypatch.undo()
+
+    left = '["sh", "-c", "sleep 60 & echo $! gone; exit 3"]'
+    (tmp_path / "left.toml").write_text(f"after_run = {left}\n")
+    monkeypatch.setenv("TACTILE_LAB_CONFIG", str(tmp_path / "left.toml"))
+    told = lab().follow(tmp_path)
+    assert "ended with 3" in told
+    number = int(told.split()[-2])
+    os.kill(number, signal.SIGKILL)  # it was not waited for: it is there to be ended
+
+
+def test_a_tilde_is_the_home_folder(set_by_lab, monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    set_by_lab('runs = "~/runs"\nbench = "~/bench.toml"\n')
+    assert lab().runs == tmp_path / "runs"
+    assert lab().bench == str(tmp_path / "bench.toml")
+    monkeypatch.setenv("TACTILE_LAB_RUNS", "~/there")
+    assert lab().runs == tmp_path / "there"

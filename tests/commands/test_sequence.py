@@ -1,6 +1,7 @@
 """Several runs in turn: planned before, kept on disk, gone on with after a fault."""
 
 import json
+import sys
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -133,3 +134,31 @@ def test_a_time_to_begin(sequence):
         assert answer.code == 2
         assert told in answer.err
     assert "no sequence was begun" in sequence("--resume").err
+
+
+def test_what_a_kill_left_undone_after_a_run_is_done_on_resume(
+    tactile_lab, sequence, asked, tmp_path, monkeypatch
+):
+    assert sequence(asked({"scene": "demo", "times": 2})).code == 0
+    state = tmp_path / "runs" / "sequence.json"
+    held = json.loads(state.read_text())
+    first, second = held["runs"]
+    first["told"] = False  # killed as its report was written
+    second["status"] = "running"  # and another as it ran
+    state.write_text(json.dumps(held))
+    called = tmp_path / "called"
+    script = f"import sys; open({str(called)!r}, 'a').write(sys.argv[1])"
+    after = [sys.executable, "-c", script]
+    (tmp_path / "lab.toml").write_text(f"after_run = {json.dumps(after)}\n")
+    monkeypatch.setenv("TACTILE_LAB_CONFIG", str(tmp_path / "lab.toml"))
+
+    resumed = tactile_lab("sequence", "--resume", "--out", tmp_path / "runs")
+    assert resumed.code == 0, resumed.err
+    assert (Path(first["run"]) / "report.html").exists()
+    assert f"{second['run']} was not ended" in resumed.err
+    again = kept(tmp_path)[1]
+    assert again[0] == "complete"
+    assert again[1] != second["run"]
+    assert called.read_text() == f"{first['run']}{again[1]}"
+    assert sequence("--resume").code == 0
+    assert called.read_text() == f"{first['run']}{again[1]}"

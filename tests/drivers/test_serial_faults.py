@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from drivers.coil.source import CoilSource
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
-from sim_backend.serial_line.wires import FarEnd
+from sim_backend.serial_line.wires import FarEnd, plug_in, unplug
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
@@ -342,3 +342,31 @@ def test_a_source_that_was_never_reached_is_not_called_safe(serial_bench):
     report = it.coil.safe_off()
     assert not report.verified and "never reached" in report.text
     assert it.clock.now() == begun
+
+
+def test_no_answer_is_told_with_what_the_instrument_reports(resistor):
+    clock = SimulatedClock()
+    row = coil_dialect("keithley-2400")
+    source = SimCoilSource(resistor, row.id, clock)
+    end = plug_in(source, row.serial, clock, "coil")
+    coil = CoilSource(row, end.url, CoilLimits(current=0.5), clock)
+    with clock.taking_part("test"):
+        coil.open()
+        coil.energise()
+        source.switch(False)  # at its front panel
+        with pytest.raises(NoReplyError, match=r"reports \+?803.*front panel"):
+            coil.read_current()
+        assert coil.safe_off().verified
+        coil.close()
+    unplug(end)
+
+
+def test_a_source_that_answers_late_as_it_is_opened_is_not_said_to_be_on(serial_bench):
+    it = serial_bench
+    it.end.faults.add(SerialFault(kind="missing", line=r"OUTP\?", skip=1, times=None))
+    with pytest.raises(UnsafeError) as failed:
+        it.coil.open()
+    assert "OUTPUT STATE UNKNOWN" not in str(failed.value)
+    assert "when connected" in str(failed.value)
+    it.end.faults.clear()
+    assert it.coil.safe_off().verified
