@@ -41,6 +41,10 @@ AT_ZERO = 1e-5
 SAMPLED = frozenset({"V_C1", "V_C2", "V_K", "coil_current", "I_DS", "spikes", "rate"})
 """Signals for which the scope is opened."""
 
+MOST_MOVING, MOST_SET_POINTS = 500_000, 4_000_000
+"""Set-points of one trial while its current changes, and all of them: 6 hours and two
+days of a Kepco. Each one that differs is a step that the plan computes."""
+
 LEADS = 3
 """Times a current is led by what the one before left behind."""
 
@@ -112,7 +116,12 @@ def _set_points(
     before: float,
     interval: float,
 ) -> Drive:
-    """Played by set-points, one each `interval` s."""
+    """Played by set-points, one each `interval` s.
+
+    Raises:
+        LimitError: there are too many of them.
+    """
+    _refuse_too_many(wanted, interval)
     played, warning = limited(wanted, coil.limits.slew, interval, before)
     played = cut(played, wanted.end)
     why = f"one each {show(interval, 's', 3)}"
@@ -128,6 +137,21 @@ def _set_points(
     given, _ = magnet.lagged_force(stairs, (before, before))
     error = _difference(asked, given)
     return Drive(played, error=error, why=why, warning=warning)
+
+
+def _refuse_too_many(wanted: Waveform, interval: float) -> None:
+    changes = np.diff(wanted.value) != 0
+    moving = float(np.diff(wanted.time)[changes].sum())
+    for seconds, most, what in (
+        (moving, MOST_MOVING, "changes its force"),
+        (wanted.end, MOST_SET_POINTS, "lasts"),
+    ):
+        if seconds > most * interval:
+            raise LimitError(
+                f"A trial {what} for {show(seconds, 's')}; at one set-point each "
+                f"{show(interval, 's', 3)}, {show(most * interval, 's', 2)} is the "
+                "most. Ask for a shorter ramp, hold or rest, or for more trials."
+            )
 
 
 def _lists(scene: Scene) -> ListCapability:

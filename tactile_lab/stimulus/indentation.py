@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.errors import ParameterError
+from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
@@ -17,6 +19,9 @@ FINEST = 2.5e-4
 
 IN_ONE_RISE, IN_ONE_CYCLE = 64, 96
 """Points a smooth rise, and a cycle, are drawn with: within 0.06 % of the curve."""
+
+MOST_POINTS = 200_000
+"""Points of one force, which are computed in the plan: a minute and a half at 20 Hz."""
 
 
 def rise(level: float, lasts: float) -> Waveform:
@@ -55,9 +60,17 @@ def on_indentation(
 
     Returns:
         The force; and start and end, s, of the part where `over` acts in full.
+
+    Raises:
+        ParameterError: it has too many points.
     """
     spacing = max(FINEST, min(1 / (IN_ONE_CYCLE * highest), lasts / IN_ONE_CYCLE))
     count = max(IN_ONE_CYCLE, math.ceil(lasts / spacing))
+    if count > MOST_POINTS:
+        raise ParameterError(
+            f"{show(lasts, 's')} of a force with details of {show(highest, 'Hz')} is "
+            f"{count:.2g} points; {MOST_POINTS} are the most. Ask for less time."
+        )
     time = lasts * np.arange(count + 1) / count
     soft = lasts / 10
     edge = np.clip(np.minimum(time, lasts - time) / soft, 0.0, 1.0)

@@ -144,3 +144,21 @@ def test_doctor_looks_where_the_bench_file_says(tactile_lab, tmp_path):
     findings = tactile_lab("doctor", "--json", *asked).json["findings"]
     (pico,) = (one for one in findings if one["topic"] == "picosdk")
     assert "/opt/own/ps3000a.so" in pico["text"]
+
+
+@pytest.mark.parametrize(
+    ("scene", "change", "told"),
+    [
+        ("demo", "protocol.ramp=1e6 s", "changes its force for 2 Ms"),
+        ("staircase", "protocol.ramp=1e6 s", "changes its force for"),
+        ("sine_sweep", "protocol.lowest=1e-6 Hz", "changes its force for"),
+        ("demo", "protocol.hold=1e7 s", "lasts for 10 Ms"),
+        ("texture", "protocol.lasts=1e6 s", "200000 are the most"),
+    ],
+)
+def test_what_would_fill_the_memory_is_refused_before(tactile_lab, scene, change, told):
+    answer = tactile_lab("plan", scene, "--set", change)
+    assert answer.code == 2
+    assert told in answer.err
+    assert "Ask for" in answer.err
+    assert "MemoryError" not in answer.err
