@@ -31,6 +31,7 @@ VERBS = {
     "doctor": "Environment, drivers, permissions, timing, disk; each with its remedy.",
     "serve-bench": "Serve the simulated serial instruments to other programs.",
     "runs": "The runs recorded so far; find, sort and tabulate by any key.",
+    "note": "A note, tags or a star for a run; `runs --where` finds them.",
     "show": "What one run holds, in numbers, and where its figures are.",
     "compare": "What differs between two runs, and what each found.",
     "chart": "One number over many runs: what is usual, what drifts, by specimen.",

@@ -3,7 +3,9 @@
 import json
 
 import pytest
+from click.testing import CliRunner
 
+from tactile_lab.cli import cli
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.folder import RunFolder
@@ -74,3 +76,37 @@ def test_damaged_remarks_are_refused_with_what_to_do(run, rubbish):
         read_remarks(run)
     (entry,) = _runs(run.parent)
     assert "remarks" in entry.trouble
+
+
+def _noted(run, *words):
+    return CliRunner().invoke(cli, ["note", str(run), *words])
+
+
+def test_notes_tags_and_stars_from_the_command_line_are_found(run):
+    done = _noted(run, "moved it", "--at", "1500 ms", "--tag", "cal", "--tag", "#new",
+                  "--star")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "1.5 s: moved it" in done.output
+    for where in ("tag = cal", "tag = new and starred = yes", "note ~ MOVED"):
+        assert len(_runs(run.parent, where=where)) == 1
+    assert _noted(run, "--untag", "new", "--no-star").exit_code == 0
+    kept = read_remarks(run)
+    assert (kept.tags, kept.starred) == (["cal"], False)
+    told = json.loads(_noted(run, "--json").stdout)
+    assert told["notes"][0]["time_s"] == 1.5
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["--tag", "two words"], "is no tag"),
+        (["--untag", "gone"], "has no tag gone"),
+        (["--at", "1 s"], "write the note"),
+        (["  "], "is empty"),
+        (["when", "--at", "1 N"], "s is needed"),
+    ],
+)
+def test_a_remark_that_is_none_is_refused_and_nothing_written(run, words, why):
+    done = _noted(run, *words)
+    assert done.exit_code == 2 and why in done.output
+    assert not (run / REMARKS).exists()

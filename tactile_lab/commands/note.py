@@ -1,0 +1,96 @@
+"""``tactile-lab note``: what people say of a run, so that it is found again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from tactile_lab.commands.options import json_option, run_argument
+from tactile_lab.commands.terminal import print_json, refusing, say
+
+
+@click.command()
+@run_argument
+@click.argument("text", required=False)
+@click.option("--at", metavar="TIME", help='On the run\'s axis, such as "12.5 s".')
+@click.option("--tag", multiple=True, metavar="WORD", help="Add a tag; repeatable.")
+@click.option("--untag", multiple=True, metavar="WORD", help="Take a tag away.")
+@click.option("--star/--no-star", default=None, help="Give it a star, or take it away.")
+@click.option("--title", metavar="TEXT", help="Call it so; empty for its own title.")
+@json_option
+def command(
+    run: Path,
+    text: str | None,
+    at: str | None,
+    tag: tuple[str, ...],
+    untag: tuple[str, ...],
+    star: bool | None,
+    title: str | None,
+    as_json: bool,
+) -> None:
+    """Add the note TEXT, tags or a star to RUN; without any, say what it has.
+
+    The record itself is never touched. `runs --where 'tag = cal'`, `note ~ magnet` and
+    `starred = yes` find the run again.
+    """
+    with refusing():
+        from tactile_lab.errors import SceneError
+        from tactile_lab.quantity import parse
+        from tactile_lab.store.folder import read_info
+        from tactile_lab.store.remarks import Note, read_remarks, write_remarks
+
+        read_info(run)  # a run, and no other folder
+        before = found = read_remarks(run)
+        if at is not None and not text:
+            raise SceneError("--at says when a note is of; write the note after RUN.")
+        if text is not None:
+            if not text.strip():
+                raise SceneError("The note is empty.")
+            note = Note(text=text, time=None if at is None else parse(at, "s"))
+            found = replace(found, notes=(*found.notes, note))
+        missing = [_word(one) for one in untag if _word(one) not in found.tags]
+        if missing:
+            raise SceneError(
+                f"{run.name} has no tag {missing[0]}; it has "
+                f"{', '.join(found.tags) or 'none'}."
+            )
+        gone = {_word(one) for one in untag}
+        tags = dict.fromkeys((*found.tags, *map(_word, tag)))
+        found = replace(found, tags=tuple(one for one in tags if one not in gone))
+        if star is not None:
+            found = replace(found, starred=star)
+        if title is not None:
+            found = replace(found, title=title.strip())
+        if found != before:
+            write_remarks(run, found)
+    if as_json:
+        notes = [{"text": n.text, "time_s": n.time, "at": n.at} for n in found.notes]
+        print_json(
+            {
+                "title": found.title,
+                "tags": list(found.tags),
+                "starred": found.starred,
+                "notes": notes,
+            }
+        )
+        return
+    mark = "* " if found.starred else ""
+    say(" ".join((f"{mark}{found.title or run.name}", *(f"#{t}" for t in found.tags))))
+    for one in found.notes:
+        say(f"  {one}")
+
+
+def _word(text: str) -> str:
+    """A tag as it is kept.
+
+    Raises:
+        SceneError: it is empty, or would be two.
+    """
+    from tactile_lab.errors import SceneError
+
+    word = text.strip().removeprefix("#")
+    if not word or "," in word or word.split() != [word]:
+        raise SceneError(f'"{text}" is no tag; write one word, such as cal.')
+    return word
