@@ -36,7 +36,8 @@ report show themselves.
     46
 
 A study varies a scene: `study` computes what is missing of it on every core and gives
-one labelled data set (docs/studies.md). `design` chooses parts for a wanted behaviour.
+one labelled data set (docs/studies.md). `design` chooses parts for a wanted behaviour,
+`identify` fits the sensor's parameters to one or several runs.
 
 A protocol of your own is a subclass of `Protocol` that yields one `Trial` after
 another, in a file that `load` takes. Whatever is refused or fails is a
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from tactile_lab.scene.scene import Scene
     from tactile_lab.scripting import (
         design,
+        identify,
         latest,
         plan,
         run,
@@ -84,6 +86,7 @@ __all__ = [
     "Trial",
     "Waveform",
     "design",
+    "identify",
     "latest",
     "load",
     "plan",
@@ -105,6 +108,7 @@ _HOMES = {
     "Trial": "trial",
     "Waveform": "waveform",
     "design": "scripting",
+    "identify": "scripting",
     "latest": "scripting",
     "load": "scene.load",
     "plan": "scripting",

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
     from tactile_lab.model.simulate import Result
+    from tactile_lab.report.identified import FittedRuns
     from tactile_lab.report.write import Report
     from tactile_lab.studies.chosen import Chosen
 
@@ -206,6 +207,34 @@ def study(
     asked = load_study(what, name)
     found = carry_out(asked, Path(out), count=workers, scheduler=scheduler)
     return found.to_xarray()
+
+
+def identify(
+    runs: Run | str | Path | Sequence[Run | str | Path],
+    parameters: Sequence[str],
+    *,
+    force_scales: bool = False,
+) -> FittedRuns:
+    """Fit one set of parameters of the sensor to a run, or to several together.
+
+    ``identify(["runs/A", "runs/B"], ["V_GS", "tau"]).together.estimates["V_GS"]``
+
+    Args:
+        runs: runs, or their folders.
+        parameters: names of `Circuit`; the others stay as each run's scene has them.
+        force_scales: fit a factor of each run's force as well, "force_1" and so on.
+
+    Raises:
+        RunFolderError: not a run, or one without data.
+        NotIdentifiableError: the data do not determine a parameter.
+        ParameterError: an unknown parameter.
+    """
+    from tactile_lab.report.from_run import read
+    from tactile_lab.report.identified import identify_runs
+
+    several = [runs] if isinstance(runs, Run | str | Path) else runs
+    read_ = [read(r.path if isinstance(r, Run) else Path(r)) for r in several]
+    return identify_runs(read_, parameters, force_scales=force_scales)
 
 
 def design(what: str | Path | Mapping[str, Any]) -> Chosen:

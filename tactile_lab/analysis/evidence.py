@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,8 @@ class Residuals:
         spike_times: FloatArray | None,
     ) -> None:
         self.names = names
-        self._circuit, self._force, self._duration = circuit, force, duration
+        self.force = force
+        self._circuit, self._duration = circuit, duration
         self._trace = V_C1
         times = np.empty(0) if spike_times is None else np.asarray(spike_times)
         short = np.diff(times) <= LONGEST
@@ -79,7 +81,7 @@ class Residuals:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """All residuals at scaled parameters `x`, V."""
-        return self.under(DrivenCircuit(self.circuit(x), self._force))
+        return self.under(DrivenCircuit(self.circuit(x), self.force))
 
     def under(self, driven: DrivenCircuit) -> FloatArray:
         """All residuals of a circuit and its force, V: of V_C1, then at firing."""
@@ -108,6 +110,68 @@ class Residuals:
             misses[i] = charge + kept - circuit.fire_voltage
         return misses
 
+    def weights(self, residual: FloatArray) -> FloatArray:
+        """One over the scatter of each kind of evidence."""
+        weights = np.empty(self.size)
+        for part in (slice(0, self.bins), slice(self.bins, self.size)):
+            if residual[part].size:
+                weights[part] = 1 / max(scatter(residual[part]), 1e-9)
+        return weights
+
+
+class Together:
+    """Residuals of one or several runs as a function of the parameters they share.
+
+    Args:
+        runs: of each run its residuals, of the same parameters, begun alike.
+        scaled: whether the force of each run has a factor of its own that is fitted.
+    """
+
+    def __init__(self, runs: Sequence[Residuals], *, scaled: bool = False) -> None:
+        self._runs = runs
+        self._shared = runs[0].names
+        self._scaled = scaled
+        factors = (f"force_{i}" for i in range(1, len(runs) + 1))
+        self.names = (*self._shared, *(factors if scaled else ()))
+        self.size = sum(run.size for run in runs)
+        ends = np.cumsum([run.size for run in runs])
+        self.parts = [slice(e - r.size, e) for e, r in zip(ends, runs, strict=True)]
+        traced, offsets = np.zeros(self.size, dtype=bool), np.zeros(self.size)
+        for run, part in zip(runs, self.parts, strict=True):
+            traced[part][: run.bins] = True
+            offsets[part][: run.bins] = run.offset
+        self.traced = traced
+        self.offsets = offsets
+
+    def driven(self, x: FloatArray) -> list[DrivenCircuit]:
+        """Circuit and force of each run at scaled parameters `x`."""
+        shared = x[: len(self._shared)]
+        return [
+            DrivenCircuit(run.circuit(shared), run.force.scaled(scale))
+            for run, scale in zip(self._runs, self.scales(x), strict=True)
+        ]
+
+    def scales(self, x: FloatArray) -> list[float]:
+        """The factor of each run's force."""
+        factors = x[len(self._shared) :] if self._scaled else np.zeros(len(self._runs))
+        return list(map(float, np.exp(factors)))
+
+    def values(self, x: FloatArray) -> dict[str, float]:
+        """The parameters at scaled `x`, SI, by name."""
+        circuit = self.driven(x)[0].circuit
+        found = {name: float(getattr(circuit, name)) for name in self._shared}
+        factors = zip(self.names, x, strict=True)
+        return found | {n: float(np.exp(y)) for n, y in factors if n not in found}
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """All residuals at scaled parameters `x`, V, run after run."""
+        return self.under(self.driven(x))
+
+    def under(self, driven: Sequence[DrivenCircuit]) -> FloatArray:
+        """All residuals of a circuit and its force for each run, V."""
+        pairs = zip(self._runs, driven, strict=True)
+        return np.concatenate([run.under(one) for run, one in pairs])
+
     def weighted(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """All residuals over their scatter."""
         return self.residual(x) * weights
@@ -117,12 +181,9 @@ class Residuals:
         return np.full(self.size, 1 / 5e-3)
 
     def weights(self, residual: FloatArray) -> FloatArray:
-        """One over the scatter of each kind of evidence."""
-        weights = np.empty(self.size)
-        for part in (slice(0, self.bins), slice(self.bins, self.size)):
-            if residual[part].size:
-                weights[part] = 1 / max(scatter(residual[part]), 1e-9)
-        return weights
+        """One over the scatter of each kind of evidence of each run."""
+        pairs = zip(self._runs, self.parts, strict=True)
+        return np.concatenate([run.weights(residual[part]) for run, part in pairs])
 
 
 def scatter(residual: FloatArray) -> float:

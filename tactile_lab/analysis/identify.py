@@ -5,8 +5,10 @@ What it is fitted to: `tactile_lab.analysis.evidence`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from scipy.optimize import least_squares
 
 from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.estimate import Z95, Estimate
-from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, scatter
+from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, Together, scatter
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
@@ -22,6 +24,7 @@ from tactile_lab.model.circuit import PARAMETERS, Circuit
 from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
+Displaced = Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]]
 
 ALIKE = 0.98
 """Two parameters whose estimates correlate more than this are hardly told apart."""
@@ -42,7 +45,7 @@ class Identified:
     """Fitted parameters.
 
     Attributes:
-        circuit: with the fitted values.
+        circuit: of the first run, with the fitted values.
         estimates: by name, SI.
         correlation: shape (n, n), of the estimates, in the order of `estimates`.
         scatter_V_C1: remaining scatter of V_C1, V; None if not used.
@@ -58,6 +61,29 @@ class Identified:
     warnings: tuple[str, ...] = field(default=())
 
 
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What one run says.
+
+    Attributes:
+        circuit: the sensor as it is believed to be.
+        force: N on the run's time axis, from the measured coil current.
+        duration: of the run, s.
+        V_C1: measured, decimated; its bins must be independent. Its resolution is taken
+            for what the channel's offset is known to.
+        spike_times: detected spikes, s.
+        displaced: what a circuit and its force become if either is moved by `PART` of
+            its 95 % band, for each independent cause of uncertainty.
+    """
+
+    circuit: Circuit
+    force: Waveform
+    duration: float
+    V_C1: Measured | None = None
+    spike_times: FloatArray | None = None
+    displaced: Displaced = lambda _: ()
+
+
 def identify(
     circuit: Circuit,
     names: Sequence[str],
@@ -66,41 +92,51 @@ def identify(
     *,
     V_C1: Measured | None = None,
     spike_times: FloatArray | None = None,
-    displaced: Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]] = lambda _: (),
+    displaced: Displaced = lambda _: (),
 ) -> Identified:
-    """Fit the parameters `names`, starting from those of `circuit`.
+    """Fit the parameters `names` to one run; see `Evidence` and `identify_together`."""
+    seen = Evidence(circuit, force, duration, V_C1, spike_times, displaced)
+    return identify_together([seen], names)
+
+
+def identify_together(
+    runs: Sequence[Evidence], names: Sequence[str], *, force_scales: bool = False
+) -> Identified:
+    """Fit one set of the parameters `names` to all runs, begun at the first's circuit.
+
+    Other parameters stay as each run's circuit has them. Intervals hold the scatter of
+    the data, and what the offset of V_C1 and each cause of uncertainty would move the
+    estimate by; a cause is taken to be the same in all runs, as of one bench.
 
     Args:
-        circuit: the sensor as it is believed to be.
+        runs: at least one.
         names: parameters of `Circuit` to fit.
-        force: N on the run's time axis, from the measured coil current.
-        duration: of the run, s.
-        V_C1: measured, decimated; its bins must be independent. Its resolution is taken
-            for what the channel's offset is known to.
-        spike_times: detected spikes, s.
-        displaced: what a circuit and its force become if either is moved by `PART` of
-            its 95 % band, for each independent cause of uncertainty.
-
-    Intervals hold the scatter of the data, and what the offset of V_C1 and each
-    cause of uncertainty would move the estimate by.
+        force_scales: also fit a factor of each run's force, "force_1" and so on.
 
     Raises:
         ParameterError: an unknown parameter, or an option.
         NotIdentifiableError: no data, fewer points than parameters, or a parameter
             that does not act on the data at all.
     """
-    _check(circuit, names)
+    for one in runs:
+        _check(one.circuit, names)
     unused: tuple[str, ...] = ()
-    if circuit.saturation and spike_times is not None:
-        # between spikes I_C is then no function of V_C1 alone
-        spike_times, unused = None, ("spikes are not used: T1 saturates",)
-    problem = Residuals(circuit, tuple(names), force, duration, V_C1, spike_times)
-    if problem.size <= len(names):
+    problems = []
+    for one in runs:
+        begun: dict[str, Any] = {name: getattr(runs[0].circuit, name) for name in names}
+        circuit, spikes = replace(one.circuit, **begun), one.spike_times
+        if circuit.saturation and spikes is not None:
+            # between spikes I_C is then no function of V_C1 alone
+            spikes, unused = None, ("spikes are not used: T1 saturates",)
+        told = (circuit, tuple(names), one.force, one.duration, one.V_C1, spikes)
+        problems.append(Residuals(*told))
+    problem = Together(problems, scaled=force_scales)
+    if problem.size <= len(problem.names):
         raise NotIdentifiableError(
-            f"{problem.size} data points cannot determine {len(names)} parameters"
-            + "".join(f" ({why})" for why in unused)
+            f"{problem.size} data points cannot determine {len(problem.names)} "
+            "parameters" + "".join(f" ({why})" for why in unused)
         )
-    x, weights = np.zeros(len(names)), problem.first_weights()
+    x, weights = np.zeros(len(problem.names)), problem.first_weights()
     for _ in range(3):  # the scatter of the two kinds of evidence is itself estimated
         solved = least_squares(
             problem.weighted, x, x_scale="jac", diff_step=DIFFERENCE, method="lm",
@@ -108,7 +144,7 @@ def identify(
         )  # fmt: skip
         x = np.asarray(solved.x, dtype=np.float64)
         weights = problem.weights(problem.residual(x))
-        causes = _systematic(problem, x, displaced)
+        causes = _systematic(problem, x, [one.displaced for one in runs])
         weights = _without_edges(weights, causes)
     found = _identified(problem, x, weights, [moved for _, moved in causes])
     return replace(found, warnings=(*unused, *found.warnings))
@@ -131,18 +167,27 @@ _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
 def _systematic(
-    problem: Residuals,
-    x: FloatArray,
-    displaced: Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]],
+    problem: Together, x: FloatArray, displaced: Sequence[Displaced]
 ) -> list[tuple[str, FloatArray]]:
-    """Half of the 95 % band each systematic cause gives all residuals, V, by name."""
-    here = problem.residual(x)
-    moved = displaced(problem.circuit(x))
-    causes = [(name, (problem.under(driven) - here) / PART) for name, driven in moved]
-    if problem.bins and problem.offset:
-        shifted = np.zeros(problem.size)
-        shifted[: problem.bins] = problem.offset
-        causes.append(("offset", shifted))
+    """Half of the 95 % band each systematic cause gives all residuals, V, by name.
+
+    The n-th cause of a name is the same one in every run.
+    """
+    driven, here = problem.driven(x), problem.residual(x)
+    found: dict[tuple[str, int], list[DrivenCircuit]] = {}
+    scales = problem.scales(x)
+    for number, (one, causes_of) in enumerate(zip(driven, displaced, strict=True)):
+        met: Counter[str] = Counter()
+        for name, moved in causes_of(one.circuit):
+            scaled = DrivenCircuit(moved.circuit, moved.force.scaled(scales[number]))
+            found.setdefault((name, met[name]), list(driven))[number] = scaled
+            met[name] += 1
+    causes = [
+        (name, (problem.under(moved) - here) / PART)
+        for (name, _), moved in found.items()
+    ]
+    if problem.offsets.any():
+        causes.append(("offset", problem.offsets))
     return causes
 
 
@@ -155,7 +200,7 @@ def _without_edges(
 
 
 def _identified(
-    problem: Residuals, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
+    problem: Together, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
 ) -> Identified:
     jacobian = _jacobian(problem, x) * weights[:, None]
     lengths = np.linalg.norm(jacobian, axis=0)
@@ -170,28 +215,28 @@ def _identified(
     covariance = inverse / np.outer(lengths, lengths) * problem.size / freedom
     errors = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(errors, errors)
-    circuit = problem.circuit(x)
+    values = problem.values(x)
     # what each cause moves the least-squares estimate by, to first order
     solve = inverse / np.outer(lengths, lengths) @ jacobian.T
     moved = [np.abs(solve @ (cause * weights)) for cause in causes]
     estimates = {
         name: _estimate(
-            problem, circuit, name, float(errors[i]), freedom, [m[i] for m in moved]
+            name, values[name], float(errors[i]), freedom, [m[i] for m in moved]
         )
         for i, name in enumerate(problem.names)
     }
-    bins = problem.bins
+    traced, fired = residual[problem.traced], residual[~problem.traced]
     return Identified(
-        circuit=circuit,
+        circuit=problem.driven(x)[0].circuit,
         estimates=estimates,
         correlation=correlation,
-        scatter_V_C1=scatter(residual[:bins]) if bins else None,
-        scatter_V_fire=scatter(residual[bins:]) if problem.size > bins else None,
+        scatter_V_C1=scatter(traced) if traced.size else None,
+        scatter_V_fire=scatter(fired) if fired.size else None,
         warnings=_warnings(estimates, correlation, float(strength[0])),
     )
 
 
-def _jacobian(problem: Residuals, x: FloatArray) -> FloatArray:
+def _jacobian(problem: Together, x: FloatArray) -> FloatArray:
     """Central differences in the scaled parameters, shape (points, parameters)."""
     columns = []
     for i in range(x.size):
@@ -203,14 +248,12 @@ def _jacobian(problem: Residuals, x: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    problem: Residuals,
-    circuit: Circuit,
     name: str,
+    value: float,
     error: float,
     freedom: int,
     halves: Sequence[float],
 ) -> Estimate:
-    value = getattr(circuit, name)
     if name in SCALES:
         found = Estimate.of(value, error * SCALES[name], freedom)
         return found.widened(*(half * SCALES[name] for half in halves))

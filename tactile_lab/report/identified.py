@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.analysis.identify import Identified, identify
+from tactile_lab.analysis.identify import Evidence, Identified, identify_together
 from tactile_lab.deviation import DrivenCircuit
-from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.twin import measured
@@ -22,11 +22,76 @@ file does not say how it lags: L/R and eddy currents last some milliseconds."""
 
 
 def identify_run(run: RunData, names: Sequence[str]) -> Identified:
-    """Fit the parameters `names` to V_C1 and the spikes of a run.
+    """Fit the parameters `names` to one run; see `identify_runs`."""
+    return identify_together([_evidence(run, names)], names)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FittedRuns:
+    """One set of parameters of several runs.
+
+    Attributes:
+        together: fitted to all of them.
+        alone: fitted to each, by the run's name; None where it alone cannot tell.
+    """
+
+    together: Identified
+    alone: dict[str, Identified | None]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the data do not determine, and which runs say something else."""
+        found = list(self.together.warnings)
+        for name, joint in self.together.estimates.items():
+            for run, one in self.alone.items():
+                if one is None or name not in one.estimates:
+                    continue
+                mine = one.estimates[name]
+                if mine.high < joint.low or mine.low > joint.high:
+                    found.append(
+                        f"{run} alone gives {name} from {mine.low:.6g} to "
+                        f"{mine.high:.6g}: the runs do not share one value, and their "
+                        "common one is none of them"
+                    )
+        return tuple(found)
+
+
+def identify_runs(
+    runs: Sequence[RunData], names: Sequence[str], *, force_scales: bool = False
+) -> FittedRuns:
+    """Fit one set of the parameters `names` to several runs, and each by itself.
+
+    Args:
+        runs: at least one.
+        names: parameters of `Circuit` to fit.
+        force_scales: fit a factor of each run's force as well, "force_1" and so on.
 
     Raises:
-        NotIdentifiableError: the run has neither, or does not determine a parameter.
-        ParameterError: an unknown parameter.
+        NotIdentifiableError: a run has neither V_C1 nor spikes, or they do not
+            determine a parameter.
+        ParameterError: an unknown parameter, or a run that is named twice.
+    """
+    told = [run.run for run in runs]
+    if twice := [name for name in told if told.count(name) > 1]:
+        raise ParameterError(
+            f"{twice[0]} is named twice; its evidence would count twice. Name it once."
+        )
+    seen = [_evidence(run, names) for run in runs]
+    together = identify_together(seen, names, force_scales=force_scales)
+    alone: dict[str, Identified | None] = {}
+    for run, one in zip(runs, seen, strict=True):
+        try:
+            alone[run.run] = identify_together([one], names)
+        except NotIdentifiableError:
+            alone[run.run] = None
+    return FittedRuns(together=together, alone=alone)
+
+
+def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
+    """What a run says of the parameters.
+
+    Raises:
+        NotIdentifiableError: it has neither V_C1 nor spikes.
     """
     trace = run.trace("V_C1")
     if (
@@ -35,7 +100,7 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
         or (trace is None and not run.searched)
     ):
         raise NotIdentifiableError(
-            "the run has neither V_C1 nor spikes; record V_C1 or V_K"
+            f"{run.run} has neither V_C1 nor spikes; record V_C1 or V_K"
         )
     believed = run.belief
     spikes = run.spike_times
@@ -51,9 +116,8 @@ def identify_run(run: RunData, names: Sequence[str]) -> Identified:
             if not (name == "follower" and "I_bias" in names):
                 yield name, driven
 
-    return identify(
+    return Evidence(
         believed.circuit,
-        names,
         believed.force,
         run.duration,
         V_C1=seen,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.analysis.belief import PART
-from tactile_lab.analysis.identify import identify
+from tactile_lab.analysis.identify import Evidence, identify, identify_together
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
@@ -127,3 +127,51 @@ def test_spikes_of_a_saturating_t1_are_no_evidence():
         identify(
             Circuit(saturation=True), ("V_GS",), FORCE, FORCE.end, spike_times=spikes
         )
+
+
+def pushed(truth, factor, seed, believed=None):
+    """A run whose force is `factor` times what is believed."""
+    circuit, force = replace(Circuit(), **truth), FORCE.scaled(factor)
+    found = simulate(circuit, force, keep=("V_C1", "spikes"))
+    time = (np.arange(200) + 0.5) * FORCE.end / 200
+    rng = np.random.default_rng(seed)
+    trace = Measured(
+        "V_C1", time, found.sample("V_C1", time) + rng.normal(0, 3e-3, 200)
+    )
+    spikes = found.spike_times + rng.normal(0, 1e-4, found.spike_times.size)
+    return Evidence(believed or circuit, FORCE, FORCE.end, trace, spikes)
+
+
+def test_several_runs_share_what_is_fitted_and_keep_what_is_not():
+    believed = [replace(Circuit(), V_GS=V_GS) for V_GS in (1.39, 1.41)]
+    runs = [
+        pushed({"V_GS": one.V_GS, "tau": 7.9}, 1.0, seed, one)
+        for seed, one in enumerate(believed)
+    ]
+    found = identify_together(runs, ("tau",)).estimates["tau"]
+    alone = [identify_together([run], ("tau",)).estimates["tau"] for run in runs]
+    assert found.low < 7.9 < found.high
+    assert found.error < min(one.error for one in alone)
+
+
+def test_the_force_of_each_run_has_a_factor_of_its_own_where_asked():
+    factors = (1.0, 1.1)
+    runs = [pushed({"tau": 8.0}, k, n, Circuit()) for n, k in enumerate(factors)]
+    found = identify_together(runs, ("tau",), force_scales=True).estimates
+    assert list(found) == ["tau", "force_1", "force_2"]
+    for name, truth in zip(found, (8.0, *factors), strict=True):
+        assert found[name].value == pytest.approx(truth, rel=5e-3)
+        assert found[name].low < truth < found[name].high
+
+
+def test_what_one_bench_does_not_know_is_not_averaged_away():
+    def offset(circuit):
+        moved = Waveform(FORCE.time, FORCE.value + PART * 5e-3 * (FORCE.value > 0))
+        yield "force", DrivenCircuit(circuit, moved)
+
+    runs = [
+        replace(pushed({}, 1.0, seed, Circuit()), displaced=offset) for seed in range(3)
+    ]
+    several = (runs[:1], runs)
+    one, many = (identify_together(r, ("V_GS",)).estimates["V_GS"] for r in several)
+    assert many.high - many.low > 0.8 * (one.high - one.low)

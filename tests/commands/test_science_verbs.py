@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -47,6 +48,22 @@ def test_identify_finds_the_bench_s_own_parameters(run_folder):
     assert found["parameters"]["V_GS"]["value"] == pytest.approx(1.4, abs=5e-3)
     assert found["parameters"]["tau"]["value"] == pytest.approx(8.69, rel=0.1)
     assert "V_GS" in call("identify", run_folder, "V_GS").stdout
+
+
+def test_identify_fits_several_runs_together(run_folder):
+    other = run_folder.with_name("other")
+    shutil.copytree(run_folder, other)
+    told = json.loads(call("identify", run_folder, other, "V_GS", "--json").stdout)
+    alone = told["runs"]["other"]["parameters"]["V_GS"]["value"]
+    assert told["parameters"]["V_GS"]["value"] == pytest.approx(alone, abs=1e-6)
+    said = call("identify", run_folder, other, "V_GS")
+    assert "other alone 1." in said.stdout, said.output
+    refused = call("identify", run_folder, other)
+    assert refused.exit_code == 2 and "Name what to fit" in refused.stderr
+    refused = call("identify", run_folder, run_folder, "V_GS")
+    assert refused.exit_code == 2 and "named twice" in refused.stderr
+    refused = call("identify", run_folder, "V_GS", "--force-scales")
+    assert refused.exit_code == 2 and "fit g31 instead" in refused.stderr
 
 
 def test_identify_refuses_what_is_no_parameter(run_folder):

@@ -20,7 +20,7 @@ from tactile_lab.model.simulate import simulate
 from tactile_lab.plugins import protocol_class
 from tactile_lab.report.canvas import draw
 from tactile_lab.report.findings import find
-from tactile_lab.report.identified import identify_run, settled
+from tactile_lab.report.identified import identify_run, identify_runs, settled
 from tactile_lab.report.overview import overview
 from tactile_lab.report.results import as_json, results
 from tactile_lab.report.run_data import RunData
@@ -471,6 +471,15 @@ def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_pa
     assert "Not determined" in report.html.read_text(encoding="utf-8")
     assert sum(t.response.spikes for t in report.findings.run.results) > 30
     assert report.html.exists()
+
+
+def test_runs_that_do_not_share_a_value_are_named():
+    runs = [
+        replace(modelled("pulses", [pulse(0.15)], circuit=Circuit(V_GS=V_GS)), run=name)
+        for name, V_GS in (("S1", 1.40), ("S2", 1.38))
+    ]
+    found = identify_runs(runs, ("V_GS",))
+    assert any("S2 alone gives V_GS" in text for text in found.warnings)
 
 
 def test_identification_leaves_out_the_field_s_lag(rate_force):
