@@ -37,43 +37,37 @@ settings.register_profile(
 )
 settings.load_profile("settled")
 
-WAITING = frozenset({
-    "tests/commands/test_cli.py",
-    "tests/commands/test_killed_run.py",
-    "tests/commands/test_killed_with_a_source_meter.py",
-    "tests/commands/test_loaded.py",
-    "tests/commands/test_monitor.py",
-    "tests/commands/test_run_endings.py",
-    "tests/commands/test_run_on_served_source.py",
-    "tests/commands/test_starting.py",
-    "tests/docs/test_documents.py",
-    "tests/drivers/test_acceptance_rehearsal.py",
-    "tests/drivers/test_guard.py",
-    "tests/drivers/test_serial_acceptance_rehearsal.py",
-    "tests/engine/test_link.py",
-    "tests/gui/test_on_screen.py",
-    "tests/sim_backend/test_serial_servers.py",
-})  # fmt: skip
-"""Files whose tests wait, for processes, wires or a screen, more than they compute."""
+WAITING = {
+    "tests/drivers/test_acceptance_rehearsal.py": "wires",
+    "tests/drivers/test_guard.py": "wires",
+    "tests/drivers/test_serial_acceptance_rehearsal.py": "wires",
+    "tests/sim_backend/test_serial_servers.py": "wires",
+    "tests/commands/test_killed_run.py": "programs",
+    "tests/commands/test_killed_with_a_source_meter.py": "programs",
+    "tests/commands/test_monitor.py": "programs",
+    "tests/commands/test_run_on_served_source.py": "programs",
+    "tests/gui/test_on_screen.py": "programs",
+}
+"""Files that wait, for wires or other programs, more than they compute; for which."""
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """A worker for each core, and one for what waits."""
-    return (os.cpu_count() or 1) + 1
+    """A worker for each core, and one for each kind of waiting."""
+    return (os.cpu_count() or 1) + len(set(WAITING.values()))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(
     config: pytest.Config, log: Producer
 ) -> LoadFileScheduling | None:
-    """Give all files that wait to one worker, first of all; each other file to one."""
+    """Give one worker each kind of waiting, first of all, and then file by file."""
     from xdist.scheduler import LoadFileScheduling
 
     class Lanes(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "waiting" if file in WAITING else file
+            return WAITING.get(file, file)
 
     if config.getoption("dist") != "loadfile":
         return None
@@ -82,5 +76,5 @@ def pytest_xdist_make_scheduler(
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put what waits first: it is to last no longer than the rest."""
+    """Put what waits first: something is left to compute as long as it waits."""
     items.sort(key=lambda item: item.nodeid.partition("::")[0] not in WAITING)
