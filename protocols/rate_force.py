@@ -71,7 +71,7 @@ class RateForce(Recovering, Levels):
         yield from rate_against_force(
             run,
             "Highest rate in the hold of each step from rest against its force, as in "
-            "Fig. 4d, and its number of spikes. Line: Eq. (15) with the current at the "
+            "Fig. 4d, and the spikes in it. Line: Eq. (15) with the current at the "
             "end of the ramp; it knows no adaptation. Grey band: the critical force "
             "lies within.",
             *expected,

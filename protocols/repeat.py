@@ -66,11 +66,19 @@ class Repeat(ForceProtocol):
         if len(trials) < 2:
             return
         number = np.arange(1, len(trials) + 1)
-        # one spike has no rate: its place stays empty
+        # one spike has no rate: it stands hollow at 0
         rate = np.array([t.response.peak_rate for t in trials], dtype=np.float64)
         if np.isnan(rate).all():
             return
-        counts = tuple(str(t.response.spikes) for t in trials)
+        counts = np.array([str(t.response.spikes) for t in trials])
+        none = np.isnan(rate)
+        hollow = Series(
+            x=number[none], y=np.zeros(int(none.sum())), mark="open",
+            name="fewer than two spikes in the hold", texts=tuple(counts[none]),
+        )  # fmt: skip
+        joined = Series(
+            x=number[~none], y=rate[~none], mark="joined", texts=tuple(counts[~none])
+        )
         yield Plot(
             name="summary",
             title="decrement",
@@ -83,7 +91,7 @@ class Repeat(ForceProtocol):
                     label="Highest rate",
                     unit="Hz",
                     prefix="",
-                    series=(Series(x=number, y=rate, mark="joined", texts=counts),),
+                    series=(joined, hollow) if none.any() else (joined,),
                     limits=(0, float(np.nanmax(rate)) * 1.15),
                 ),
             ),

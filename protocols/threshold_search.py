@@ -126,7 +126,10 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
 
 
 def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterator[Plot]:
-    """Rate and spikes of each trial against its force; none below two trials.
+    """Rate and spikes in the hold against the force; none below two trials.
+
+    What gave no rate stands hollow at 0, and spikes of the ramps have marks of their
+    own: beyond the force that silences a T1 that saturates only these are left.
 
     Args:
         run: what was measured.
@@ -139,8 +142,8 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
     force = np.array([t.level for t in trials], dtype=np.float64)
     # one spike has no rate
     rate = np.array([t.response.peak_rate for t in trials], dtype=np.float64)
-    count = np.array([t.response.spikes for t in trials])
-    fired = count > 0
+    ramped = np.array([t.response.ramp_spikes for t in trials])
+    held = np.array([t.response.spikes for t in trials]) - ramped
     known = run.force_uncertainty
     error = None if known is None else known.of(force)
     bands: tuple[Guide, ...] = ()
@@ -151,19 +154,28 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
     except NotIdentifiableError:
         pass  # no band to draw; the conclusion says why
 
-    def points(values: NDArray[Any], mark: Mark, which: NDArray[np.bool_]) -> Series:
-        return Series(
-            x=force[which],
-            y=values[which],
-            name=run.origin if mark == "points" else "silent",
-            mark=mark,
-            x_error=None if error is None else error[which],
-        )
+    def points(
+        values: NDArray[Any], which: NDArray[np.bool_], mark: Mark, name: str
+    ) -> Iterator[Series]:
+        if which.any():
+            yield Series(
+                x=force[which],
+                y=values[which],
+                name=name,
+                mark=mark,
+                x_error=None if error is None else error[which],
+            )
 
-    rated = [points(rate, "points", np.isfinite(rate))] if np.any(rate > 0) else []
-    counted = [points(count, "points", fired)] if fired.any() else []
-    if not fired.all():
-        counted.append(points(count, "open", ~fired))
+    known_rate = np.isfinite(rate)
+    rated = (
+        *points(rate, known_rate, "points", run.origin),
+        *points(np.zeros_like(rate), ~known_rate, "open", "fewer than two spikes"),
+    )
+    counted = (
+        *points(held, held > 0, "points", ""),
+        *points(held, held == 0, "open", "none in the hold"),
+        *points(ramped, ramped > 0, "up", "in the ramps"),
+    )
     yield Plot(
         name="summary",
         caption=caption,
@@ -179,9 +191,9 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
                 limits=(0, None),
             ),
             Panel(
-                label="Spikes",
+                label="Spikes in hold",
                 prefix="",
-                series=tuple(counted),
+                series=counted,
                 guides=bands,
                 limits=(0, None),
                 height=1.0,

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+CUT_OFF = "spikes could not be told all of the time: their channel left its range"
+"""Why a trial has no latency, rate or fit."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedSignal:
@@ -87,6 +90,8 @@ class MeasuredTrial:
             the part of its hold that was held.
         clock_uncertainty: bound on how far spike times lie from the coil's, s: how well
             the scope's clock is aligned with the host's; None if not known.
+        unsearched: whether its spikes could not be told all of the time, their channel
+            cut off: they are counted, and no latency, rate or fit is told.
     """
 
     label: str
@@ -101,6 +106,7 @@ class MeasuredTrial:
     drift: float | None = None
     complete: bool = True
     clock_uncertainty: float | None = None
+    unsearched: bool = False
 
     @property
     def held(self) -> tuple[float, float] | None:
@@ -112,7 +118,8 @@ class MeasuredTrial:
     @cached_property
     def response(self) -> Response:
         """Its spikes described: count, latency, highest and final rate, fall."""
-        return respond(self.spike_times, onset=self.onset, hold=self.hold)
+        found = respond(self.spike_times, onset=self.onset, hold=self.hold)
+        return found.counted if self.unsearched else found
 
     @property
     def adaptation(self) -> Adaptation | None:
@@ -126,6 +133,8 @@ class MeasuredTrial:
 
     @cached_property
     def _fitted(self) -> tuple[Adaptation | None, str]:
+        if self.unsearched:
+            return None, CUT_OFF
         if self.response.spikes == 0:
             return None, "no spikes"
         if self.hold is None:
@@ -220,6 +229,8 @@ class Measurement:
     def _fit_circuit(
         self, trial: MeasuredTrial
     ) -> tuple[CircuitAdaptation | None, str]:
+        if trial.unsearched:
+            return None, CUT_OFF
         begin = self.applied_edge(trial)
         if self.circuit is None or trial.hold is None or begin is None:
             return None, "no hold, or no circuit to compare with"

@@ -16,7 +16,6 @@ from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.signals import AVERAGED
 from tactile_lab.store.layout import BIN
-from tactile_lab.store.overrange import overrange
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
@@ -68,7 +67,7 @@ class RunSource(Source):
         self.simulated = run.simulated
         self.moves_probes = _moves_probes(run)
         self._threshold = threshold_of(run)
-        self._beyond = {name: overrange(run, name) for name in run.signals}
+        self._beyond = {name: run.overrange(name) for name in run.signals}
         self._gain = float(run.attributes.get("newtons_per_ampere", 1.0)) or 1.0
         self._slow = _slow(run, self._gain)
         slow = (name for name, (time, _) in self._slow.items() if time.size)

@@ -14,12 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.noise import MAINS
 from tactile_lab.errors import NotIdentifiableError
 
 FloatArray = NDArray[np.float64]
 
 FEWEST = 5
 """Spikes, and presentations of which each is left out in turn for the interval."""
+
+FEWEST_OF_MAINS = 20
+"""Spikes from which on the mains are looked for in them."""
+MOST_OF_MAINS = 1000
+"""Only so many are looked at, the first."""
+WANDER = 0.1
+"""How far the mains are from their frequency at most, Hz."""
+HELD = 0.5
+"""Vector strength at the mains' frequency from which on they are called the cause."""
+IRREGULAR = 0.3
+"""Distance of the quartiles of intervals, in medians, from which on they vary."""
 
 LOCKED = 0.01
 """Probability of chance below which spikes are called locked."""
@@ -152,3 +164,60 @@ def strongest_frequency(
     best = int(np.argmax(strength))
     chance = resolved * rayleigh(min(float(strength[best]), 1.0), spikes.size)
     return float(tried[best]), min(1.0, chance)
+
+
+@dataclass(frozen=True)
+class MainsLocking:
+    """Spikes that come at one phase of the mains.
+
+    Attributes:
+        mains: 50 or 60 Hz.
+        strength: vector strength at it.
+        spikes: of how many.
+    """
+
+    mains: float
+    strength: float
+    spikes: int
+
+
+def mains_locking(spikes: FloatArray) -> MainsLocking | None:
+    """Whether spikes of a run keep to the phase of the mains; None if they do not.
+
+    A sensor that fires regularly repeats itself at multiples of its rate, which may lie
+    there by chance. So more is asked for than an unlikely strength: none around may be
+    as large, and intervals are those of the mains or shorter, or else irregular.
+
+    Args:
+        spikes: all of the run, s, ascending.
+    """
+    spikes = spikes[:MOST_OF_MAINS]
+    n = spikes.size
+    if n < FEWEST_OF_MAINS:
+        return None
+    length = max(float(spikes[-1] - spikes[0]), 1.0)
+    low, middle, high = np.quantile(np.diff(spikes), [0.25, 0.5, 0.75])
+    irregular = high - low > IRREGULAR * middle
+    for mains in MAINS:
+        near = _strengths(spikes, mains - WANDER, mains + WANDER, length)
+        apart = np.concatenate([
+            _strengths(spikes, mains - 5.0, mains - 2 * WANDER - 2 / length, length),
+            _strengths(spikes, mains + 2 * WANDER + 2 / length, mains + 5.0, length),
+        ])  # fmt: skip
+        strength = float(near.max())
+        own = irregular or middle < 1.05 / mains
+        if own and strength > max(HELD, 1.5 * float(apart.max())):
+            return MainsLocking(mains, strength, n)
+    return None
+
+
+def _strengths(
+    spikes: FloatArray, low: float, high: float, length: float
+) -> FloatArray:
+    """Vector strengths at frequencies as close as `length`, s, tells apart."""
+    count = max(16, min(4000, math.ceil(4 * (high - low) * length)))
+    strengths = [
+        abs(np.exp(2j * np.pi * f * spikes).mean())
+        for f in np.linspace(low, high, count)
+    ]
+    return np.array(strengths)

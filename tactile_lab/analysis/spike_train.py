@@ -5,7 +5,7 @@ Times are seconds, rates hertz.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,6 +66,14 @@ class Response:
     adaptation_index: float | None
     intervals: int
     silent: float | None
+
+    @property
+    def counted(self) -> Response:
+        """Only the numbers of spikes: where some may have been missed between them."""
+        return replace(
+            self, latency=None, peak_rate=None, final_rate=None, fall=None,
+            adaptation_index=None, intervals=0, silent=None,
+        )  # fmt: skip
 
 
 def respond(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from tactile_lab.analysis.noise import MAINS
 from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.computing import Computing
@@ -74,8 +75,11 @@ def threshold_of(scene: Scene) -> float:
     scope = scene.bench.scope
     wired = scope.channels if scope is not None else ()
     step = max((resolution(c) for c in wired if c.signal == "V_K"), default=0.0)
-    noise = scene.simulated.noise.get("V_K", 0.0) if scene.bench.simulated else 0.0
-    return DEVIATIONS * max(noise, step / 2)
+    if not scene.bench.simulated:
+        return DEVIATIONS * step / 2
+    noise, hum = scene.simulated.noise.get("V_K", 0.0), scene.simulated.hum
+    # a deviation is told from the quartiles, which a sine has 0.71 of it from its mean
+    return DEVIATIONS * max(math.hypot(noise, 1.05 * hum), step / 2)
 
 
 def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
@@ -113,10 +117,19 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
 def _noise(scene: Scene, needed: Needs, streamed: float) -> Iterator[str]:
     if not scene.bench.simulated or needed.detect_on != "V_K":
         return
-    sigma = scene.simulated.noise.get("V_K", 0.0)
+    sigma, hum = scene.simulated.noise.get("V_K", 0.0), scene.simulated.hum
+    threshold = threshold_of(scene)
+    if 0 < hum and hum + 3 * sigma > threshold:
+        cycles = MAINS[0] * streamed
+        yield (
+            f"mains hum of {show(hum, 'V')} and noise of {show(sigma, 'V')} on V_K "
+            f"reach the threshold of {show(threshold, 'V')} in up to {cycles:.3g} "
+            "cycles of the mains, and add a spike or more in each. Raise the "
+            'threshold, or set detect.threshold = "auto".'
+        )
+        return
     if sigma <= 0:
         return
-    threshold = threshold_of(scene)
     above = 0.5 * math.erfc(threshold / sigma / math.sqrt(2))
     expected = above * scene.record.sample_rate * streamed
     if expected > 0.5:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import TactileLabError
-from tactile_lab.measurement import RecordedSignal
+from tactile_lab.measurement import CUT_OFF, RecordedSignal
 from tactile_lab.model.drain_current import drain_current
 from tactile_lab.plot import Plot
 from tactile_lab.report.drift import drift_plot
@@ -71,7 +71,14 @@ def find(run: RunData) -> Findings:
         except TactileLabError as reason:
             missing.append(f"No model beside the run: {reason}")
     # a trial that was cut short is told and drawn, but nothing is concluded from it
-    whole = replace(run, trials=tuple(t for t in run.trials if t.complete))
+    # nor from one whose spikes could not be told, where spikes are what it is about
+    spiking = "spikes" in run.protocol.signals
+    whole = replace(
+        run,
+        trials=tuple(
+            t for t in run.trials if t.complete and not (spiking and t.unsearched)
+        ),
+    )
     conclusion = _conclusion(whole)
     answers: tuple[Plot, ...] = ()
     try:
@@ -87,7 +94,12 @@ def find(run: RunData) -> Findings:
     return Findings(
         run=run,
         notes=notes,
-        missing=(*conclusion.missing, *_cut_short(run), *missing),
+        missing=(
+            *conclusion.missing,
+            *_cut_short(run),
+            *_unsearched(run),
+            *missing,
+        ),
         conclusion=conclusion,
         answers=answers,
         beside=beside,
@@ -119,6 +131,14 @@ def _cut_short(run: RunData) -> tuple[str, ...]:
         "it; its row, its fits and the model beside it are of the part before the "
         "run ended.",
     )
+
+
+def _unsearched(run: RunData) -> tuple[str, ...]:
+    """Which trials have no numbers from spikes but their count, and why."""
+    cut = [trial.label for trial in run.results if trial.unsearched]
+    if not cut:
+        return ()
+    return (f"No latency, rate or fit of {', '.join(cut)}: {CUT_OFF}.",)
 
 
 def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:

@@ -19,12 +19,13 @@ from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.quantity import exact, show
 from tactile_lab.report.driven import told
+from tactile_lab.report.mains import told as mains_told
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.store.overrange import overrange
 from tactile_lab.store.overrange import told as overrange_told
+from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
@@ -85,6 +86,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             accuracy=str(info.get("accuracy") or ""),
             warnings=(
                 *overrange_told(run),
+                *mains_told(run),
                 *warnings,
                 *_doubts(scene, started, settings, warnings),
             ),
@@ -171,8 +173,9 @@ def stimulus_onset(scene: Scene) -> float:
 def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
     """The trials, and what came after the last in a run that ended before its time."""
     spikes, clock = run.spikes["time"], _clock(run, run.scene)
+    blind = unsearched(run)
     trials = [
-        _trial(row, complete, spikes, onset, run.force, clock)
+        _trial(row, complete, spikes, onset, run.force, clock, blind)
         for row, complete in zip(run.trials, run.completed.tolist(), strict=True)
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
@@ -199,6 +202,7 @@ def _trial(
     onset: float,
     force: Waveform,
     clock: float | None,
+    blind: NDArray[np.float64],
 ) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
@@ -216,6 +220,7 @@ def _trial(
         rest=_number(row, "rest_V_C1"),
         drift=_number(row, "drift_V_C1"),
         clock_uncertainty=clock,
+        unsearched=bool(np.any((blind[:, 0] < end) & (blind[:, 1] > start))),
     )
 
 
@@ -247,7 +252,7 @@ def _trace(run: Run, name: str) -> RecordedSignal:
         high=cells.high,
         scale=float(signal.attributes.get("scale", 1.0)),
         code=abs(signal.gain),
-        overrange=overrange(run, name),
+        overrange=run.overrange(name),
         samples=cells.width / signal.interval,
     )
 

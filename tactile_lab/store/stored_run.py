@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -166,6 +167,20 @@ class StoredRun:
         samples, checks, pyramid = (self._file[f"{kind}/{name}"] for kind in kinds)
         return samples, checks, pyramid
 
+    def overrange(self, name: str) -> FloatArray:
+        """Stretches in which a stored signal left its range, shape (k, 2), s.
+
+        The scope tells it block by block: a stretch is as long as the blocks are.
+        """
+        rows = self.records("overrange")
+        rows = rows[rows["channels"] >> self.signal(name).row & 1 == 1]
+        if not rows.size:
+            return np.empty((0, 2))
+        first, stop = rows["sample"], rows["sample"] + rows["samples"]
+        edges = [0, *(np.flatnonzero(first[1:] != stop[:-1]) + 1).tolist(), rows.size]
+        joined = [(first[a], stop[b - 1]) for a, b in pairwise(edges)]
+        return self.axis.time_of(np.array(joined))
+
     @property
     def axis(self) -> Axis:
         """Where stored samples lie in time."""
@@ -308,12 +323,18 @@ class StoredRun:
 
     @property
     def shunt(self) -> Shunt | None:
-        """Reads the recorded coil current between two times; None without one."""
+        """Reads the recorded coil current between two times; None without one.
+
+        It gives nothing from times in which its channel left its range.
+        """
         if "coil_current" not in self.signals:
             return None
         signal = self.signal("coil_current")
+        begins, ends = self.overrange("coil_current").T
 
         def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
+            if np.any((begins < end) & (ends > start)):
+                return np.empty(0), np.empty(0)
             part = signal.between(start, end)
             # as fine as edges are looked for in; a long level is read from the pyramid
             wanted = round((part.stop - part.start) * signal.interval / BIN_TIME)

@@ -223,6 +223,17 @@ def test_a_run_that_clipped_says_so_in_its_report(run_scene, tmp_path):
     assert 0.3 < start < 0.6 < end < 1.4
 
 
+def test_spikes_made_by_the_mains_are_warned_of_in_the_report(run_scene, short):
+    hum = "mains, 50 Hz"
+    quiet, loud = (
+        read(run_scene(*short, f"simulated.hum={volts} V").folder)
+        for volts in (0.0, 0.6)
+    )
+    assert not any(hum in text for text in quiet.warnings)
+    assert any(hum in text for text in loud.warnings)
+    assert loud.spike_times.size > quiet.spike_times.size + 20
+
+
 def test_a_rest_that_was_cut_off_at_the_range_is_no_number(run_scene, short):
     from sim_backend.bench import open_bench
     from sim_backend.picoscope.faults import ScopeFault

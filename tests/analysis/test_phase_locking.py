@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.analysis.phase_locking import (
+    mains_locking,
     phase_locking,
     phases_of,
     rayleigh,
@@ -96,3 +97,17 @@ def test_a_frequency_of_chance_is_called_chance():
         for _ in range(200)
     ]
     assert np.mean(np.array(chances) < 0.05) < 0.08
+
+
+def test_spikes_that_the_mains_make_are_known_from_a_sensors_own():
+    rng = np.random.default_rng(0)
+    hum = np.arange(0, 8, 0.02) + rng.normal(0, 1e-3, 400)
+    found = mains_locking(np.sort([*hum, *rng.uniform(0, 8, 50)]))
+    assert found is not None and found.mains == 50.0
+    assert found.strength == pytest.approx(0.84, abs=0.05)
+    now_and_then = np.sort(rng.choice(hum, 150, replace=False))
+    assert mains_locking(now_and_then).mains == 50.0
+    assert mains_locking(np.arange(300) / 60.05).mains == 60.0
+    adapting = np.cumsum(1 / np.linspace(40, 10, 200))
+    for own in (adapting, np.arange(500) / 25.03, np.arange(200) / 37.0, hum[:10]):
+        assert mains_locking(own) is None

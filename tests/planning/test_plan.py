@@ -98,6 +98,13 @@ def test_noise_above_the_threshold_is_warned_of():
     assert "adds spikes" not in warned("simulated.noise.V_K=20 mV")
 
 
+def test_hum_above_the_threshold_is_warned_of():
+    """It crosses once a cycle where its peaks and the noise on them get there."""
+    assert "mains hum of 480 mV" in warned("simulated.hum=480 mV")
+    assert "hum" not in warned("simulated.hum=300 mV")
+    assert "hum of" not in warned("simulated.hum=480 mV", "detect.threshold=auto")
+
+
 def test_spikes_that_never_reach_the_threshold_are_warned_of():
     assert "no spike is high enough" in warned("detect.threshold=4 V")
 

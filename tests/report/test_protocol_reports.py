@@ -240,6 +240,18 @@ def test_numbers_from_samples_beyond_the_range_are_refused():
     assert told["overrange_s"] == {"V_C1": whole.tolist()}
 
 
+def test_a_trial_whose_spikes_could_not_be_told_has_a_count_and_no_rate():
+    train = MeasuredTrial(
+        label="120 mN", level=0.12, start=0.0, duration=2.0, hold=(0.25, 1.5),
+        spike_times=np.array([0.3, 0.4, 0.5]),
+    )  # fmt: skip
+    assert train.response.latency == 0.3
+    blind = replace(train, unsearched=True)
+    assert blind.response.spikes == 3
+    assert (blind.response.latency, blind.response.peak_rate) == (None, None)
+    assert "left its range" in blind.why_not
+
+
 def test_bipolar_without_a_rest_before_it_says_so():
     run = pushed_and_pulled(0)
     late = tuple(replace(t, start=t.start - 0.5) for t in run.trials)

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tactile_lab.bench import Block
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
-from tactile_lab.store.overrange import overrange, told
+from tactile_lab.store.overrange import told, unsearched
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.run import Run
 from tactile_lab.trial import Outcome, Trial
@@ -220,13 +221,51 @@ def test_over_range_is_flagged_per_block_and_channel(bench, recorder, folder):
     recorder.close("complete", 300)
     with Run.load(folder.path) as run:
         assert run.records("overrange").tolist() == [(100, 100, 2), (200, 100, 3)]
-        np.testing.assert_allclose(overrange(run, "V_K"), [[0.1, 0.3]])
-        np.testing.assert_allclose(overrange(run, "V_C1"), [[0.2, 0.3]])
+        np.testing.assert_allclose(run.overrange("V_K"), [[0.1, 0.3]])
+        np.testing.assert_allclose(run.overrange("V_C1"), [[0.2, 0.3]])
         assert [line.split(",")[0] for line in told(run)] == [
             "V_C1 left the range of scope input A",
             "V_K left the range of scope input B",
         ]
         assert "−5 V to 5 V, at 0.2 to 0.3 s (100 ms in all)" in told(run)[0]
+
+
+@pytest.mark.parametrize(
+    ("rests", "peak", "told_whole"),
+    [(0, 127, True), (120, 127, False), (-127, 100, False)],
+    ids=["cut off at its top", "never below the threshold", "at the other end"],
+)
+def test_spikes_cut_off_at_their_top_are_told_and_no_others(
+    bench, recorder, folder, rests, peak, told_whole
+):
+    made = np.zeros((2, 300), np.int16)
+    made[1] = rests * 256
+    made[1, 150::40] = peak * 256
+    recorder.segment(bench.stream(), 0.0)
+    for first in range(0, 300, 100):
+        over = (False, first == 100)
+        recorder.append(bench.block(made, first, 100, over=over))
+    recorder.close("complete", 300)
+    with Run.load(folder.path) as run:
+        assert unsearched(run).tolist() == ([] if told_whole else [[0.1, 0.2]])
+        (text,) = told(run)
+        assert ("spikes are counted and timed" in text) is told_whole
+
+
+def test_a_shunt_beyond_its_range_dates_no_step(bench, folder):
+    layout = Layout(signals=("coil_current",), simulated=True)
+    recorder = Recorder(folder, layout, reserve=0)
+    recorder.segment(bench.stream(names=("coil_current",)), 0.0)
+    steps = np.repeat(np.arange(8) % 2, 100)[None].astype(np.int16) * np.int16(25600)
+    for first in range(0, 800, 100):
+        part = steps[:, first : first + 100]
+        recorder.append(
+            Block(first=first, codes=part, overrange=(first == 300,), received=0.0)
+        )
+    recorder.close("complete", 800)
+    with Run.load(folder.path) as run:
+        assert run.shunt(0.35, 0.36)[0].size == 0
+        assert run.shunt(0.45, 0.46)[0].size > 0
 
 
 def test_only_asked_signals_are_stored(bench, folder):
