@@ -61,7 +61,7 @@ class Trimmed:
     Attributes:
         off: of V_GS, V.
         spikes: number within 60 s.
-        last: time of the last after onset, s; None where it still fired.
+        last: time of the last after the first, s; None where it still fired.
         at_rest: it fires without force.
     """
 
@@ -139,7 +139,7 @@ def trimmed(off: float) -> Trimmed:
     assert times is not None
     silent = times.size and times[-1] < 59.0
     return Trimmed(
-        off, int(times.size), float(times[-1]) if silent else None,
+        off, int(times.size), float(times[-1] - times[0]) if silent else None,
         any("fires at rest" in text for text in found.warnings),
     )  # fmt: skip
 

@@ -208,10 +208,11 @@ def _draw(results: list[tuple[Point, Found]]) -> None:
             and p.force < 0.26
         ]  # fmt: skip
         axis.plot(*zip(*known, strict=True), "o", color="tab:red", label="ngspice")
-        axis.set(title=title, xlabel="force (mN)")
+        axis.set(title=title, xlabel="Force, held (mN)")
         axis.grid(visible=True, color="0.92")
-    axes[0].set_ylabel("rate (Hz)")
+    axes[0].set_ylabel("Highest rate (Hz)")
     axes[0].legend(frameon=False)
+    plot.suptitle("V_GS = 1.4 V, V_P does not decay, 2 s", fontsize=9, color="0.3")
     plot.savefig(DOCS / "saturation.svg", metadata={"Date": None})
     plt.close(plot)
 

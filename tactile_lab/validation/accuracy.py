@@ -16,6 +16,7 @@ from tactile_lab.validation.contest import (
     CALLED,
     COMPILED,
     OURS,
+    TIMED_OUT,
     Row,
     contest,
     methods,
@@ -284,7 +285,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     """Log-log work-precision diagram, one panel per scene.
 
     Methods that failed are told by a cross at the foot of the panel, at the time they
-    took.
+    took; those stopped at the cap took no time of their own, and are in the table.
     """
     import matplotlib
 
@@ -307,11 +308,11 @@ def figure(rows: Sequence[Row], path: Path) -> None:
             some = [r for r in rows if r.scene == scene and r.method == name]
             if not some:
                 continue
-            points = sorted(
+            points = [  # joined from setting to setting
                 (row.run_time, max(row.spike_error, 1e-17))
                 for row in some
                 if row.spike_error is not None
-            )
+            ]
             compiled = some[0].runs == COMPILED
             style = {
                 "color": "black" if name == OURS else colours(k % 10),
@@ -325,7 +326,11 @@ def figure(rows: Sequence[Row], path: Path) -> None:
             if points:
                 label = name if compiled else f"{name} ({some[0].runs})"
                 (handles[label],) = axis.plot(*zip(*points, strict=True), **style)
-            failed = [r.run_time for r in some if r.spike_error is None]
+            failed = [
+                row.run_time
+                for row in some
+                if row.spike_error is None and row.verdict != TIMED_OUT
+            ]
             style |= {"marker": "x", "linestyle": "none", "markersize": 4}
             axis.plot(failed, [1e-17] * len(failed), **style)
         axis.set(xscale="log", yscale="log", title=scene, ylim=(3e-18, 1))
@@ -336,15 +341,17 @@ def figure(rows: Sequence[Row], path: Path) -> None:
             ha="right", va="bottom", color="0.4",
         )  # fmt: skip
         axis.text(
-            0.01, 2e-17, "x: wrong count, NaN, failed or out of time", fontsize=7,
+            0.01, 2e-17, "x: wrong count, NaN or failed", fontsize=7,
             transform=axis.get_yaxis_transform(), color="0.4",
         )  # fmt: skip
         axis.grid(visible=True, color="0.92")
         axis.tick_params(labelbottom=True, labelleft=True)
     for axis in axes.flat[len(scenes) :]:
         axis.set_visible(False)
-    plot.supxlabel("CPU time of one call (s)", fontsize=11)
-    plot.supylabel("largest error of a spike time (s)", fontsize=11)
+    for axis in axes[-1]:
+        axis.set_xlabel("CPU time of one call (s)")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("error of a spike time (s)")
     plot.legend(
         list(handles.values()), list(handles), loc="outside lower center", ncols=4,
         frameon=False, fontsize=9,
