@@ -39,7 +39,8 @@ def unsearched(run: StoredRun) -> FloatArray:
         )
         reached = float(np.nanmin([low, high])) <= other_end
         blind.append(reached or float(np.nanmedian(mean)) >= sign * detection.threshold)
-    return found[np.array(blind)]
+    kept: FloatArray = found[np.array(blind)]
+    return kept
 
 
 def told(run: StoredRun) -> tuple[str, ...]:
