@@ -38,9 +38,9 @@ VERBS = {
     "verify": "Check every sample and spike of a run; exit code 1 if damaged.",
     "recover": "Make a run whole that was cut short by a crash.",
     "export": "A run, or a skin's spikes: CSV, MATLAB, NWB, Neo, Tonic and others.",
-    "report": "Figure, page and numbers of a run, again from its data.",
+    "report": "Page and numbers of a run from its data; several side by side.",
     "trust": "Let the code that a run from elsewhere holds be executed here.",
-    "identify": "Fit parameters of the sensor to a run, with intervals.",
+    "identify": "Fit parameters of the sensor to runs, with intervals.",
     "transfer": "I_S, m and swing from a measured transfer curve.",
 }
 """Verb and its line in ``--help``.

@@ -53,7 +53,9 @@ def _benches(_: click.Context, __: click.Parameter, begun: str) -> list[Completi
     return [CompletionItem("sim"), CompletionItem(begun, type="file")]
 
 
-def _runs(ctx: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
+def complete_runs(
+    ctx: click.Context, _: click.Parameter, begun: str
+) -> list[CompletionItem]:
     """Folders of runs below the folder begun, or below ./runs; newest first."""
     found = sorted(Path().glob(f"{begun or 'runs/'}*/run.json"), reverse=True)
     found += sorted(Path().glob(f"{begun}*/run.json"), reverse=True) if begun else []
@@ -91,7 +93,7 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 run_argument: Decorator = click.argument(
-    "run", type=click.Path(path_type=Path), shell_complete=_runs
+    "run", type=click.Path(path_type=Path), shell_complete=complete_runs
 )
 
 

@@ -68,7 +68,7 @@ def facts(entry: RunSummary) -> list[Fact]:
             found += _parameter(f"protocol.{key}", value)
     try:
         results = json.loads((entry.folder / RESULTS).read_text(encoding="utf-8"))
-        found += _results(results)
+        found += of_results(results)
     except (OSError, ValueError, TypeError, AttributeError):
         return found
     return found
@@ -115,7 +115,8 @@ def _parameter(key: str, value: Any) -> Iterator[Fact]:
                 yield Fact(key, float(match[1]), unit=match[2])
 
 
-def _results(results: Mapping[str, Any]) -> Iterator[Fact]:
+def of_results(results: Mapping[str, Any]) -> Iterator[Fact]:
+    """The numbers that a run's results.json concludes, and those of its trials."""
     concluded = list(_numbers(results.get("conclusion") or {}))
     yield from concluded
     told = {fact.key for fact in concluded}

@@ -30,6 +30,22 @@ def test_report_writes_all_files_again(run_folder, tmp_path):
     assert printed == json.loads((tmp_path / "results.json").read_text())
 
 
+def test_several_runs_are_reported_side_by_side(run_folder, tmp_path):
+    other = tmp_path / "again"
+    shutil.copytree(run_folder, other)
+    done = call("report", run_folder, other, "--out", tmp_path / "both")
+    assert done.exit_code == 0, done.output
+    assert "2 runs of 2 specimens" in done.stdout and "rest_V_C1" in done.stdout
+    page = (tmp_path / "both" / "runs.html").read_text(encoding="utf-8")
+    assert "<svg" in page and "again" in page
+    out = ("--out", tmp_path / "both", "--json")
+    told = json.loads(call("report", run_folder, other, *out).stdout)
+    (rate,) = told["runs"]["again"]["rates"]
+    assert rate["force_N"] == 0.18 and rate["rate_Hz"] > 5
+    twice = call("report", run_folder, run_folder, "--out", tmp_path / "both")
+    assert twice.exit_code == 2 and "named twice" in twice.stderr
+
+
 def test_report_of_no_run_is_refused(tmp_path):
     done = call("report", tmp_path)
     assert done.exit_code == 2
