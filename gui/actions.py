@@ -243,6 +243,13 @@ class Actions(QObject):
         except (TactileLabError, OSError) as error:
             panels.session.log.add(Severity.ERROR, "skin", str(error))
 
+    def show_studies(self) -> None:
+        """Show the studies beside the runs, and those among them."""
+        from gui.dialogs.studies import show_studies
+
+        out = self.panels.session.out
+        show_studies(self.window, self.panels.theme, (out.parent / "studies", out))
+
     def show_help(self, topic: str = "", page: int = 0) -> None:
         """Show the help: 0 panels, at a topic; 1 shortcuts; 2 about the program."""
         from gui.dialogs.help import show_help
@@ -270,6 +277,7 @@ class Actions(QObject):
             save_scene=self.save_scene,
             about_run=self.runs.about_shown,
             open_skin=self.ask_skin,
+            show_studies=self.show_studies,
             export_view=self.export_view,
             connect=self.connect_dialog,
             settings=self.show_preferences,

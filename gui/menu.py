@@ -27,6 +27,7 @@ class Acts:
     save_scene: Act
     about_run: Act
     open_skin: Act
+    show_studies: Act
     export_view: Act
     connect: Act
     settings: Act
@@ -72,6 +73,7 @@ class GearMenu(QMenu):
             last.addAction(name, partial(screen.open_run, entry.folder))
         last.setEnabled(bool(newest) and not session.state.in_run)
         self._add("Open a skin …", "", acts.open_skin)
+        self._add("Studies …", "", acts.show_studies)
         self._add("About this run …", "Ctrl+I", acts.about_run)
         self._add("Export view …", "Ctrl+E", acts.export_view)
         self.addSeparator()

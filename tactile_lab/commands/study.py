@@ -89,11 +89,12 @@ def carry_out_attended(
         TactileLabError: it cannot be carried out, or not to its end.
     """
     from tactile_lab.studies.carry_out import carry_out
+    from tactile_lab.studies.live import SHOWN
     from tactile_lab.studies.page import REPORT, told_before, write_page
 
     folder = out / study.name
     if (told := told_before(study, folder)) is not None:
-        text = told.pop("text")
+        text, _ = told.pop("text"), told.pop(SHOWN)
         if as_json:
             print_json({"study": str(folder), **told})
         else:

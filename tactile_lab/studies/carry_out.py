@@ -17,6 +17,7 @@ from tactile_lab.planning.plan import plan
 from tactile_lab.store.folder import lock
 from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
+from tactile_lab.studies.live import LOCK, Live
 from tactile_lab.studies.points import Points, Task
 from tactile_lab.studies.shelf import Batch, Shelf
 from tactile_lab.studies.study import Study
@@ -30,8 +31,6 @@ FIRST = 3
 """Points whose time tells what the others will take."""
 SHELF = "points"
 """Folder of finished points, shared by all studies beside it."""
-LOCK = ".lock"
-"""File in a study's folder that whoever carries it out holds."""
 PATIENCE = 2.0
 """Longest wait for the workers of one that was killed to end, s."""
 
@@ -164,6 +163,7 @@ def _carried_out(
     done, failed = study.design.size - missing.size, 0
     there = done
     if missing.size:
+        live = Live(study, shelf, named, out / study.name)
         with workers(study, points, count, scheduler) as crew:
             pace = _Pace(crew.count)
             tell(Progress(done, study.design.size, there, failed, crew.count))
@@ -173,6 +173,8 @@ def _carried_out(
                 pace.tell(size)
                 done, failed = done + size, failed + len(batch.reasons)
                 tell(Progress(done, study.design.size, there, failed, crew.count))
+                live.tell(done, failed)
+        live.end()
     found = gathered(study, shelf, shelf.find(named))
     if missing.size or not is_written(study, out / study.name):
         try:

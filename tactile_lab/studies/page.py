@@ -14,9 +14,10 @@ from tactile_lab.store.folder import replacing, write_json
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import MADE_OF, Gathered, is_written
+from tactile_lab.studies.live import RESULTS, SHOWN, shown
 from tactile_lab.studies.study import Study
 
-RESULTS, REPORT = "results.json", "report.html"
+REPORT = "report.html"
 MARKS = {"model": "Circuit model", "simulated": "Simulated bench", "bench": "Measured"}
 
 
@@ -44,10 +45,10 @@ def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     from tactile_lab.report.html import picture, rendered
     from tactile_lab.studies.answers import conclude, plots
 
-    study, said = found.study, conclude(found)
+    study, said, drawn = found.study, conclude(found), list(plots(found))
     subtitle = f"{study.scene.name} · {' × '.join(map(str, study.design.shape)) or 1}"
     pictures = []
-    for plot in plots(found):
+    for plot in drawn:
         title = f"{study.title}: {plot.title}"
         figure = draw(plot, title, subtitle, simulated=study.on != "bench")
         pictures.append(picture(title, plot, save(figure, folder / plot.name)[1]))
@@ -75,7 +76,12 @@ def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     with replacing(html) as new:
         new.write_text(text, encoding="utf-8")
     # last, for `told_before`
-    results = {MADE_OF: study_digest(study), "text": said.text, **said.plain}
+    results = {
+        MADE_OF: study_digest(study),
+        "text": said.text,
+        SHOWN: shown(study, said.sentences, drawn),
+        **said.plain,
+    }
     write_json(folder / RESULTS, results)
     return html, said
 

@@ -121,7 +121,7 @@ class Shelf:
         """What is kept by name, and why for each point that failed ("" for others).
 
         Args:
-            places: as `find` gave them, all known.
+            places: as `find` gave them; what is not known yet is NaN, or a row of none.
             names: what is wanted.
         """
         size = places.file.size
@@ -130,6 +130,8 @@ class Shelf:
         order = np.argsort(places.file, kind="stable")
         numbers, begins = np.unique(places.file[order], return_index=True)
         for number, mine in zip(numbers, np.split(order, begins[1:]), strict=True):
+            if number < 0:
+                continue
             rows = places.row[mine].astype(np.intp)
             with np.load(self._files[number]) as arrays:
                 why = dict(

@@ -1,0 +1,141 @@
+"""Studies beside the runs: what each says, and its figures as points come."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QTimer, QUrl
+from PySide6.QtGui import QDesktopServices, QHideEvent
+from PySide6.QtWidgets import QWidget
+
+from gui.dialogs.overlay import Overlay
+from gui.look.theme import Theme
+from gui.parts import STRETCH, Combo, column, label, push, row, say, scrolling
+from gui.plots.small_plot import SmallPlot
+from tactile_lab.errors import RunFolderError
+from tactile_lab.plot import Plot
+from tactile_lab.studies.live import look_at, studies_in
+from tactile_lab.studies.page import REPORT
+
+AGAIN = 1000
+"""Milliseconds after which the files are looked at anew."""
+NONE = (
+    "No studies yet. tactile-lab study STUDY.toml makes one: a scene at many points, "
+    "see docs/studies.md."
+)
+
+
+class StudiesCard(Overlay):
+    """A choice of studies; below it what the chosen one says, and its figures.
+
+    Attributes:
+        choice: of studies.
+        text: what the chosen one says.
+        figures: of it.
+    """
+
+    def __init__(self, window: QWidget, theme: Theme) -> None:
+        super().__init__(window, 760)
+        self._theme = theme
+        self._roots: tuple[Path, ...] = ()
+        self._folders: list[Path] = []
+        self._stamp: tuple[object, ...] = ()
+        self.figures: list[SmallPlot] = []
+        self.choice = Combo()
+        self.choice.setAccessibleName("Study")
+        self.state = label("", "pill")
+        self.text = label("", "", wrap=True)
+        self.page = push("Open the report")
+        self.page.clicked.connect(self._open_page)
+        self.close_button = push("Close", "primary")
+        self.close_button.clicked.connect(self.hide)
+        inner = QWidget()
+        self._rows = column(inner, self.text, spacing=10)
+        self._rows.addStretch(1)
+        self._area = scrolling(inner)
+        self._area.setMinimumHeight(430)
+        head = row(label("Studies", "big"), (self.choice, 1), self.state, spacing=12)
+        foot = row(STRETCH, self.page, self.close_button)
+        column(self.card, head, self._area, foot, margin=22, spacing=14)
+        self.choice.currentIndexChanged.connect(self._show)
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.refresh)
+
+    def show_studies(self, roots: tuple[Path, ...]) -> None:
+        """Show the studies in these folders."""
+        self._roots, self._stamp = roots, ()
+        self.refresh()
+        self.open()
+        self._timer.start(AGAIN)
+        self.close_button.setFocus()
+
+    def refresh(self) -> None:
+        """Look at the files; what has not changed stays as it is."""
+        found = studies_in(*self._roots)
+        if set(found) != set(self._folders):
+            chosen = self._chosen
+            self._folders = found
+            self.choice.blockSignals(True)
+            self.choice.clear()
+            self.choice.addItems([path.name for path in found])
+            if chosen in found:
+                self.choice.setCurrentIndex(found.index(chosen))
+            self.choice.blockSignals(False)
+            self._stamp = ()
+        self._show()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Nobody looks: the files are left alone."""
+        self._timer.stop()
+        super().hideEvent(event)
+
+    @property
+    def _chosen(self) -> Path | None:
+        at = self.choice.currentIndex()
+        return self._folders[at] if 0 <= at < len(self._folders) else None
+
+    def _show(self, *_: object) -> None:
+        folder = self._chosen
+        self.choice.setVisible(folder is not None)
+        self.state.setVisible(folder is not None)
+        if folder is None:
+            say(self.text, NONE)
+            self._draw(())
+            self.page.setEnabled(False)
+            return
+        try:
+            stamp = (
+                folder,
+                *((p, p.stat().st_mtime_ns) for p in folder.glob("*.json")),
+            )
+            seen = look_at(folder)
+        except (RunFolderError, OSError) as error:  # between two of its files
+            say(self.text, str(error))
+            return
+        self.state.setText("Running" if seen.running else "At rest")
+        self.page.setEnabled((folder / REPORT).is_file())
+        if stamp != self._stamp:
+            self._stamp = stamp
+            say(self.text, "\n".join((seen.title, *seen.sentences)))
+            self._draw(seen.plots)
+
+    def _draw(self, plots: tuple[Plot, ...]) -> None:
+        while len(self.figures) < len(plots):
+            self.figures.append(SmallPlot(self._theme))
+            self._rows.insertWidget(len(self.figures), self.figures[-1])
+        for figure, plot in zip(self.figures, plots, strict=False):
+            figure.show_plot(plot)
+        for number, figure in enumerate(self.figures):
+            figure.setVisible(number < len(plots))
+
+    def _open_page(self) -> None:
+        if self._chosen is not None:
+            page = (self._chosen / REPORT).resolve()
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(page)))
+
+
+def show_studies(window: QWidget, theme: Theme, roots: tuple[Path, ...]) -> None:
+    """Show the card over the window."""
+    found = window.findChild(StudiesCard)
+    card = found if isinstance(found, StudiesCard) else StudiesCard(window, theme)
+    card.show_studies(roots)

@@ -1,0 +1,144 @@
+"""A study as whoever looks sees it: how far it is, and its figures as points come."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import RunFolderError
+from tactile_lab.plot import Plot
+from tactile_lab.quantity import count
+from tactile_lab.store.folder import lock, write_json
+from tactile_lab.studies.answers import plots
+from tactile_lab.studies.dataset import gathered
+from tactile_lab.studies.shelf import Shelf
+from tactile_lab.studies.study import Study
+
+LIVE, RESULTS, LOCK = "live.json", "results.json", ".lock"
+"""Files in a study's folder: while it is computed, once it is finished, and the one
+that whoever carries it out holds."""
+SHOWN = "shown"
+"""Key of either file under which stands what the window shows."""
+EVERY = 1.0
+"""Shortest time from one look to the next, s."""
+SHARE = 20
+"""Looking takes at most one part in so many of the time."""
+
+
+class Live:
+    """Writes what is known of a study that is computed.
+
+    Args:
+        study: which.
+        shelf: of finished points.
+        named: their addresses.
+        folder: of the study.
+    """
+
+    def __init__(
+        self, study: Study, shelf: Shelf, named: NDArray[np.void], folder: Path
+    ) -> None:
+        self._study, self._shelf, self._named = study, shelf, named
+        self._file = folder / LIVE
+        self._next = 0.0
+
+    def tell(self, done: int, failed: int) -> None:
+        """So many points are done; written now and then.
+
+        Raises:
+            RecordingError: the folder cannot be written.
+        """
+        began = time.monotonic()
+        if began < self._next:
+            return
+        places = self._shelf.find(self._named)
+        drawn = plots(gathered(self._study, self._shelf, places))
+        said = f"{done:,} of {count(self._named.size, 'point')} are known"
+        said += f", {failed:,} of these refused or failed." if failed else "."
+        write_json(self._file, {SHOWN: shown(self._study, [said], drawn)})
+        took = time.monotonic() - began
+        self._next = began + max(EVERY, SHARE * took)
+
+    def end(self) -> None:
+        """It is finished: its results take the place of this."""
+        self._file.unlink(missing_ok=True)
+
+
+def shown(
+    study: Study, sentences: Iterable[str], drawn: Iterable[Plot]
+) -> dict[str, Any]:
+    """What the window shows of a study, as JSON takes it."""
+    return {
+        "title": study.title,
+        "sentences": list(sentences),
+        "plots": [plot.to_dict() for plot in drawn],
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class SeenStudy:
+    """A study's folder, looked at.
+
+    Attributes:
+        folder: of the study.
+        title: for people.
+        sentences: what it says, or how far it is.
+        plots: its figures so far.
+        running: whether somebody carries it out now.
+    """
+
+    folder: Path
+    title: str
+    sentences: tuple[str, ...]
+    plots: tuple[Plot, ...]
+    running: bool
+
+
+def studies_in(*roots: Path) -> list[Path]:
+    """Folders of studies in these folders, the one that changed last first."""
+    found = [path.parent for root in roots for path in root.glob(f"*/{LOCK}")]
+    told = [path for path in found if _told_in(path) is not None]
+    return sorted(told, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
+def look_at(folder: Path) -> SeenStudy:
+    """What a study says by now.
+
+    Raises:
+        RunFolderError: the folder holds none, or it cannot be read.
+    """
+    file = _told_in(folder) or folder / RESULTS
+    running = _is_held(folder / LOCK)
+    try:
+        told = json.loads(file.read_text(encoding="utf-8"))[SHOWN]
+        sentences = tuple(map(str, told["sentences"]))
+        if file.name == LIVE and not running:
+            sentences += ("Nobody computes it now; start it again and it goes on.",)
+        drawn = tuple(Plot.from_dict(plot) for plot in told["plots"])
+        return SeenStudy(folder, str(told["title"]), sentences, drawn, running)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunFolderError(
+            f"{folder} holds no study that can be read ({type(error).__name__}: "
+            f"{error}). Carry it out again: what is known is not computed anew."
+        ) from error
+
+
+def _told_in(folder: Path) -> Path | None:
+    """The file that tells of a study, while it is computed or after."""
+    files = (folder / name for name in (LIVE, RESULTS))
+    return next((file for file in files if file.is_file()), None)
+
+
+def _is_held(file: Path) -> bool:
+    try:
+        with file.open(encoding="utf-8") as held:
+            return not lock(held, shared=True)
+    except OSError:
+        return False
