@@ -125,6 +125,7 @@ class StudiesCard(Overlay):
             self._rows.insertWidget(len(self.figures), self.figures[-1])
         for figure, plot in zip(self.figures, plots, strict=False):
             figure.show_plot(plot)
+            figure.setMaximumHeight(figure.minimumHeight())
         for number, figure in enumerate(self.figures):
             figure.setVisible(number < len(plots))
 
