@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from gui.review.run_card import day
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
+from gui.state import WindowState
 
 RECENT = 8
 """Runs offered."""
@@ -77,9 +78,13 @@ class GearMenu(QMenu):
         self._add("About this run …", "Ctrl+I", acts.about_run)
         self._add("Export view …", "Ctrl+E", acts.export_view)
         self.addSeparator()
-        self._add("Use simulated bench", "", partial(session.connect_bench, "sim"))
+        free = not session.busy and not session.monitor.alive
+        use = partial(session.connect_bench, "sim")
+        self._add("Use simulated bench", "", use, possible=free)
         self._add("Connect instruments …", "Ctrl+K", acts.connect)
-        self._add("Disconnect", "", session.disconnect_bench)
+        leave = session.disconnect_bench
+        ready = session.state is WindowState.READY
+        self._add("Disconnect", "", leave, possible=free and ready)
         self.addSeparator()
         theme = self.addMenu("Theme")
         for word in ("system", "light", "dark"):
@@ -97,6 +102,7 @@ class GearMenu(QMenu):
         """Open it below its button."""
         self.popup(button.mapToGlobal(QPoint(0, button.height())))
 
-    def _add(self, words: str, keys: str, act: Act) -> None:
+    def _add(self, words: str, keys: str, act: Act, *, possible: bool = True) -> None:
         # a tab parts the keys; the window has the shortcuts, the menu only names them
-        self.addAction(f"{words}\t{keys}" if keys else words, act)
+        made = self.addAction(f"{words}\t{keys}" if keys else words, act)
+        made.setEnabled(possible)

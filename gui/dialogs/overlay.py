@@ -77,8 +77,10 @@ class Overlay(QWidget):
             page.setFocus()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Dim what lies below."""
-        QPainter(self).fillRect(self.rect(), QColor(8, 12, 20, 120))
+        """Dim what lies below, once where cards lie over each other."""
+        cards = self._window.findChildren(Overlay)
+        if next(card for card in cards if card.isVisible()) is self:
+            QPainter(self).fillRect(self.rect(), QColor(8, 12, 20, 120))
 
     def _place(self) -> None:
         window = self._window

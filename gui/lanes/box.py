@@ -90,6 +90,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         painted: what is shown, as the numbers on the card want it.
         locked: whether the range stays as it is.
         levels: where lines across are, in shown units; two at most.
+        wanted: threshold that a hand drags the run's to, V; None while nobody does.
         top: whether it is the highest, where the names of holds are.
     """
 
@@ -100,6 +101,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         self.painted, self._twin = Painted(), Trace.nothing()
         self.locked = self.top = False
         self.levels: list[float] = []
+        self.wanted: float | None = None
         self.axis = ValueAxis(stage, self)
         self.sigRangeChangedManually.connect(self._lock)
         self.forget()
@@ -178,8 +180,8 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
                 self._runs(on, runs)
             else:
                 self._beyond(on)
-                self._threshold(on)
                 self._traces(on, runs[0], self._twin)
+                self._threshold(on)
             self._levels(on)
         if len(runs) == 1:
             self._tag(on)
@@ -191,6 +193,13 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             if abs(frame.y1(level) + self.y() - y) <= NEAR:
                 return number_
         return None
+
+    def threshold_at(self, y: float) -> bool:
+        """Whether the threshold lies at a height in the scene, px."""
+        level = self._stage.source.threshold
+        if level is None or self.lane.key != "V_K":
+            return False
+        return abs(self._frame(0.0).y1(level) + self.y() - y) <= NEAR
 
     def value_at(self, y: float) -> float:
         """The value at a height in the scene, px, in shown units."""
@@ -218,15 +227,20 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             paint.write(painter, at, words, tokens.accent, align=1.0)
 
     def _threshold(self, on: Drawing) -> None:
-        """The level at which spikes were counted."""
-        level, frame = on.source.threshold, on.frame
+        """The level at which spikes were counted, and where a hand drags it to."""
+        level, frame, tokens = on.source.threshold, on.frame, on.tokens
         if level is None or self.lane.key != "V_K":
             return
-        y = round(frame.y1(level)) + 0.5
-        on.painter.setPen(paint.pen(on.tokens.muted, Qt.PenStyle.DotLine))
-        on.painter.drawLine(QPointF(0, y), QPointF(frame.right, y))
-        words = f"threshold {number(level, 2)} V"
-        paint.write(on.painter, QPointF(5, y - 8), words, on.tokens.muted)
+        for value, ink, words in (
+            (level, tokens.muted, f"threshold {number(level, 2)} V"),
+            (self.wanted, tokens.accent, f"next {number(self.wanted or 0.0, 2)} V"),
+        ):
+            if value is None:
+                continue
+            y = round(frame.y1(value)) + 0.5
+            on.painter.setPen(paint.pen(ink, Qt.PenStyle.DotLine))
+            on.painter.drawLine(QPointF(0, y), QPointF(frame.right, y))
+            paint.write_on(on.painter, QPointF(5, y - 8), words, ink, tokens.plot)
 
     def _beyond(self, on: Drawing) -> None:
         """Shade where the input left its range: the trace is a limit there."""

@@ -320,3 +320,18 @@ def write(
     painter.setPen(pen(colour))
     where = QPointF(round(at.x() - align * width), round(at.y() - height / 2))
     painter.drawStaticText(where, laid_out)
+
+
+def write_on(
+    painter: QPainter,
+    at: QPointF,
+    text: str,
+    colour: str,
+    ground: str,
+    align: float = 0.0,
+) -> None:
+    """Write as `write` does, on a ground of its own: to be read over anything."""
+    _, wide, _ = _laid_out(text, 11)
+    box = QRectF(at.x() - align * wide - 3, at.y() - 8, wide + 6, 16)
+    painter.fillRect(box, QColor(ground))
+    write(painter, at, text, colour, align=align)

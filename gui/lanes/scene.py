@@ -134,13 +134,8 @@ class Marks(Layer):
                 self._tell(painter, where, f"{' · '.join(told)} {lane.unit}", 0.0)
 
     def _tell(self, painter: QPainter, at: QPointF, words: str, align: float) -> None:
-        """Write on a ground of its own, so that it can be read over anything."""
         tokens = self._stage.tokens
-        painter.setFont(sized(11))
-        wide = painter.fontMetrics().horizontalAdvance(words)
-        ground = QRectF(at.x() - align * wide - 3, at.y() - 8, wide + 6, 16)
-        painter.fillRect(ground, QColor(tokens.panel))
-        paint.write(painter, at, words, tokens.text, align=align)
+        paint.write_on(painter, at, words, tokens.text, tokens.panel, align)
 
 
 class LaneScene(pg.GraphicsView):  # type: ignore[misc]
@@ -149,6 +144,8 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
     box_zoomed = Signal(float, float)
     menu_asked = Signal(object, object, object)
     """The lane under the pointer, and where that is: in the scene, on the screen."""
+    threshold_dragged = Signal(float)
+    """To where, V."""
     drawn = Signal()
 
     def __init__(self, stage: Stage, places: Callable[[], Places]) -> None:
@@ -160,6 +157,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         self.crosshair = False
         self._cursor: int | None = None
         self._level: tuple[LaneBox, int] | None = None
+        self._threshold: LaneBox | None = None
         self._pressed: QPointF | None = None
         self._from = 0.0
         self._marks = Marks(stage)
@@ -283,6 +281,8 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
             self._pressed, self._from = at, self.stage.view.start
             self._cursor = self._near_cursor(at.x())
             self._level = self._near_level(at) if self._cursor is None else None
+            if self._cursor is None and self._level is None:
+                self._threshold = self._near_threshold(at)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Drag on, or move the crosshair."""
@@ -295,6 +295,8 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         elif self._level is not None:
             box, which = self._level
             box.levels[which] = box.value_at(at.y())
+        elif self._threshold is not None:
+            self._threshold.wanted = self._threshold.value_at(at.y())
         elif self.stage.zoom_box:
             self._marks.box = self._boxed(pressed, at)
         elif abs(pressed.x() - at.x()) > 3:
@@ -309,6 +311,11 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         """End of the drag."""
         box, pressed = self._marks.box, self._pressed
         self._pressed = self._cursor = self._level = self._marks.box = None
+        dragged, self._threshold = self._threshold, None
+        if dragged is not None and dragged.wanted is not None:
+            if dragged.wanted > 0:
+                self.threshold_dragged.emit(dragged.wanted)
+            dragged.wanted = None
         if pressed is None:
             super().mouseReleaseEvent(event)
         elif box is not None and box.width() > 4:
@@ -347,7 +354,11 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         shape = Qt.CursorShape.ArrowCursor
         if self._near_cursor(at.x()) is not None:
             shape = Qt.CursorShape.SizeHorCursor
-        elif self._near_level(at) or (at.x() < AXIS and self.lane_at(at.y())):
+        elif (
+            self._near_level(at)
+            or self._near_threshold(at)
+            or (at.x() < AXIS and self.lane_at(at.y()))
+        ):
             shape = Qt.CursorShape.SizeVerCursor
         self.viewport().setCursor(shape)
 
@@ -356,6 +367,11 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         box = self.lane_at(at.y())
         which = None if box is None else box.level_at(at.y())
         return None if box is None or which is None else (box, which)
+
+    def _near_threshold(self, at: QPointF) -> LaneBox | None:
+        """The lane whose threshold is at a place."""
+        box = self.lane_at(at.y())
+        return box if box is not None and box.threshold_at(at.y()) else None
 
     def _near_cursor(self, x: float) -> int | None:
         frame = self.stage.whole()

@@ -59,6 +59,7 @@ class LaneStack(QFrame):
         view.cursors_changed.connect(self.show_values)
         self.scene.drawn.connect(self._follow_picture)
         self.scene.menu_asked.connect(self._ask)
+        self.scene.threshold_dragged.connect(self.threshold_asked)
         theme.changed.connect(self._tint)
 
     @property

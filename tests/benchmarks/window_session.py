@@ -276,7 +276,8 @@ def lies(reports: list[dict]) -> list[str]:
             if not false or told["manual"]:
                 begun.pop(claim, None)
             elif told["at"] - begun.setdefault(claim, told["at"]) > LIE:
-                found.append(f"{claim}, at {told['at'] - reports[0]['at']:.0f} s")
+                at = f"at {told['at'] - reports[0]['at']:.0f} s"
+                found.append(f"{claim}, {at} of {told['source']}: {told['words']}")
                 begun[claim] = float("inf")
     return found
 

@@ -64,6 +64,11 @@ def listen_to_trouble() -> None:
     qInstallMessageHandler(warned)
 
 
+def number(far: wires.FarEnd) -> int:
+    """The how many-th far end it is: they are numbered as they are plugged in."""
+    return int(far.name.rpartition("-")[2])
+
+
 class Watched:
     """The window, the far ends of its coil sources, and what both say."""
 
@@ -80,7 +85,7 @@ class Watched:
         fit(self.window, self.window.screen().availableSize())
         self.window.show()
         begin(self.window, str(self.scene), "sim")
-        self._count, self._names = 0, {}
+        self._count, self._names, self._newest = 0, {}, 0
         self._timer = QTimer()
         self._timer.timeout.connect(self._report)
         self._timer.start(100)
@@ -88,9 +93,14 @@ class Watched:
 
     @property
     def coils(self) -> list[wires.FarEnd]:
-        """The source in use: one that was unplugged, or let go of, is another's."""
+        """The newest source, while it lives: a bench connected anew has its own.
+
+        One that was unplugged stays as it was, and may outlive the one after it.
+        """
         ends = [far for name, far in wires._far_ends.items() if "coil" in name]
-        return [far for far in ends if hasattr(far.instrument, "output_on")][-1:]
+        for far in ends:
+            self._newest = max(self._newest, number(far))
+        return [far for far in ends if number(far) == self._newest]
 
     def _logged(self, line: LogLine) -> None:
         tell({"log": f"{line.at:%H:%M:%S.%f} {line.source}: {line.text}"})

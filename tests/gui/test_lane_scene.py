@@ -106,6 +106,25 @@ def drag(stack: LaneStack, a: QPoint, b: QPoint) -> None:
     QTest.mouseRelease(stack.scene.viewport(), LEFT, pos=b)
 
 
+def test_the_threshold_is_dragged_to_where_the_next_run_counts(
+    app: QApplication, stack: LaneStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(LiveSource, "threshold", 0.5)
+    lane, asked = box(stack, "V_K"), []
+    stack.threshold_asked.connect(asked.append)
+    bare = stack.scene.grab().toImage()
+    low, high = lane.shown
+    line = lane.geometry().bottom() - lane.height() * (0.5 - low) / (high - low)
+    start, view = QPoint(AXIS + 200, round(line)), stack.view.start
+    drag(stack, start, start - QPoint(0, 20))
+    assert asked == [pytest.approx(lane.value_at(line - 20), abs=0.03)]
+    assert stack.view.start == view and lane.wanted is None
+    settle(app)
+    assert stack.scene.grab().toImage() == bare, "the run's own stays where it was"
+    drag(stack, start, QPoint(start.x(), round(lane.geometry().bottom()) - 1))
+    assert len(asked) == 1, "below 0 nothing can be counted"
+
+
 def span(lane: LaneBox) -> float:
     low, high = lane.shown
     return high - low

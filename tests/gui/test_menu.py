@@ -85,6 +85,33 @@ def test_the_menu_names_shortcuts_that_exist_and_what_was_opened_last(lab) -> No
     menu.close()
 
 
+def test_the_menu_offers_nothing_that_a_run_forbids(lab) -> None:
+    def possible() -> dict[str, bool]:
+        lab.window.actions_.show_menu()
+        menu = lab.window.findChildren(GearMenu)[-1]
+        found = {one.text(): one.isEnabled() for one in menu.actions()}
+        menu.close()
+        return {name: found[name] for name in ("Use simulated bench", "Disconnect")}
+
+    assert possible() == {"Use simulated bench": True, "Disconnect": True}
+    lab.run()
+    assert possible() == {"Use simulated bench": False, "Disconnect": False}
+
+
+def test_cards_over_each_other_darken_the_window_once(lab) -> None:
+    window = lab.window
+    window.actions_.show_help()
+    corner = QPoint(20, window.height() - 20)
+
+    def colour() -> str:
+        lab.app.processEvents()
+        return window.grab().toImage().pixelColor(corner).name()
+
+    one = colour()
+    window.actions_.show_preferences()
+    assert colour() == one
+
+
 def test_single_keys_do_nothing_below_a_card(lab) -> None:
     window = lab.window
     before = window.centre.tools.twin.isChecked()
