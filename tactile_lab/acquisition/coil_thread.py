@@ -214,7 +214,11 @@ class CoilThread(InstrumentThread):
         """Switch off, verify by read-back, close."""
         if self.generator is not None and self._playing:
             self.generator.ramp_down(self.coil.beat)
+        asked, last = self.clock.now(), self.last
         self.off = self.coil.safe_off()
+        flowed = last is not None and abs(last.setpoint) > RESOLUTION
+        if flowed and self.off.verified:  # it fell from there
+            self._note(Applied(asked, self.clock.now(), 0.0, self.off.current))
         self.live = False
         try:
             if self.off.verified and self.opened:

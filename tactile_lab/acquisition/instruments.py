@@ -114,8 +114,16 @@ class Instruments:
         """Whether any thread has met a failure."""
         return any(thread.failure is not None for thread in self.threads)
 
-    def close(self) -> OffReport:
-        """Close all and report how the coil was left."""
+    def close(self, meanwhile: Wait) -> OffReport:
+        """Close all, the coil first, and report how that was left.
+
+        Args:
+            meanwhile: goes on with the record until the coil is off, as `open` waits.
+        """
+        coil = self.coil
+        if coil is not None:
+            coil.leave()
+            meanwhile(lambda: coil.ended)
         for thread in self.threads:
             thread.leave()
         for thread in self.threads:

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
-from tactile_lab.acquisition.instruments import Instruments
+from tactile_lab.acquisition.instruments import CLOSING, Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.person import Prompt
 from tactile_lab.acquisition.program import Program
@@ -160,6 +160,23 @@ class Pump:
             start = self._account.axis(stream.started)
             self._account.align(start, self._intake.reached, stream.uncertainty)
         self._end_intake(scope)
+
+    def follow(self, done: Callable[[], bool]) -> None:
+        """Go on taking samples until `done()`: how the force falls is told, too.
+
+        What fails ends it, and is met again by `last_words`.
+        """
+        scope, until = self._instruments.scope, self._clock.now() + CLOSING
+        with suppress(Exception):
+            while not done() and self._clock.now() < until:
+                self._take_blocks()
+                self._clock.wait_for(
+                    lambda: bool(
+                        done()
+                        or (scope and self._intake.streaming and scope.waiting > 0)
+                    ),
+                    min(until, self._clock.now() + PULSE),
+                )
 
     def last_words(self, known: BaseException | None) -> list[BaseException]:
         """Store what the instruments still delivered while they were closed.

@@ -124,7 +124,7 @@ class Runner:
                 self._account.state(events.RunState.STOPPING, "making the coil safe")
             finally:  # whatever the record does
                 self._lease.end()
-                off = self.instruments.close()
+                off = self.instruments.close(self._pump.follow)
             ending = Ending(state, off, reason, failure, self._stop.signal)
             try:
                 last = self._pump.last_words(failure)

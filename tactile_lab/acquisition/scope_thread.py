@@ -107,6 +107,8 @@ class ScopeThread(InstrumentThread):
                 if now >= poll:
                     poll = now + self.scope.poll_interval
             self.clock.wait_for(self._called, self._wake(poll))
+        if self.stream is not None:
+            self._poll()
 
     def make_safe_and_close(self) -> None:
         """Stop the stream and close."""

@@ -17,7 +17,7 @@ from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
-from tactile_lab.quantity import exact, show
+from tactile_lab.quantity import count, exact, show
 from tactile_lab.report.driven import told
 from tactile_lab.report.mains import told as mains_told
 from tactile_lab.report.run_data import Loss, RunData
@@ -85,6 +85,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
             warnings=(
+                *_as_it_fell(run),
                 *overrange_told(run),
                 *mains_told(run),
                 *warnings,
@@ -179,7 +180,7 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
         for row, complete in zip(run.trials, run.completed.tolist(), strict=True)
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
-    late = spikes[spikes >= end] - end
+    late = spikes[(spikes >= end) & (spikes < run.stopped)] - end
     if late.size and run.status != "complete":
         trials.append(
             MeasuredTrial(
@@ -193,6 +194,20 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
             )
         )
     return tuple(trials)
+
+
+def _as_it_fell(run: Run) -> tuple[str, ...]:
+    """How many spikes came after the run was stopped, which are no trial's."""
+    if run.completed.all():
+        return ()
+    fell = np.count_nonzero(run.spikes["time"] >= run.stopped)
+    if not fell:
+        return ()
+    said = count(int(fell), "spike")
+    return (
+        f"{said} came as the force fell after the run was stopped, at "
+        f"{show(run.stopped, 's', 4)}; they belong to no trial.",
+    )
 
 
 def _trial(

@@ -267,13 +267,13 @@ class StoredRun:
     def trials(self) -> Records:
         """Trials: index, start, end (s), level (N), hold, spikes, label (bytes).
 
-        One that was cut short, or goes on, is not `complete` and ends with the run; so
-        does its hold, if it was reached.
+        One that was cut short, or goes on, is not `complete` and ends where the run was
+        stopped; so does its hold, if it was reached. The fall after it is no trial's.
         """
         rows = self.records("trials")
         for number in np.flatnonzero(~self.completed):
             row = rows[number]
-            row["end"] = min(row["end"], self.duration)
+            row["end"] = min(row["end"], self.duration, self.stopped)
             length, times = row["end"] - row["start"], self.spikes["time"]
             inside = (times >= row["start"]) & (times < row["end"])
             row["spikes"] = np.count_nonzero(inside)
@@ -281,6 +281,12 @@ class StoredRun:
             if not row["hold_start"] < row["hold_end"]:
                 row["hold_start"] = row["hold_end"] = np.nan
         return rows
+
+    @property
+    def stopped(self) -> float:
+        """When the coil began to be made safe, s; infinite in a run that was not."""
+        rows = self.records("events")
+        return float(min(rows["time"][rows["kind"] == b"stopping"], default=np.inf))
 
     @property
     def completed(self) -> NDArray[np.bool_]:
