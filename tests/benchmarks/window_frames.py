@@ -190,6 +190,15 @@ def memory(pid: int | str = "self") -> float:
     return float("nan")
 
 
+def shares(engine: int | None) -> tuple[float, float, float]:
+    """The clock, and the processor time of this process and of the engine, s."""
+    both = []
+    for pid in ("self", engine):
+        times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        both.append(sum(map(int, times[11:13])) / os.sysconf("SC_CLK_TCK"))
+    return time.monotonic(), both[0], both[1]
+
+
 def main(seconds: float) -> None:
     with tempfile.TemporaryDirectory() as out:
         bench = Bench(Path(out))
@@ -205,7 +214,15 @@ def main(seconds: float) -> None:
         bench.measure("idle", seconds)
         window.setup.start()
         bench.until(lambda: session.source is not None, 30)
+        before = shares(session.link.pid)
         bench.measure("run in real time, simulated bench", min(seconds, 12.0))
+        after = shares(session.link.pid)
+        took = after[0] - before[0]
+        parts = [100 * (b - a) / took for a, b in zip(before, after, strict=True)]
+        bench.say(
+            f"In the run the window took {parts[1]:.0f} % of a core, the engine "
+            f"{parts[2]:.0f} %."
+        )
         session.stop("benchmark")
         bench.clear()
         bench.until(lambda: not session.busy, 20)

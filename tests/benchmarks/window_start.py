@@ -1,0 +1,110 @@
+"""How long the window takes until it can be used, and until its bench is ready.
+
+    python tests/benchmarks/window_start.py [STARTS] [--beside CHECKOUT]
+
+The program itself is started, offscreen, on the built-in simulated bench; with another
+checkout beside it both in turn, so that their ratio holds on a busy machine, too. Times
+are from the start of Python. Processor times are of the window's process until it can
+be used, and of window and engine until READY. The first start of each is not counted.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+WATCHED = """
+import os, sys, time
+from pathlib import Path
+from PySide6.QtCore import QTimer
+import gui.app as app
+
+def lived():
+    ticks = Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19]
+    up = float(Path("/proc/uptime").read_text().split()[0])
+    return up - int(ticks) / os.sysconf("SC_CLK_TCK")
+
+def used(pid):
+    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return sum(map(int, times[11:13])) / os.sysconf("SC_CLK_TCK")
+
+begin, found = app.begin, {}
+
+def watched(window, *rest):
+    begin(window, *rest)
+    found.update(usable=lived(), window=used("self"))
+    timer = QTimer(window)
+
+    def look():
+        session = window.session
+        if session.state.value == "ready" and session.plan.expectation is not None:
+            timer.stop()
+            found.update(ready=lived(), both=used("self") + used(session.link.pid))
+            import json
+            print(json.dumps(found), flush=True)
+            window.close()
+
+    timer.timeout.connect(look)
+    timer.start(5)
+
+if __name__ == "__main__":
+    app.begin = watched
+    app.main("demo", out=Path(sys.argv[1]), bench="sim")
+"""
+PARTS = ("usable", "window", "ready", "both")
+HEAD = (
+    "| checkout | starts | usable, s | its processor | READY, s | processor, both |\n"
+    "|---|---|---|---|---|---|"
+)
+
+
+def start(checkout: Path, folder: Path) -> dict[str, float]:
+    """Start a checkout's window once; what it took, s."""
+    script = folder / "watched.py"
+    script.write_text(WATCHED)
+    python = checkout / ".venv" / "bin" / "python"
+    told = subprocess.run(
+        [python if python.exists() else sys.executable, script, folder / "runs"],
+        stdout=subprocess.PIPE, text=True, check=True, timeout=300, cwd=folder,
+        env={
+            **os.environ, "QT_QPA_PLATFORM": "offscreen",
+            "XDG_CONFIG_HOME": str(folder), "PYTHONPATH": str(checkout),
+        },
+    )  # fmt: skip
+    found: dict[str, float] = json.loads(told.stdout.splitlines()[-1])
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("starts", type=int, nargs="?", default=6)
+    parser.add_argument("--beside", type=Path)
+    options = parser.parse_args()
+    here = Path(__file__).resolve().parents[2]
+    checkouts = [here] if options.beside is None else [here, options.beside.resolve()]
+    taken: dict[Path, list[dict[str, float]]] = {one: [] for one in checkouts}
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(options.starts + 1):
+            for checkout in checkouts:
+                taken[checkout].append(start(checkout, Path(folder)))
+    print(HEAD)
+    for name, found in zip(("this", "beside"), taken.values(), strict=False):
+        middle = [np.median([one[part] for one in found[1:]]) for part in PARTS]
+        cells = [f"{value:.2f}" for value in middle]
+        print(f"| {name} | {options.starts} | {' | '.join(cells)} |")
+    if len(checkouts) == 2:
+        ratios = [
+            np.median([a[part] / b[part] for a, b in zip(*pairs, strict=True)])
+            for pairs in [[one[1:] for one in taken.values()]]
+            for part in PARTS
+        ]
+        print(f"| ratio | | {' | '.join(f'{ratio:.2f}' for ratio in ratios)} |")
+
+
+if __name__ == "__main__":
+    main()
