@@ -217,9 +217,11 @@ class Link:
     def _let_rest(self) -> None:
         """Have an engine end that has nothing to do."""
         with self._lock:
-            if not self._tasks and not self._asked:
-                self._write(None)
-                self._pipe = self._process = None
+            if self._tasks or self._asked or self._process is None:
+                return
+            self._write(None)
+            start(self._process.join, "rest")  # else it would stay as a zombie
+            self._pipe = self._process = None
 
     def _number(self) -> int:
         """A number for what is asked next, and an engine to ask."""

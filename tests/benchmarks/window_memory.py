@@ -12,6 +12,7 @@ libraries. The last row is of two minutes later, when the desk has gone to rest.
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 import time
 from pathlib import Path
@@ -37,11 +38,9 @@ def children(pid: int) -> list[int]:
 
 def row(bench: Bench, runs: int) -> str:
     """The table's row after so many runs."""
-    session, own = bench.session, Path("/proc/self").resolve().name
-    links = {"engine": session.link.pid, "desk": session.desk.pid}
-    every = [int(own), *children(int(own))]
-    sizes = {pid: set_sizes(pid) for pid in every}
-    named = {pid: name for name, pid in links.items()} | {int(own): "window"}
+    session, own = bench.session, os.getpid()
+    sizes = {pid: set_sizes(pid) for pid in [own, *children(own)]}
+    named = {own: "window", session.link.pid: "engine", session.desk.pid: "desk"}
     parts = dict.fromkeys(("window", "engine", "desk", "others"), 0.0)
     for pid, size in sizes.items():
         parts[named.get(pid, "others")] += size["Pss"]
@@ -84,7 +83,8 @@ def main() -> None:
                 end = time.monotonic() + 5
                 bench.until(lambda end=end: time.monotonic() > end, 6)
                 print(row(bench, number), flush=True)
-        bench.until(lambda: session.desk.pid is None, 300)
+        desk = session.desk.pid
+        bench.until(lambda: desk not in children(os.getpid()), 300)
         print(row(bench, options.runs), flush=True)
         bench.window.close()
         session.close()

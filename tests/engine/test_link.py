@@ -8,6 +8,7 @@ import threading
 import time
 import weakref
 from multiprocessing import Pipe
+from pathlib import Path
 
 import pytest
 
@@ -139,6 +140,10 @@ def test_an_engine_of_which_nothing_is_asked_ends_and_the_next_question_starts_o
         while link.pid is not None:
             link.poll()
         second = answered(link)
+        end = time.monotonic() + 60
+        while Path(f"/proc/{first.value}").exists() and time.monotonic() < end:
+            time.sleep(0.001)
+        assert not Path(f"/proc/{first.value}").exists(), "it is still there"
     assert not first.lost and not second.lost and lost == []
     assert first.value != second.value
 
