@@ -20,7 +20,10 @@ from tactile_lab.errors import InstrumentError, LinkLostError, NotFoundError
 from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
 
 KEPCO = coil_dialect("kepco-bop")
-FAST = KEPCO.serial.model_copy(update={"latency": 0.0, "timeout": 0.3})
+TIMEOUT = 1.5
+"""Longer than a far end on a busy machine takes, s."""
+
+FAST = KEPCO.serial.model_copy(update={"latency": 0.0, "timeout": TIMEOUT})
 ROW = KEPCO.model_copy(update={"serial": FAST})
 PATIENCE = 60.0
 """Longest wait for what a busy machine does late, s."""
@@ -108,7 +111,7 @@ def test_one_bad_exchange_does_not_end_the_run(served, kind):
     clock, source, end, _server, coil = served
     coil.open()
     coil.energise()
-    end.faults.add(SerialFault(kind=kind, line="CURR", amount=0.45))
+    end.faults.add(SerialFault(kind=kind, line="CURR", amount=1.5 * TIMEOUT))
     drive(clock, coil, 0.05)
     assert end.faults.struck == 1
     assert source.setpoint == pytest.approx(coil.setpoint, abs=1e-5)
@@ -137,10 +140,13 @@ def test_unplugged_while_playing(served, form, monkeypatch):
 
 
 def test_a_stuck_peer_does_not_hang_us(served, monkeypatch):
-    monkeypatch.setattr("drivers.coil.wire.VERIFICATIONS", 1)  # each takes 5 s
+    monkeypatch.setattr("drivers.coil.wire.VERIFICATIONS", 1)
     clock, _source, end, server, coil = served
     coil.open()
     coil.energise()
+    link = coil._wire.link  # no answer is awaited any more
+    link.wire = link.wire.model_copy(update={"timeout": 0.1})
+    link._serial.timeout = link._serial.write_timeout = 0.1
     end.faults.add(SerialFault(kind="stuck", line="CURR", amount=600.0))
     begun = time.monotonic()
     with pytest.raises(InstrumentError):
