@@ -15,7 +15,6 @@ from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.planning.ways import ways_used
 from tactile_lab.scene.load import load
-from tactile_lab.waveform import Waveform
 
 WAVE = (
     'protocol.levels=["190 mN", "190 mN"]',
@@ -64,17 +63,7 @@ def test_it_is_loaded_once_and_at_once(ran):
 
 
 def test_its_points_stand_where_the_samples_show_them(ran):
-    run = ran.stored()
-    trace = run.signal("coil_current").trace(cells=20_000)
-    applied = Waveform.stairs(run.applied.steps, run.duration)
-    for start in run.trials["start"]:
-        inside = (trace.time > start - 0.05) & (trace.time < start + 1.15)
-        time, seen = trace.time[inside] + trace.width / 2, trace.mean[inside]
-        late = [
-            np.abs(applied.at(time - by) - seen).mean()
-            for by in np.arange(-20e-3, 20e-3, 0.5e-3)
-        ]
-        assert abs(np.argmin(late) * 0.5e-3 - 20e-3) <= 2e-3
+    assert ran.lateness() == pytest.approx([0.0, 0.0], abs=2e-3)
 
 
 @pytest.fixture

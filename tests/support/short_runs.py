@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tactile_lab.acquisition import events
@@ -10,6 +11,7 @@ from tactile_lab.acquisition.ending import Executed
 from tactile_lab.engine.execution import Execution
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
+from tactile_lab.waveform import Waveform
 
 
 @dataclass
@@ -25,6 +27,19 @@ class Ran:
 
     def stored(self) -> Run:
         return Run.load(self.folder)
+
+    def lateness(self) -> list[float]:
+        """How late the samples of each trial are after the run's points, ±20 ms, s."""
+        run = self.stored()
+        trace = run.signal("coil_current").trace(cells=20_000)
+        applied = Waveform.stairs(run.applied.steps, run.duration)
+        shifts, found = np.arange(-20e-3, 20e-3, 0.5e-3), []
+        for start in run.trials["start"]:
+            inside = (trace.time > start - 0.05) & (trace.time < start + 1.15)
+            time, seen = trace.time[inside] + trace.width / 2, trace.mean[inside]
+            off = [np.abs(applied.at(time - by) - seen).mean() for by in shifts]
+            found.append(float(shifts[np.argmin(off)]))
+        return found
 
 
 @pytest.fixture
