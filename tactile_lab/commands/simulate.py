@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactile_lab.commands.options import json_option, scene_options
-from tactile_lab.commands.terminal import print_json, refusing, say, warn, working
+from tactile_lab.commands.terminal import fail, print_json, refusing, say, warn, working
+from tactile_lab.neuro.formats import CIRCUITS, circuit_format_of
 
 if TYPE_CHECKING:
     from tactile_lab.model.simulate import Result
     from tactile_lab.scene.scene import Scene
+    from tactile_lab.waveform import Waveform
 
 MOST_SAMPLES = 10_000_000
 
@@ -31,6 +35,15 @@ MOST_SAMPLES = 10_000_000
     metavar="SECONDS",
     help="Error of spike times aimed at, s (and of V_C1, V).",
 )
+@click.option(
+    "--export",
+    "exports",
+    type=click.Path(path_type=Path, dir_okay=False),
+    multiple=True,
+    metavar="FILE",
+    help="Write the circuit under this force for another simulator; the ending says "
+    f"which: {', '.join(CIRCUITS)}; repeatable.",
+)
 @json_option
 def command(
     scene: str | None,
@@ -38,17 +51,21 @@ def command(
     bench: str | None,
     samples: int | None,
     tolerance: float,
+    exports: tuple[Path, ...],
     as_json: bool,
 ) -> None:
     """Simulate the sensor of SCENE (the demo unless given) under its force.
 
-    Opens no bench and writes nothing: no coil, calibration, follower or limit applies.
+    Opens no bench and writes only what is exported: no coil, calibration, follower or
+    limit applies.
     """
     with refusing():
         from tactile_lab.planning.preview import model, modelled
         from tactile_lab.planning.timeline import timeline
         from tactile_lab.scene.load import load
 
+        for file in exports:
+            circuit_format_of(file)
         loaded = load(scene, overrides, bench).sensor_alone
         drive = timeline(loaded, through_coil=False)
         with working("solving the model"):
@@ -56,12 +73,28 @@ def command(
                 loaded, drive.force, drive.duration, modelled(loaded), tolerance
             )
         report = answer(loaded, result, samples)
+        for file in exports:
+            _export(loaded, drive.force, drive.duration, file)
     if as_json:
         for text in report["warnings"]:
             warn(text)
         print_json(report)
     else:
         _print(loaded, result, report)
+
+
+def _export(scene: Scene, force: Waveform, duration: float, file: Path) -> None:
+    from tactile_lab.neuro.circuits import write
+    from tactile_lab.neuro.solved import Solved
+
+    solved = Solved.of(
+        scene.circuit, force, duration, start=scene.start, title=scene.name
+    )
+    try:
+        for one in write(solved, file):
+            say(f"written     {one}", sys.stderr)
+    except OSError as error:
+        fail(f"{file} cannot be written: {error.strerror}.", 2)
 
 
 def answer(scene: Scene, result: Result, samples: int | None) -> dict[str, Any]:

@@ -7,6 +7,7 @@ and ``export`` (a run with its signals) or ``write`` (spikes alone, of a run or 
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -67,18 +68,35 @@ def of_whole_run(name: str) -> Any:
     )
 
 
+CIRCUITS = (".brian2.py", ".nestml", ".nir")
+"""Endings of files that ``simulate --export`` writes the circuit to."""
+
+
 def format_of(file: Path) -> str:
     """The format of spikes that a file's ending names.
 
     Raises:
         ParameterError: no format has that ending.
     """
-    for name, one in SPIKES.items():
-        if file.name.endswith(one.ending) and file.name != one.ending:
-            return name
-    known = [f"{one.ending} ({name})" for name, one in SPIKES.items()]
+    names = {one.ending: name for name, one in SPIKES.items()}
+    return names[_ending(file, names, "spikes")]
+
+
+def circuit_format_of(file: Path) -> str:
+    """Which of `CIRCUITS` a file's name ends with.
+
+    Raises:
+        ParameterError: none.
+    """
+    return _ending(file, CIRCUITS, "circuits")
+
+
+def _ending(file: Path, known: Iterable[str], what: str) -> str:
+    for ending in known:
+        if file.name.endswith(ending) and file.name != ending:
+            return ending
     raise ParameterError(
-        f"{file}: no format of spikes ends so. {choices(file.suffix, known, 'Endings')}"
+        f"{file}: no format of {what} ends so. {choices(file.suffix, known, 'Endings')}"
     )
 
 

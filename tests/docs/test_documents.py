@@ -158,3 +158,13 @@ def test_the_skin_of_its_page_is_pressed_and_its_python_runs(tmp_path):
     (source,) = blocks("skin.md", "python")
     (tmp_path / "press.py").write_text(source, encoding="utf-8")
     python("press.py", folder=tmp_path)
+
+
+def test_the_circuit_of_a_taxel_is_written_as_its_page_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (source,) = blocks("neuromorphic.md", "python")
+    exec(source, {})
+    written = {file.name for file in tmp_path.iterdir()}
+    assert written == {
+        "taxel.brian2.py", "taxel.nestml", "taxel.nir", "taxel.force.npz",
+    }  # fmt: skip
