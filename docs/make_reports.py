@@ -48,6 +48,7 @@ STEPS: dict[str, tuple[float, str]] = {
     "study speed": (30, f"{BENCHMARKS}/study_speed.py --out docs/study-figures.md"),
     "study answers": (20, f"{BENCHMARKS}/study_answers.py --out docs/study-answers.md"),
     "study kills": (30, f"{BENCHMARKS}/study_kills.py --out docs/study-kills.md"),
+    "skin": (8, f"{BENCHMARKS}/skin_speed.py --out docs/skin-figures.md"),
     "designs": (10, f"{BENCHMARKS}/design_table.py --out docs/design-figures.md"),
     "window": (25, f"{BENCHMARKS}/window_figures.py --out docs/window-figures.md"),
 }

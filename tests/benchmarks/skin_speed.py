@@ -1,0 +1,237 @@
+"""An array's kernel beside Brian2 and Dormand-Prince, and how its time grows.
+
+``python tests/benchmarks/skin_speed.py --out docs/skin-figures.md``; Brian2 is taken
+from where `make test` installs it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from provenance import provenance
+
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.neuro.solved import Solved
+from tactile_lab.skin import kernel
+from tactile_lab.skin.events import Events
+from tactile_lab.skin.press import press
+from tactile_lab.skin.single import force_of, simulate_taxel
+from tactile_lab.skin.skin import Skin, load_skin
+from tactile_lab.validation.problem import Problem
+from tactile_lab.validation.rivals import DORMAND_PRINCE, stepped
+
+PLATE = {
+    "kind": "texture", "pressure": "100 kPa", "start": "0.2 s", "ramp": "20 ms",
+    "hold": "0.5 s", "period": "1 s",
+}  # fmt: skip
+RIVALS = 64
+"""Taxels that all methods compute."""
+TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
+STEPS = (1e-4, 2e-5, 5e-6)
+SIMULATORS = Path(sys.prefix) / "simulators"
+GROWN = (
+    "taxels", "solved", "fired", "spikes", "CPU time", "a solved taxel", "a spike",
+    "wall time", "times real time", "load",
+)  # fmt: skip
+HEADS = ("method", "setting", "spikes", "largest error of a time", "CPU time", "ratio")
+
+
+def plate(rows: int, columns: int, seconds: int, firm: bool = True) -> Skin:
+    """An array under a rough plate that is pressed once a second."""
+    load = {**PLATE, "times": seconds}
+    if not firm:  # a ball on a corner: most taxels stay silent
+        load = {
+            "kind": "sphere", "force": "2 N", "radius": "5 mm", "start": "0.2 s",
+            "ramp": "20 ms", "hold": "0.5 s", "times": seconds, "period": "1 s",
+        }  # fmt: skip
+    return load_skin(
+        {
+            "duration": f"{seconds} s",
+            "sensor": {"preset": "fig5b"},
+            "array": {"grid": [rows, columns], "pitch": "1.5 mm"},
+            "stimulus": [load],
+        }
+    )
+
+
+def pressed(skin: Skin, cores: int | None = None) -> tuple[Events, float, float]:
+    """Its events, CPU time and wall time spent, s."""
+    folder = Path(tempfile.mkdtemp())
+    before, began = time.process_time(), time.perf_counter()
+    press(skin, folder, cores=cores)
+    took = time.perf_counter() - began
+    return Events.read(folder), time.process_time() - before, took
+
+
+def apart(found: list[np.ndarray], true: list[np.ndarray]) -> float:
+    """Largest error of a spike time, s; infinite where a train has another number."""
+    return max(
+        float(np.max(np.abs(a - b), initial=0.0)) if a.size == b.size else np.inf
+        for a, b in zip(found, true, strict=True)
+    )
+
+
+def brian2(skin: Skin, taxels: range, step: float) -> tuple[list[np.ndarray], float]:
+    """Trains and the time of the compiled program's run, which has one thread, s."""
+    solved = [
+        Solved.of(skin.circuit_of(n), force_of(skin, n), skin.duration) for n in taxels
+    ]
+    columns = {
+        name: [one.parameters[name] for one in solved] for name in solved[0].parameters
+    } | {name: [one.first[name] for one in solved] for name in ("V_C1", "I_C", "V_C2")}
+    columns["tau_L"] = [one.circuit.tau_L for one in solved]
+    with tempfile.TemporaryDirectory() as folder:
+        given, answer = Path(folder) / "in.npz", Path(folder) / "out.npz"
+        np.savez(
+            given, duration=skin.duration, **columns,
+            points=[one.force.time.size for one in solved],
+            time=np.concatenate([one.force.time for one in solved]),
+            force=np.concatenate([one.force.value for one in solved]),
+        )  # fmt: skip
+        script = Path(__file__).with_name("skin_brian2.py")
+        words = [sys.executable, str(script), str(given), str(answer), str(step)]
+        subprocess.run(
+            words, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": str(SIMULATORS)},
+        )  # fmt: skip
+        got = np.load(answer)
+    trains = [np.sort(got["time"][got["taxel"] == k]) for k in range(len(solved))]
+    return trains, float(got["spent"])
+
+
+def rivals(seconds: int) -> tuple[list[str], int]:
+    """Rows of the table of methods, and the number of spikes."""
+    skin, taxels = plate(8, RIVALS // 8, seconds), range(RIVALS)
+    true = [
+        simulate(
+            skin.circuit_of(n), force_of(skin, n), until=skin.duration, tolerance=1e-12
+        ).spike_times
+        for n in taxels
+    ]
+    count = sum(train.size for train in true)
+    pressed(skin, cores=1)  # compiles, or loads what was
+    events, ours, _ = min(
+        (pressed(skin, cores=1) for _ in range(3)), key=lambda r: r[1]
+    )
+
+    def row(name: str, setting: str, trains: list[np.ndarray], took: float) -> str:
+        error, spikes = apart(trains, true), sum(t.size for t in trains)
+        told = f"{error:.1e} s" if np.isfinite(error) else "another number of spikes"
+        return (
+            f"| {name} | {setting} | {spikes:,} | {told} | {took * 1e3:,.1f} ms | "
+            f"{took / ours:,.1f} |"
+        )
+
+    rows = [row("Tactile Lab, with forces and file", "1 ns", events.trains(), ours)]
+    problems = [
+        Problem(str(n), skin.circuit_of(n), force_of(skin, n), skin.duration)
+        for n in taxels
+    ]
+    stepped(problems[0], 60.0, DORMAND_PRINCE, 1e-6)
+    for tolerance in TOLERANCES:
+        began = time.process_time()
+        found = [
+            stepped(one, 60.0, DORMAND_PRINCE, tolerance).spike_times
+            for one in problems
+        ]
+        took = time.process_time() - began
+        rows.append(row("Dormand-Prince 5(4), numba", f"{tolerance:g}", found, took))
+        print(rows[-1], flush=True)
+    for step in STEPS:
+        found, took = brian2(skin, taxels, step)
+        rows.append(row("Brian2, C++ standalone, RK4", f"{step:g} s", found, took))
+        print(rows[-1], flush=True)
+    return rows, count
+
+
+def growth(seconds: int) -> list[str]:
+    """CPU time of arrays of several sizes."""
+    rows = []
+    for side, firm in ((25, True), (50, True), (100, True), (100, False), (200, False)):
+        skin = plate(side, side, seconds, firm)
+        events, cpu, wall = pressed(skin)
+        active = int((events.role <= kernel.SILENT).sum())
+        fired, spikes = int((events.count > 0).sum()), int(events.count.sum())
+        rows.append(
+            f"| {side * side:,} | {active:,} | {fired:,} | {spikes:,} | {cpu:.2f} s | "
+            f"{cpu / active * 1e6:.0f} µs | {cpu / max(spikes, 1) * 1e6:.2f} µs | "
+            f"{wall:.2f} s | {skin.duration / wall:.1f} | {os.getloadavg()[0]:.1f} |"
+        )
+        print(rows[-1], flush=True)
+    return rows
+
+
+def equal(seconds: int, count: int, seed: int) -> int:
+    """How many of `count` random taxels of 10,000 equal their single simulation."""
+    skin = plate(100, 100, seconds)
+    events, _, _ = pressed(skin)
+    trains = events.trains()
+    chosen = np.random.default_rng(seed).choice(skin.array.size, count, replace=False)
+    return sum(
+        np.array_equal(trains[n], simulate_taxel(skin, int(n)).spike_times)
+        for n in chosen
+    )
+
+
+def main() -> None:
+    """Measure and print or write the tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seconds", type=int, default=4)
+    parser.add_argument("--taxels", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path)
+    asked = parser.parse_args()
+    simulate(Circuit(), force_of(plate(2, 2, 1), 0), until=1.0)
+    rows, count = rivals(asked.seconds)
+    grown = growth(asked.seconds)
+    same = equal(asked.seconds, asked.taxels, asked.seed)
+    text = f"""# An array's kernel beside others, and how its time grows
+
+{provenance()}. Made by `tests/benchmarks/skin_speed.py`. Sensors of preset fig5b,
+each a specimen of its own, under a rough plate pressed once a second for
+{asked.seconds} s.
+
+## The same equations by others
+
+{RIVALS} taxels, {count:,} spikes, one thread each. Errors are against our solver at
+1e-12 s. CPU time of ours is that of the whole `press` on one core, forces and file
+included; of the others that of the solution alone, compiling and the force left out.
+Dormand-Prince is compiled as ours is, has V_P in closed form, starts anew at each point
+of the force and locates spikes on its dense output. Brian2 (for its runs wall time, one
+thread) is given a spike's place inside its step; ratios of one run on one machine, load
+{os.getloadavg()[0]:.0f}.
+
+| {" | ".join(HEADS)} |
+{"|---" * len(HEADS)}|
+{chr(10).join(rows)}
+
+## Growth
+
+"Solved" are the taxels that could come to threshold, "fired" those of them that did;
+the last two rows are a ball on one spot, where nearly all taxels are left out.
+CPU times hold forces, events and the file.
+
+| {" | ".join(GROWN)} |
+{"|---" * len(GROWN)}|
+{chr(10).join(grown)}
+
+## To the last bit
+
+{same:,} of {asked.taxels:,} random taxels (seed {asked.seed}) of the array of 10,000
+have the spike times of their single simulation to the last bit.
+"""
+    if asked.out:
+        asked.out.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
