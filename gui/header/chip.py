@@ -106,6 +106,9 @@ class Chip(QWidget):
         self._detail.setVisible(bool(view.detail) and room is Room.FULL)
         layout = self.layout()
         assert layout is not None
+        bare = room is Room.BARE
+        layout.setContentsMargins(*((6, 4, 7, 4) if bare else (10, 4, 11, 4)))
+        layout.setSpacing(2 if bare else 9)
         layout.invalidate()
         layout.activate()  # its size is asked for at once
         self.updateGeometry()

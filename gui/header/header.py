@@ -26,8 +26,8 @@ _CLOCK_COLOURS = {
 }
 
 
-WHOLE, SHORT = 190, 120
-"""Widths of the title, px: that of a run's name, and the least."""
+WHOLE, SHORT, LEAST = 190, 120, 40
+"""Widths of the title, px: that of a run's name, a short one's, and the least."""
 
 
 class Header(QFrame):
@@ -47,6 +47,7 @@ class Header(QFrame):
         self.stop = StopButton()
         self.badge = label("SIMULATED BENCH", "sim")
         self.badge.setAccessibleName("This bench is simulated")
+        self._name = label("Tactile Lab", "hidentity")
         self._title = Elided("", "hsub")
         self._title.setMinimumWidth(WHOLE)
         self._state = QLabel()
@@ -117,7 +118,8 @@ class Header(QFrame):
             bare = room is Room.BARE
             self._buttons[0].setVisible(room is Room.FULL)
             self._buttons[2].setVisible(not bare)
-            least = WHOLE if room is Room.FULL else SHORT
+            self._name.setVisible(not bare)  # six chips, and it is no news
+            least = {Room.FULL: WHOLE, Room.SHORT: SHORT, Room.BARE: LEAST}[room]
             self._title.setMinimumWidth(least)
             self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
             layout.invalidate()
@@ -165,9 +167,8 @@ class Header(QFrame):
     def _lay_out(self) -> None:
         logo = QLabel()
         logo.setPixmap(pixmap("logo", look.LAMP_BLUE, 26))
-        name = label("Tactile Lab", "hidentity")
-        name.font().setWeight(QFont.Weight.DemiBold)
-        first = row(name, self.badge, STRETCH, spacing=9)
+        self._name.font().setWeight(QFont.Weight.DemiBold)
+        first = row(self._name, self.badge, STRETCH, spacing=9)
         words = lines(first, self._title, spacing=3)
         words.setContentsMargins(0, 13, 0, 11)
         clock = lines(self._state, self._clock, spacing=1)

@@ -15,6 +15,10 @@ VIEWS = (
     InstrumentView("Teslameter", Lamp.ACTIVE, "LSCI MODEL425", "8.78 mT"),
     InstrumentView("Model", Lamp.WARNING, "beside the run", "NRMSE 12.3 %"),
 )
+SOURCED = (
+    InstrumentView("Source of V_th", Lamp.ACTIVE, "to hold 3.213 V", "3.2130 V"),
+    InstrumentView("Source of V_GS", Lamp.ACTIVE, "to hold 1.4051 V", "1.40512 V"),
+)
 SHOWN = Snapshot(WindowState.RUNNING, "bench", True, "2026-11-21_120000_demo")
 
 
@@ -30,12 +34,12 @@ def header(lab) -> Iterator[Header]:
 
 
 @pytest.mark.parametrize("width", [1180, 1280, 1400, 1600, 1720])
-@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_no_chip_is_cut_at_any_width(
     app: QApplication, header: Header, width: int, count: int
 ) -> None:
     header.resize(width, 68)
-    header.render_snapshot(replace(SHOWN, instruments=VIEWS[-count:]))
+    header.render_snapshot(replace(SHOWN, instruments=(*SOURCED, *VIEWS)[-count:]))
     app.processEvents()
     assert len(header.chips) == count
     assert header.minimumSizeHint().width() <= width
