@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("skin", type=click.Path(path_type=Path))
+@click.argument("skin", type=click.Path(path_type=Path), required=False)
 @click.option(
     "--plan", "only_plan", is_flag=True, help="Say what it is; compute nothing."
 )
@@ -54,20 +54,52 @@ if TYPE_CHECKING:
 @click.option(
     "--window", is_flag=True, help="Show it in a window as it is computed; no page."
 )
+@click.option(
+    "--dataset",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Instead of SKIN: make a benchmark data set of touches, and score it.",
+)
+@click.option(
+    "--touches",
+    type=click.IntRange(8, 100_000),
+    default=160,
+    show_default=True,
+    metavar="N",
+    help="Of each task of the data set, for training and again for test.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**31),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Of the data set.",
+)
 @json_option
 def command(
-    skin: Path,
+    skin: Path | None,
     only_plan: bool,
     out: Path,
     cores: int | None,
     exports: tuple[Path, ...],
     window: bool,
+    dataset: Path | None,
+    touches: int,
+    seed: int,
     as_json: bool,
 ) -> None:
     """Press on the array of sensors that SKIN, a TOML file, describes.
 
     Writes the spikes of all taxels in order of time, and a page with a film of them.
     """
+    if dataset is not None and skin is None:
+        if window or only_plan or exports:
+            raise click.UsageError("--dataset takes no --window, --plan or --export.")
+        _make_dataset(dataset, touches, seed, cores, as_json)
+        return
+    if skin is None or dataset is not None:
+        raise click.UsageError("Give SKIN, a TOML file, or --dataset FOLDER.")
     if window:
         _show(skin, out, only_plan, cores, exports, as_json)
         return
@@ -121,6 +153,52 @@ def _show(skin: Path, out: Path, *others: object) -> None:
     with refusing():
         gui: click.Command = plugged_in("tactile_lab.verbs", "gui")
     gui.main(["--skin", str(skin), "--out", str(out)], standalone_mode=False)
+
+
+def _make_dataset(
+    folder: Path, touches: int, seed: int, cores: int | None, as_json: bool
+) -> None:
+    with refusing():
+        from tactile_lab.skin.card import write_card
+        from tactile_lab.skin.dataset import FILE, LABELS, make
+        from tactile_lab.skin.decoder import coding, energy_per_spike, require_libraries
+
+        require_libraries()
+        with ProgressLine(2 * touches * len(LABELS), "touches") as line:
+            data = make(seed, touches, cores=cores, tell=line.update)
+        data.write(folder)
+        with working("scoring"):
+            codings = {task: coding(data, task) for task in LABELS}
+            energy = energy_per_spike(data)
+        made = f"Made by tactile-lab skin --dataset with --seed {seed}"
+        card = write_card(folder, data, codings, energy, made)
+    if as_json:
+        print_json(
+            {
+                "file": str(folder / FILE),
+                "card": str(card),
+                "touches": data.task.size,
+                "spikes": data.time.size,
+                "tasks": {
+                    task: {
+                        "score": one.score.value,
+                        "score_95": [one.score.low, one.score.high],
+                        "chance": one.chance,
+                        "information_bit": one.information,
+                    }
+                    for task, one in codings.items()
+                },
+                "energy_per_spike_J": energy[0],
+            }
+        )
+        return
+    say(f"{data.task.size:,} touches, {data.time.size:,} spikes")
+    for task, one in codings.items():
+        say(
+            f"{task:<12}{one.score.value:.1%} right ({one.score.low:.1%} to "
+            f"{one.score.high:.1%}, 95 %), chance {one.chance:.1%}"
+        )
+    say(f"{'card':<12}{card}")
 
 
 def _print_plan(skin: Skin, force: float) -> None:

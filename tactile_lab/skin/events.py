@@ -74,7 +74,7 @@ class EventWriter:
         begin = 0
         for path, end in zip(self._parts, ends, strict=True):
             if end > begin:
-                with _recording(), path.open("ab") as file:
+                with recording(), path.open("ab") as file:
                     file.write(events[order[begin:end]].tobytes())
             begin = end
         self._count += times.size
@@ -90,7 +90,7 @@ class EventWriter:
             RecordingError: it cannot be written.
         """
         partial = self._path.with_suffix(".part")
-        with _recording(), h5py.File(partial, "w") as file:
+        with recording(), h5py.File(partial, "w") as file:
             stored = {
                 name: file.create_dataset(
                     name, (self._count,), EVENT[name], chunks=True, shuffle=True,
@@ -113,7 +113,7 @@ class EventWriter:
 
 
 @contextmanager
-def _recording() -> Iterator[None]:
+def recording() -> Iterator[None]:
     """Turn a failing disk into an error of the tree."""
     try:
         yield

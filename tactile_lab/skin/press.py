@@ -100,7 +100,7 @@ def press(
             while blocks and len(waiting) < AHEAD * cores:
                 part = blocks.popleft()
                 waiting.append(
-                    (part, pool.submit(_block, skin, loads, part, role[part]))
+                    (part, pool.submit(solve_block, skin, loads, part, role[part]))
                 )
             part, future = waiting.popleft()
             try:
@@ -139,7 +139,7 @@ def press(
     return Pressed(int(count.sum()), told, worst, seconds, warnings(skin, most))
 
 
-def _block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) -> Any:
+def solve_block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) -> Any:
     """Numbers of spikes and pieces, forces, errors, spikes; fills `role` in."""
     array, circuit = skin.array, skin.circuit
     taxels = np.arange(part.start, part.stop)
