@@ -67,9 +67,11 @@ def under_sphere(P: float, radius_per_modulus: float, r: float, z: float) -> flo
 
 
 @inner
-def beside_edge(v: float, z: float) -> float:
-    """Under pressure 1 on all that lies beyond an edge v, m, away: from -1/2 to 1/2."""
-    return (math.atan(v / z) + v * z / (v * v + z * z)) / math.pi
+def under_strip(near: float, far: float, z: float) -> float:
+    """Under pressure 1 on a strip whose edges lie `near` and `far` behind, m."""
+    angle = math.atan2(z * (near - far), z * z + near * far)
+    edges = near / (near * near + z * z) - far / (far * far + z * z)
+    return (angle + z * edges) / math.pi
 
 
 @inner
@@ -83,8 +85,7 @@ def stress(load: FloatArray, strength: float, x: float, y: float, z: float) -> f
         return under_punch(strength, load[SHAPE_1], math.hypot(dx, dy), z)
     if kind == STRIP:
         u = dx * load[SHAPE_1] + dy * load[SHAPE_2]
-        nearer = beside_edge(u - load[SHAPE_3], z)
-        return strength * (nearer - beside_edge(u - load[SHAPE_4], z))
+        return strength * under_strip(u - load[SHAPE_3], u - load[SHAPE_4], z)
     if kind == WAVE:
         k = math.hypot(load[SHAPE_1], load[SHAPE_2])
         wave = math.cos(load[SHAPE_1] * dx + load[SHAPE_2] * dy + load[SHAPE_3])

@@ -24,7 +24,7 @@ from tactile_lab.model.transistor import (
     T1_C1,
     T1_C2,
 )
-from tactile_lab.skin.forces import SOURCES, force_on, thinned
+from tactile_lab.skin.forces import SAMPLED, SOURCES, force_on, thinned
 
 FIRED, SILENT, UNTOUCHED, DEAD, STUCK, REFUSED = range(6)
 """What became of a taxel: it fired; it was solved and did not; it was not solved, for
@@ -131,10 +131,10 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
                 continue
             t, F = force_on(
                 places[i, 0], places[i, 1], depth, area, rows, owner, courses, time,
-                framed[i], 0.5 * force_error,
+                framed[i], SAMPLED * force_error,
             )  # fmt: skip
             largest[i] = F.max()
-            pieces[i] = thinned(t, F, 0.5 * force_error)
+            pieces[i] = thinned(t, F, (1.0 - SAMPLED) * force_error)
             t, F = t[: pieces[i]], F[: pieces[i]]
             k_F = numbers_of(many[i], direct, par)
             par[SATURATES] = 1.0 if saturates else 0.0
