@@ -48,7 +48,7 @@ DEFAULT_SCOPE = "rigol-ds1000z"
 def _source(table: CoilSpec, clock: Clock) -> CoilSource:
     from drivers.coil.source import CoilSource
 
-    row = coil_dialect(table.dialect).waiting(table.timeout)
+    row = coil_dialect(table.dialect)
     return CoilSource(
         row,
         table.port,
@@ -140,14 +140,13 @@ def usbtmc_dialect(table: ScopeSpec) -> ScopeDialect:
 def _teslameter(table: FieldMeterSpec, clock: Clock) -> Teslameter:
     from drivers.teslameter import Teslameter
 
-    row = meter_dialect(table.dialect).waiting(table.timeout)
-    return Teslameter(row, table.port, clock, baud=table.baud)
+    return Teslameter(meter_dialect(table.dialect), table.port, clock, baud=table.baud)
 
 
 def _source_meter(table: VoltageSourceSpec, clock: Clock) -> SourceMeter:
     from drivers.voltage_source import SourceMeter
 
-    row = voltage_dialect(table.dialect).waiting(table.timeout)
+    row = voltage_dialect(table.dialect)
     return SourceMeter(
         table.name, row, table.port, table.limits, clock, baud=table.baud
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -197,13 +197,6 @@ class SerialDialect(Dialect):
     def verified(self, line: str) -> tuple[str, ...]:
         """`line` with the error query behind it."""
         return (line,) if self.error is None else (line, self.error)
-
-    def waiting(self, timeout: float | None) -> Self:
-        """The same where a link wants another timeout, s; as it is where None."""
-        if timeout is None:
-            return self
-        serial = self.serial.model_copy(update={"timeout": timeout})
-        return self.model_copy(update={"serial": serial})
 
 
 class SourceDialect(SerialDialect):

@@ -47,8 +47,6 @@ Located = AfterValidator(_located)
 
 Port = Annotated[str, Field(min_length=1)]
 Baud = Annotated[int, Field(ge=50, le=4_000_000)]
-Timeout = Annotated[float, Unit("s", above=0.0, most=0.8)]
-"""The guard kills a program that is silent for 1 s: no answer is waited for so long."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +72,6 @@ class CoilSpec(SceneTable):
         dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
-        timeout: longest wait for an answer, s, where the link is slow; the same.
         options: keys of the driver's own.
         limits: each narrows what model and coil allow.
         generator: how the scope's generator is wired to it; None: it is not.
@@ -84,7 +81,6 @@ class CoilSpec(SceneTable):
     dialect: Annotated[str, Located] = "kepco-bop"
     port: Port = "sim://coil"
     baud: Baud | None = None
-    timeout: Timeout | None = None
     options: dict[str, Any] = field(default_factory=dict)
     limits: CoilLimits = field(default_factory=CoilLimits)
     generator: GeneratorWiring | None = None
@@ -162,7 +158,6 @@ class FieldMeterSpec(SceneTable):
         dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
-        timeout: longest wait for an answer, s, where the link is slow; the same.
         options: keys of the driver's own.
     """
 
@@ -170,7 +165,6 @@ class FieldMeterSpec(SceneTable):
     dialect: Annotated[str, Located] = "lakeshore-425"
     port: Port = "sim://field_meter"
     baud: Baud | None = None
-    timeout: Timeout | None = None
     options: dict[str, Any] = field(default_factory=dict)
 
 
@@ -184,7 +178,6 @@ class VoltageSourceSpec(SceneTable):
         dialect: id of one that ships, or path of a TOML file with one.
         port: serial port or pyserial URL.
         baud: symbols a second; the row's own unless given.
-        timeout: longest wait for an answer, s, where the link is slow; the same.
         options: keys of the driver's own.
         limits: what may be asked of it.
     """
@@ -194,7 +187,6 @@ class VoltageSourceSpec(SceneTable):
     dialect: Annotated[str, Located] = "keithley-2400-voltage"
     port: Port = "sim://voltage_source"
     baud: Baud | None = None
-    timeout: Timeout | None = None
     options: dict[str, Any] = field(default_factory=dict)
     limits: VoltageLimits
 

@@ -48,6 +48,8 @@ class Frames(SceneTable):
             found = np.load(Path(self.file), mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError) as reason:
             raise SceneError(f"{self.file} is no .npy file: {reason}.") from reason
+        if not isinstance(found, np.ndarray):
+            raise SceneError(f"{self.file} is an archive; give one array as .npy.")
         numbers = found.dtype.kind in "fiu" and 0 not in found.shape
         if found.ndim not in (2, 3) or not numbers:
             raise SceneError(

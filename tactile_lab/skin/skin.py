@@ -13,6 +13,7 @@ from pydantic import Field
 from tactile_lab.complaint import validated
 from tactile_lab.errors import ParameterError, SceneError, choices
 from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.need import checked_tolerance
 from tactile_lab.model.specimen import specimen
 from tactile_lab.quantity import Duration, Unit
 from tactile_lab.scene.load import read_toml, tuples
@@ -21,6 +22,9 @@ from tactile_lab.skin.frames import Frames
 from tactile_lab.skin.layout import Array
 from tactile_lab.skin.stimulus import KINDS, Stimulus
 from tactile_lab.table import SceneTable
+
+MOST_STUCK = 1e8
+"""Most spikes of stuck taxels, which nothing else bounds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +134,16 @@ def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
     sensor = validated(Sensor, given, ("sensor",), blame)
     if sensor.start != "equilibrium":
         raise SceneError(f"{origin}: [sensor] start: taxels start at equilibrium.")
+    try:
+        checked_tolerance(table.tolerance)
+    except ParameterError as reason:
+        raise SceneError(f"{origin}: {reason}") from reason
+    told = len(table.array.stuck) * table.array.stuck_rate * table.duration
+    if told > MOST_STUCK:
+        raise SceneError(
+            f"{origin}: stuck taxels would fire {told:.3g} times; at most "
+            f"{MOST_STUCK:.0e} are possible. Make stuck_rate or duration smaller."
+        )
     stimuli: list[Stimulus] = []
     frames: list[Frames] = []
     for number, one in enumerate(table.stimulus):

@@ -66,6 +66,10 @@ def test_a_stimulus_that_cannot_be_is_refused(stimulus, why):
 
 
 def test_what_arrays_cannot_do_is_said():
+    with pytest.raises(SceneError, match="tolerance"):
+        skin(tolerance="1e-20 s")
+    with pytest.raises(SceneError, match="stuck taxels would fire 1e"):
+        skin({"grid": [2, 2], "stuck": [1], "stuck_rate": "10 kHz"}, duration="1e9 s")
     with pytest.raises(SceneError, match="start"):
         skin(sensor={"start": {"V_P": "0 V", "V_C1": "0 V", "V_C2": "0 V"}})
 
@@ -91,6 +95,12 @@ def test_frames_that_do_not_fit_are_refused(tmp_path, made, why):
             },
             folder=tmp_path,
         )
+
+
+def test_an_archive_of_frames_is_refused(tmp_path):
+    np.savez(tmp_path / "f.npz", a=np.zeros((3, 20)))
+    with pytest.raises(SceneError, match="is an archive"):
+        skin(stimulus={"kind": "frames", "file": str(tmp_path / "f.npz")})
 
 
 def test_braille_is_as_printed():
