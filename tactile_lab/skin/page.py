@@ -18,6 +18,7 @@ from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.html import picture, rendered
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.press import Pressed
+from tactile_lab.skin.receptive import receptive_plot
 from tactile_lab.skin.skin import Skin
 
 CELLS = 4_000_000
@@ -36,10 +37,11 @@ def write_page(skin: Skin, events: Events, done: Pressed, folder: Path) -> Path:
     Raises:
         OSError: the folder cannot be written.
     """
-    plot = raster(events)
+    plots = [raster(events)]
+    if skin.stimuli and events.time.shape[0]:
+        plots.append(receptive_plot(skin, events))
     size = skin.array.size
     subtitle = f"{size:,} taxels · {show(skin.duration, 's')}"
-    figure = draw(plot, skin.title, subtitle, simulated=True)
     film = _film(skin, events)
     text = rendered(
         "skin.html",
@@ -54,7 +56,17 @@ def write_page(skin: Skin, events: Events, done: Pressed, folder: Path) -> Path:
         },
         warnings=done.warnings,
         film=film,
-        pictures=[picture(skin.title, plot, save(figure, folder / plot.name)[1])],
+        pictures=[
+            picture(
+                skin.title,
+                plot,
+                save(
+                    draw(plot, skin.title, subtitle, simulated=True),
+                    folder / plot.name,
+                )[1],
+            )
+            for plot in plots
+        ],
         settings=settings(skin),
         none="none",
         made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC. Spike times are as "

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError, TactileLabError
-from tactile_lab.model.batch import certain, records
+from tactile_lab.model.batch import Records, certain, records
 from tactile_lab.model.circuit import (
     LARGEST_VOLTAGE,
     SUBTHRESHOLD_LIMIT,
@@ -152,14 +152,7 @@ def solve_block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) 
     for taxel in taxels[~certain(circuit, many, None)]:
         with _saying(f"Taxel {taxel}"):
             skin.circuit_of(int(taxel))
-    run = kernel.run_saturating if circuit.saturation else kernel.run
-    found = run(
-        many, circuit.t1 == "direct", role, array.stuck_rate,
-        array.places[part], array.depth, array.side**2, loads.time, loads.rows,
-        loads.owner, loads.courses, loads.framed(part),
-        skin.force_error, skin.duration, skin.tolerance,
-        MOST_COUPLED if circuit.saturation else MOST_SPIKES,
-    )  # fmt: skip
+    found = solved(skin, loads, many, array.places[part], loads.framed(part), role)
     refused = taxels[role == kernel.REFUSED]
     if refused.size:
         taxel = int(refused[0])
@@ -167,6 +160,21 @@ def solve_block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) 
         with _saying(f"Taxel {taxel}, pressed with up to {force}"):
             simulate_taxel(skin, taxel)
     return found
+
+
+def solved(
+    skin: Skin, loads: Loads, many: Records, places: FloatArray, framed: FloatArray,
+    role: NDArray[np.uint8],
+) -> Any:  # fmt: skip
+    """Numbers of spikes and pieces, forces, errors, spikes of circuits at places, m."""
+    array, saturates = skin.array, skin.circuit.saturation
+    run = kernel.run_saturating if saturates else kernel.run
+    return run(
+        many, skin.circuit.t1 == "direct", role, array.stuck_rate, places, array.depth,
+        array.side**2, loads.time, loads.rows, loads.owner, loads.courses, framed,
+        skin.force_error, skin.duration, skin.tolerance,
+        MOST_COUPLED if saturates else MOST_SPIKES,
+    )  # fmt: skip
 
 
 @contextmanager

@@ -138,10 +138,10 @@ def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
         checked_tolerance(table.tolerance)
     except ParameterError as reason:
         raise SceneError(f"{origin}: {reason}") from reason
-    told = len(table.array.stuck) * table.array.stuck_rate * table.duration
-    if told > MOST_STUCK:
+    without_end = len(table.array.stuck) * table.array.stuck_rate * table.duration
+    if without_end > MOST_STUCK:
         raise SceneError(
-            f"{origin}: stuck taxels would fire {told:.3g} times; at most "
+            f"{origin}: stuck taxels would fire {without_end:.3g} times; at most "
             f"{MOST_STUCK:.0e} are possible. Make stuck_rate or duration smaller."
         )
     stimuli: list[Stimulus] = []

@@ -10,6 +10,7 @@ from tactile_lab.skin import kernel
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.press import highest, press
+from tactile_lab.skin.receptive import receptive_field
 from tactile_lab.skin.single import force_of, simulate_taxel
 from tactile_lab.skin.skin import load_skin
 
@@ -112,6 +113,19 @@ def test_the_force_is_as_true_as_asked(pressed):
         assert np.abs(coarse.at(at) - exact.at(at)).max() < 1.01 * skin.force_error
         assert coarse.time.size < exact.time.size
     assert loads.largest(np.array([0.5])) > 0.01
+
+
+def test_a_receptive_field_is_the_array_with_its_stimuli_moved():
+    ball = {"kind": "sphere", "force": "1 N", "start": "50 ms"}
+    skin = load_skin({**SLIDE, "duration": "0.3 s", "stimulus": [ball]})
+    moved, count, force = receptive_field(skin, 45, 0)
+    k = int(np.argmax(count)) + 3
+    there = {**ball, "at": [f"{moved[k]} m", "0 m"]}
+    alone = load_skin({**SLIDE, "duration": "0.3 s", "stimulus": [there]})
+    assert simulate_taxel(alone, 45).spike_times.size == count[k] > 0
+    assert count.max() > count[k] and count[0] < count.max()
+    nearest = np.argmin(np.abs(moved - skin.array.places[45, 0]))
+    assert force.argmax() == nearest
 
 
 def test_frames_are_the_force_on_each_taxel(tmp_path):
