@@ -3,12 +3,15 @@
 ``make reports`` runs this. It first says how long that takes, does only what is not
 done yet at this commit, and so goes on where it was stopped; the long campaigns among
 them keep their own rows too. Words choose those whose names contain one of them:
-``.venv/bin/python docs/make_reports.py paper plan``.
+``.venv/bin/python docs/make_reports.py paper plan``. ``--pages`` measures nothing: it
+lists each page with the commits it was measured at, and how many commits have changed
+the code it measures since.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -55,6 +58,42 @@ STEPS: dict[str, tuple[float, str]] = {
 """What to run by its name, and the minutes it is thought to take on two cores with
 nothing else running; once it has run here, what it took here counts."""
 NEEDS = {"saturation": "ngspice"}
+SOLVER = "tactile_lab/model"
+RUNS = (
+    "tactile_lab/acquisition tactile_lab/engine tactile_lab/spikes tactile_lab/store "
+    "drivers sim_backend"
+)
+TOLD = f"tactile_lab/analysis protocols {SOLVER} {RUNS}"
+PAGES = {
+    "accuracy": f"{SOLVER} tactile_lab/validation",
+    "honesty": f"{SOLVER} tactile_lab/validation",
+    "stability": f"{SOLVER} tactile_lab/validation",
+    "saturation": SOLVER,
+    "fit-recovery": f"{SOLVER} tactile_lab/analysis",
+    "bench-coverage": TOLD,
+    "paper": f"{TOLD} tactile_lab/report",
+    "surprise-figures": TOLD,
+    "plan-figures": f"tactile_lab/planning {RUNS}",
+    "protocol-figures": f"protocols tactile_lab/report {RUNS}",
+    "detection-figures": "tactile_lab/spikes",
+    "detection-oracles": "tactile_lab/spikes",
+    "store-figures": "tactile_lab/store",
+    "kill-figures": "tactile_lab/store",
+    "kill-verb-figures": "tactile_lab/store tactile_lab/commands",
+    "streaming-figures": RUNS,
+    "serial-figures": "drivers sim_backend tactile_lab/acquisition",
+    "force-figures": "drivers sim_backend tactile_lab/acquisition",
+    "scope-figures": "drivers sim_backend",
+    "fault-figures": RUNS,
+    "fuzz-figures": "tactile_lab/scene tactile_lab/commands",
+    "study-figures": "tactile_lab/studies",
+    "study-answers": f"tactile_lab/studies {SOLVER}",
+    "study-kills": "tactile_lab/studies",
+    "design-figures": f"tactile_lab/studies {SOLVER}",
+    "window-figures": "gui",
+}
+"""What each page measures: if that has changed since, it may be out of date."""
+HASH = r"\b(?=[0-9a-f]*[0-9])(?=[0-9a-f]*[a-f])[0-9a-f]{7}\b"
 
 
 def commit() -> str:
@@ -63,8 +102,34 @@ def commit() -> str:
     return subprocess.check_output(asked, cwd=ROOT, text=True).strip()
 
 
+def since(version: str, paths: str) -> str:
+    """How many commits after `version` changed any of these paths; "" if it is none."""
+    asked = ["git", "rev-list", "--count", f"{version}..HEAD", "--", *paths.split()]
+    told = subprocess.run(asked, cwd=ROOT, text=True, capture_output=True, check=False)
+    return told.stdout.strip()
+
+
+def pages() -> str:
+    """Which page is of which commits, and what has changed since the oldest of them."""
+    lines = [
+        "| page | measured at | commits since to what it measures |",
+        "|---|---|---|",
+    ]
+    for name, paths in PAGES.items():
+        text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+        found = dict.fromkeys(re.findall(HASH, text))
+        counts = {one: int(n) for one in found if (n := since(one, paths))}
+        told = ", ".join(counts) or "not said"
+        most = max(counts.values(), default=None)
+        lines.append(f"| {name} | {told} | {'unknown' if most is None else most} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Say how long it takes, then do what is left."""
+    if "--pages" in sys.argv:
+        print(pages())
+        return
     version, words = commit(), sys.argv[1:]
     known = json.loads(DONE.read_text()) if DONE.exists() else {}
     wanted = [n for n in STEPS if not words or any(word in n for word in words)]
