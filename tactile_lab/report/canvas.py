@@ -303,8 +303,8 @@ def _look(s: Series, count: int) -> Any:
         "dots": {"marker": "o", "ls": "", "ms": min(size, 3.2), "mew": 0},
         "points": {"marker": "o", "ls": "", "ms": size, "mew": 0},
         "open": {"marker": "o", "ls": "", "ms": size, "mew": 1.2, "mfc": PAPER.light},
-        "up": {"marker": "^", "ms": 4, "mew": 0, "lw": 0.8},
-        "down": {"marker": "v", "ms": 4, "mew": 0, "lw": 0.8},
+        "up": {"marker": "^", "ls": "", "ms": 4, "mew": 0},
+        "down": {"marker": "v", "ls": "", "ms": 4, "mew": 0},
         "joined": {"marker": "o", "ms": 0.8 * size, "mew": 0, "lw": 0.8},
     }
     return looks.get(s.mark, {"lw": 1.6})

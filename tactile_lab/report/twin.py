@@ -193,7 +193,7 @@ def twin_plot(run: Measurement, twin: Twin) -> Plot | None:
         caption="Measured less model, the model driven by the applied current. "
         f"{parts} Shaded: the tolerance, what codes, clocks and what the bench "
         "states of followers, lag, force and temperature leave open (95 %). Triangles: "
-        "beyond the panel.",
+        "beyond the panel, line or tolerance.",
         x_label=axis.label,
         x_unit="s",
         x_prefix="",
@@ -229,16 +229,18 @@ def _voltage(
     )
     series = _tolerated(time, difference, tolerance, "line")
     most = most or 1e-3
-    return "V_C1", "V", (*series, *_beyond(time, difference, most)), most
+    return "V_C1", "V", (*series, *_beyond(time, difference, most, "V_C1")), most
 
 
-def _beyond(time: FloatArray, value: FloatArray, most: float) -> Iterator[Series]:
-    """Triangles at the edge of the panel where the line goes on beyond it."""
+def _beyond(
+    time: FloatArray, value: FloatArray, most: float, colour: str
+) -> Iterator[Series]:
+    """Triangles at the edge of the panel where what is drawn goes on beyond it."""
     for mark, outside in (("up", value > most), ("down", value < -most)):
         at = time[outside]
         if at.size:
             edge = np.full(at.size, most if mark == "up" else -most)
-            yield Series(x=at, y=0.94 * edge, mark=cast(Mark, mark), colour="V_C1")
+            yield Series(x=at, y=0.94 * edge, mark=cast(Mark, mark), colour=colour)
 
 
 def _matched(
@@ -254,8 +256,10 @@ def _matched(
         known = tolerance[np.isfinite(tolerance)]
         usual = float(np.median(known)) if known.size else 0.0
         most = 1.2 * max(float(np.max(np.abs(value), initial=0.0)), usual)
-        series = _tolerated(axis.closed(time), value, tolerance, "dots")
-        panels.append((label, unit, series, most or 1e-3))
+        at, most = axis.closed(time), most or 1e-3
+        series = _tolerated(at, value, tolerance, "dots")
+        cut = _beyond(at, tolerance, most, "model")
+        panels.append((label, unit, (*series, *cut), most))
     return panels
 
 

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from tactile_lab.engine.execution import Execution
@@ -39,6 +40,17 @@ def test_out_of_the_box_the_model_knows_its_bench(as_believed):
     assert all(residual.within >= 0.95 for residual in found.twin.residuals)
     assert [r.signal for r in found.twin.residuals] == ["V_C1", "V_C2"]
     assert found.explanation is None
+
+
+def test_a_tolerance_that_goes_beyond_its_panel_is_marked(as_believed):
+    plot = next(p for p in find(as_believed).plots if p.name == "twin")
+    beyond = 0
+    for panel in plot.panels[1:]:
+        (dots,) = [s for s in panel.series if s.mark == "dots"]
+        cut = int(np.count_nonzero(np.asarray(dots.high) > panel.limits[1]))
+        assert cut == sum(np.size(s.x) for s in panel.series if s.mark == "up")
+        beyond += cut
+    assert beyond > 0
 
 
 def test_the_bias_of_the_follower_is_identified(as_believed):

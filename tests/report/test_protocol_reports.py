@@ -173,6 +173,8 @@ def test_a_trial_with_one_spike_is_drawn_with_no_rate(rate_force):
     fired = next(s for s in counts.series if s.mark == "points")
     assert (fired.x[0], fired.y[0]) == (0.11, 1)
     silent = next(s for s in counts.series if s.mark == "open")
+    none = next(s for s in rates.series if s.mark == "open")
+    assert (list(none.x), list(none.y)) == ([0.085, 0.11], [0, 0])
     assert (list(silent.x), list(silent.y)) == ([0.085], [0])
 
 
