@@ -8,6 +8,7 @@ Run by `make reports`, or alone (``--help``). It goes on where it was stopped:
 ``runs/bench-coverage.jsonl`` keeps what was done. Each case counts at the newest commit
 at which it was measured, with ``--since`` at that commit and all later ones: whoever
 says so holds that nothing between them moved an interval, and the page names both ends.
+Cases of which nothing is kept here stay on the page as they stood.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent
+PAGE = DOCS / "bench-coverage.md"
 KEPT = DOCS.parent / "runs" / "bench-coverage.jsonl"
 REPEATS = 1000
 SAME = 1e-6
@@ -388,8 +390,13 @@ def ends(commits: list[str]) -> str:
     return " to ".join(dict.fromkeys([commits[0], commits[-1]]))
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """The page."""
+def stood(page: str, case: str) -> list[str]:
+    """The lines of a case on the page as it was."""
+    return [line for line in page.splitlines() if line.startswith(f"| {case} |")]
+
+
+def table(rows: list[dict[str, Any]], page: str = "") -> str:
+    """The page; cases without rows as they stand on the one that was."""
     counts: dict[tuple[str, str], list[tuple[bool, float]]] = defaultdict(list)
     runs: dict[str, int] = defaultdict(int)
     refused: dict[str, int] = defaultdict(int)
@@ -409,6 +416,8 @@ def table(rows: list[dict[str, Any]]) -> str:
             counts[row["case"], name].append((hit, error))
     lines = []
     for case in CASES:
+        if case not in runs:
+            lines += stood(page, case)
         for (of_case, name), seen in counts.items():
             if of_case != case:
                 continue
@@ -458,9 +467,13 @@ tell the same offset, half a code off, and the same gain; the truth lies exactly
 bound of either, which held, but was tried once.
 
 Rows of one run share their seeds' errors, such as that of the force: few seeds whose
-force lies beyond its band count in each of them. Open: the phase at 0.05 Hz is low by
-1 mrad (0.06°), as much as its interval, and the scale of force that `rate_force` fits
-scatters a third more than its interval says.
+force lies beyond its band count in each of them.
+
+Two rows stood open until both were looked into. The phase at 0.05 Hz held in 35 %: for
+70 ms after a frequency begins the coil is still on its ramp, and the fit took that for
+a transient of the film; it now begins when the force is on its sine. The scale of force
+of `rate_force` held in 81 %, by a fault of this campaign: it read the true scale off
+the force while that still rose, so that a lag counted as an error of the fit.
 """
 
 
@@ -493,8 +506,8 @@ def main() -> None:
             rate = (time.monotonic() - began) / (i + 1)
             says = f"{i + 1} of {len(left)}, {rate * (len(left) - i - 1) / 60:.0f} min"
             print(f"{says} left", file=sys.stderr, flush=True)
-    page = table(kept(given.since))
-    (DOCS / "bench-coverage.md").write_text(page, encoding="utf-8")
+    page = table(kept(given.since), PAGE.read_text(encoding="utf-8"))
+    PAGE.write_text(page, encoding="utf-8")
     print(page)
 
 

@@ -103,11 +103,14 @@ def periodic() -> Plot:
         np.array([np.interp(within + k * period, time, c) for c in currents])
         for k in range(STIMULI)
     ]
+    mean = currents.mean(axis=0)
+    error = np.max(currents.std(axis=0, ddof=1) / np.sqrt(SPECIMENS) / mean)
     return Plot(
         name="periodic",
         caption=f"(a) I_DS under {STIMULI} stimuli of {LEVEL * 1e3:g} mN, mean of "
-        f"three specimens and, shaded, its standard error ({TOLERANCES}); bands: "
-        "holds. (b) The same, its time from the beginning of each stimulus: first, "
+        "three specimens and, shaded, its standard error, at most "
+        f"{100 * error:.1f} % ({TOLERANCES}); bands: holds. (b) The same, its time "
+        "from the beginning of each stimulus: first, "
         "second and last, and the mean of all, its standard error that of the "
         "specimens' means: the fall from stimulus to stimulus is no scatter. What V_P "
         "loses during a stimulus it lacks in the next. The paper's stimuli are not "

@@ -23,3 +23,28 @@ def test_one_number_repeated_is_no_share_of_hits(values, share):
     page = runpy.run_path(str(PAGE))["table"](rows)
     (row,) = [line for line in page.splitlines() if "| offset of" in line]
     assert row.split(" | ")[3] == share
+
+
+def test_a_case_that_was_not_measured_here_stays_on_the_page():
+    made = runpy.run_path(str(PAGE))
+    line = (
+        "| wiring_check | V_GS | 26 | 100.0 % | -0.03 | 0.21 | 0 of 26 | – | 0000000 |"
+    )
+    row = {
+        "case": "rate_force, three forces", "seed": 0, "commit": "1111111",
+        "cpu": 1.0, "told": [["V_GS", 0.5, 0.0, 1.0, 0.2]],
+    }  # fmt: skip
+    page = made["table"]([row], f"| run |\n{line}\n| rate_force, three forces | old |")
+    assert line in page
+    assert "| old |" not in page
+    assert "| rate_force, three forces | V_GS | 1 |" in page
+
+
+def test_every_page_that_measures_is_listed_with_what_it_measures():
+    root = PAGE.parent.parent
+    made = runpy.run_path(str(root / "docs" / "make_reports.py"))
+    for name, paths in made["PAGES"].items():
+        assert (root / "docs" / f"{name}.md").exists()
+        assert all((root / path).exists() for path in paths.split()), name
+    figures = {path.stem for path in (root / "docs").glob("*-figures.md")}
+    assert figures <= set(made["PAGES"])
