@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_lab.calibration import Calibration, CalibrationFile
 from tactile_lab.errors import LimitError, ParameterError
 from tactile_lab.lag import Lag
-from tactile_lab.quantity import Pause, Unit, show
+from tactile_lab.quantity import Unit, show
 from tactile_lab.table import SceneTable
 from tactile_lab.waveform import Waveform
 
@@ -43,6 +43,10 @@ class ForceUncertainty:
         """Half of the 95 % band of `force` N (any shape), N."""
         newtons = np.asarray(force, dtype=np.float64)
         return np.asarray(np.hypot(self.absolute, self.relative * newtons))
+
+
+FieldLag = Annotated[float, Unit("s", least=0.0, most=10.0)]
+"""A thick core of solid iron lags by tenths of a second; more is a mistake."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,9 +84,9 @@ class Magnet(SceneTable):
     B2_per_ampere: Annotated[float, Unit("T/A")] = 0.011
     calibration: Annotated[Calibration | None, CalibrationFile()] = None
     geometry_uncertainty: float | None = None
-    coil_lag: Pause = 0.0
-    eddy_lag: Pause = 0.0
-    lag_uncertainty: Pause | None = None
+    coil_lag: FieldLag = 0.0
+    eddy_lag: FieldLag = 0.0
+    lag_uncertainty: FieldLag | None = None
     allow_expired: bool = False
     allow_other_coil: bool = False
 

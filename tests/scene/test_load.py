@@ -302,3 +302,11 @@ def test_another_row_brings_its_own_baud_rate():
     assert other.bench.coil.baud is None
     told = load("demo", {"bench.coil.dialect": "keithley-2400", "bench.coil.baud": 300})
     assert told.bench.coil.baud == 300
+
+
+@pytest.mark.parametrize("key", ["coil_lag", "eddy_lag", "lag_uncertainty"])
+def test_a_lag_of_the_field_that_no_core_has_is_refused(key):
+    with pytest.raises(SceneError, match="at most 10 s"):
+        load("demo", {f"bench.magnet.{key}": "1e30 s"})
+    kept = load("demo", {f"bench.magnet.{key}": "0.5 s"}).bench.magnet
+    assert getattr(kept, key) == 0.5
