@@ -22,6 +22,7 @@ from tactile_lab.model.circuit import (
     SUBTHRESHOLD_LIMIT,
     FloatArray,
 )
+from tactile_lab.model.equations import fires_at_rest
 from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.model.specimen import parts
 from tactile_lab.quantity import show
@@ -209,12 +210,15 @@ def highest(skin: Skin) -> tuple[float, tuple[str, ...]]:
 
 
 def warnings(skin: Skin, most: float) -> tuple[str, ...]:
-    """Where a fast touch leaves what the model describes well, Eq. (1)'s law."""
+    """Where the model is left by a fast touch, and where none is needed to fire."""
+    found = []
+    if fires_at_rest(skin.circuit):
+        found.append("Taxels as marked fire at rest: see V_GS in [sensor].")
     limit = (SUBTHRESHOLD_LIMIT - skin.circuit.V_GS) / abs(skin.circuit.k_F)
-    if most <= limit:
-        return ()
-    return (
-        f"Taxels feel up to {show(most, 'N')}: a fast touch beyond "
-        f"{show(limit, 'N')} leaves the exponential law of Eq. (1), and I_DS is "
-        "overestimated there.",
-    )
+    if most > limit:
+        found.append(
+            f"Taxels feel up to {show(most, 'N')}: a fast touch beyond "
+            f"{show(limit, 'N')} leaves the exponential law of Eq. (1), and I_DS is "
+            "overestimated there."
+        )
+    return tuple(found)

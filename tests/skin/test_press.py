@@ -155,6 +155,8 @@ def test_what_no_model_describes_is_refused_beforehand(pressed):
     firm = {"kind": "punch", "force": "20 N", "radius": "1 mm"}
     assert "exponential law" in highest(load_skin({**SLIDE, "stimulus": [firm]}))[1][0]
     assert highest(pressed[0])[1] == ()
+    restless = load_skin({**SLIDE, "sensor": {"V_GS": "1.7 V"}})
+    assert "fire at rest" in highest(restless)[1][0]
     with pytest.raises(ParameterError, match="numbered 0 to 89"):
         force_of(pressed[0], 90)
 
