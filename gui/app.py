@@ -75,7 +75,7 @@ def main(
     from gui.window import Window
 
     session.run.notes = lab.notes if lab else {}
-    session.run.reports = wishes.reports
+    session.run.reports, session.run.publish = wishes.reports, wishes.lsl
     window = Window(session, chosen, settings)
     fit(window, window.screen().availableSize())
     window.show()

@@ -45,7 +45,8 @@ class Habits(QObject):
 
     def follow(self) -> None:
         """The preferences have changed."""
-        self._session.run.reports = self._wishes.reports
+        run, wishes = self._session.run, self._wishes
+        run.reports, run.publish = wishes.reports, wishes.lsl
         self._session.keep_in(self._wishes.folder)
         self._screen.list_runs()
 

@@ -18,6 +18,7 @@ DEFAULTS: dict[str, Any] = {
     "sound": False,
     "monitor": False,
     "reports": True,
+    "lsl": False,
     "last_bench": "",
     "lanes": "",
 }
@@ -90,6 +91,11 @@ class Preferences(QObject):
     def reports(self) -> bool:
         """Whether a report is written at the end of each run."""
         return bool(self._values["reports"])
+
+    @property
+    def lsl(self) -> bool:
+        """Whether each run is published by Lab Streaming Layer."""
+        return bool(self._values["lsl"])
 
     @property
     def recent(self) -> list[Path]:

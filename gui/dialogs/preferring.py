@@ -16,6 +16,7 @@ SWITCHES = {
     "sound": "Sound at the end of a run, and three times at a fault",
     "monitor": "Watch the sensor as soon as a bench is ready (coil off)",
     "reports": "Write the report at the end of each run",
+    "lsl": "Publish each run live to other programs (Lab Streaming Layer)",
 }
 
 

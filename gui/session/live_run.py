@@ -59,6 +59,7 @@ class LiveRun(LiveTask):
         out: folder for run folders.
         waiting: notes that were typed before the next run; it will have them.
         reports: whether the report is written at its end.
+        publish: whether the next runs are published by Lab Streaming Layer.
     """
 
     begun = Signal(object)
@@ -92,6 +93,7 @@ class LiveRun(LiveTask):
         self.notes: dict[str, str] = {}
         self.waiting: list[str] = []
         self.reports = True
+        self.publish = False
 
     def start(
         self, request: Request, title: str, expectation: Expectation | None
@@ -108,7 +110,8 @@ class LiveRun(LiveTask):
         self.voltages = {}
         self.request, self.expectation = request, expectation
         self.title = self.name = title
-        self._begin(begin_run, request, self.out, dict(self.notes))
+        notes = dict(self.notes)
+        self._begin(begin_run, request, self.out, notes, publish=self.publish)
         waiting, self.waiting = self.waiting, []
         for text in waiting:
             self.say(note, text, None)

@@ -8,14 +8,17 @@ importable in the engine, and its arguments be pickled.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tactile_lab.acquisition.events import Message
 from tactile_lab.engine.engine import ServedTask
 from tactile_lab.engine.request import Request
 
 if TYPE_CHECKING:
     from tactile_lab.engine.execution import Execution
+    from tactile_lab.engine.lsl import LslStreams
     from tactile_lab.engine.manual import ManualControl
     from tactile_lab.engine.monitor import Monitor
 
@@ -24,29 +27,60 @@ MODELLED = frozenset({"V_C1", "V_C2", "V_K", "spikes"})
 
 
 def begin_run(
-    served: ServedTask, request: Request, out: Path, notes: Mapping[str, str]
+    served: ServedTask,
+    request: Request,
+    out: Path,
+    notes: Mapping[str, str],
+    *,
+    publish: bool = False,
 ) -> Execution:
-    """Run a request into a folder in `out`; the model follows it. Notes are kept."""
+    """Run a request into a folder in `out`; the model follows it.
+
+    Args:
+        served: the task it becomes.
+        request: what to run.
+        out: folder that run folders are put into.
+        notes: kept with the run.
+        publish: tell it by Lab Streaming Layer, too.
+    """
     from tactile_lab.acquisition.asked_field import AskedField
     from tactile_lab.engine.execution import Execution
 
     scene = request.load()
+    streams = _lsl(served) if publish else None
     magnet = scene.bench.magnet
     if scene.record.compare and MODELLED & set(scene.record.signals):
         from tactile_lab.acquisition.live_model import LiveModel
 
         served.model = LiveModel.of(scene)
-    return Execution(
+    execution = Execution(
         scene,
         out,
         realtime=served.realtime,
         emit=served.emit,
+        others=() if streams is None else (streams,),
         notes=notes,
         ask=served.ask,
         asked_field=AskedField(
             served.ask_field, lambda current: float(magnet.field(current))
         ),
     )
+    if streams is not None:
+        streams.begin(execution)
+    return execution
+
+
+def _lsl(served: ServedTask) -> LslStreams:
+    """The streams that tell a run by LSL; what becomes of them is told with the run."""
+    from tactile_lab.engine.lsl import kept_open
+
+    def say(level: str, text: str) -> None:
+        served.emit(Message(level, text))
+
+    streams = kept_open()
+    streams.warn = partial(say, "warning")
+    say("info", f"published live by LSL: {streams.source}")
+    return streams
 
 
 def begin_monitor(served: ServedTask, request: Request) -> Monitor:

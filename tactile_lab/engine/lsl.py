@@ -16,6 +16,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from functools import cache
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
@@ -146,6 +147,7 @@ class LslStreams:
         warn: told, once, why nothing more can be published.
 
     Attributes:
+        warn: the same; may be another for each run.
         source: LSL's `source_id` of each of the three begins so.
 
     Raises:
@@ -157,12 +159,12 @@ class LslStreams:
             import pylsl
         except (ImportError, RuntimeError) as error:
             raise SceneError(
-                f"--live lsl needs pylsl, which could not be loaded ({error}). "
-                "`pip install pylsl`, or leave --live out."
+                "To publish live by LSL needs pylsl, which could not be loaded "
+                f"({error}). `pip install pylsl`, or do not publish."
             ) from error
         self._lsl = pylsl
         self.source = f"tactile-lab-{os.getpid()}-{time.time_ns() // 1_000_000}"
-        self._warn = warn
+        self.warn = warn
         self._closed = False
         try:
             if "LSLAPICFG" not in os.environ:
@@ -172,8 +174,8 @@ class LslStreams:
             self._events = self._open("Markers", EVENTS, pylsl.cf_string)
         except (RuntimeError, NotImplementedError) as error:
             raise SceneError(
-                f"--live lsl: LSL's streams cannot be opened ({error}). Leave --live "
-                "out, or update pylsl."
+                f"LSL's streams cannot be opened ({error}). Update pylsl, or do not "
+                "publish live."
             ) from error
         self._run: FollowedRun | None = None
         self._waiting: SimpleQueue[FollowedRun | events.Event | Line | None] = (
@@ -250,7 +252,7 @@ class LslStreams:
                     self._tell_event(told, run)
         except Exception as error:  # whatever LSL raises, the run goes on
             reason = f"{type(error).__name__}: {error}"
-            self._warn(f"nothing more is published live ({reason}); the run goes on.")
+            self.warn(f"nothing more is published live ({reason}); the run goes on.")
 
     def _tell_spikes(self, seen: events.SpikesSeen, run: FollowedRun) -> None:
         for at, amplitude in zip(seen.times, seen.amplitudes, strict=True):
@@ -278,3 +280,13 @@ class LslStreams:
 
     def _tell_line(self, line: Line) -> None:
         self._events.push_sample([json.dumps(line, allow_nan=False)])
+
+
+@cache
+def kept_open() -> LslStreams:
+    """The streams of this process, opened when first asked for; its end closes them.
+
+    Raises:
+        SceneError: pylsl is not installed, or the streams cannot be opened.
+    """
+    return LslStreams(lambda text: None)

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from provenance import provenance
 
-HOLD, REST = 4.0, 1.0
+HOLD, REST = 2.0, 1.0
 KILL_EVERY = 30.0
 SUBSCRIBER = """
 import sys
@@ -81,7 +81,7 @@ def main() -> int:
 def measured(seconds: float, folder: Path) -> tuple[str, bool]:
     """The page, and whether nothing was lost; `folder` takes the run."""
     presses = round(seconds / (HOLD + REST + 0.5))
-    levels = json.dumps(["160 mN"] * presses)
+    levels = json.dumps(["100 mN"] * presses)
     verb = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime", "--json"]
     verb += ["--live", "lsl", "--no-report", "--out", str(folder / "runs")]
     for change in (
@@ -115,7 +115,10 @@ def measured(seconds: float, folder: Path) -> tuple[str, bool]:
             killed[-1].process.wait()
         stays.process.wait()
         assert run.stdout is not None
-        result = json.loads(run.stdout.read())
+        told = run.stdout.read()
+        if run.returncode:
+            raise SystemExit((folder / "said").read_text())
+        result = json.loads(told)
     heard = stays.heard()
     number, delay = heard[:, 0], heard[:, 2] - heard[:, 1]
     spikes = int(result["spikes"])

@@ -8,8 +8,12 @@ import numpy as np
 import pylsl
 import pytest
 
+from tactile_lab.acquisition.events import Message
+from tactile_lab.engine.commands import begin_run
 from tactile_lab.engine.execution import Execution
-from tactile_lab.engine.lsl import ENVELOPES, LslStreams
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.lsl import ENVELOPES, LslStreams, kept_open
+from tactile_lab.engine.request import Request
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
@@ -105,6 +109,25 @@ def test_time_stamps_are_the_computers_clock_where_time_is_real(streams, tmp_pat
     found, stamps = spikes.pull_chunk(LONG, done.spikes, min_samples=done.spikes)
     assert len(found) == done.spikes > 0
     assert before < stamps[0] <= stamps[-1] < after
+
+
+def test_a_run_of_the_window_is_published_where_that_is_asked(tmp_path, short):
+    kept_open.cache_clear()
+    with Link(separate=False, realtime=False) as link:
+        told = list(
+            link.follow(begin_run, Request("demo", short), tmp_path, {}, publish=True)
+        )
+        streams = kept_open()
+        assert any(streams.source in one.text for one in told if type(one) is Message)
+        events = inlet(streams, "events")
+        for _ in link.follow(
+            begin_run, Request("demo", short), tmp_path, {}, publish=True
+        ):
+            pass
+        lines = lines_until(events, "clock")
+        assert lines[0]["event"] == "begun"
+    streams.close()
+    kept_open.cache_clear()
 
 
 def test_streams_that_fail_are_told_of_once_and_the_run_goes_on(

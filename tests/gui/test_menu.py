@@ -45,9 +45,12 @@ def test_settings_act_at_once(lab) -> None:
     assert card.isVisible()
     card.folder.setText(str(lab.folder / "elsewhere"))
     card.switches["reports"].setChecked(False)
+    card.switches["lsl"].setChecked(True)
     card.save.click()
     assert session.run.out == lab.folder / "elsewhere" and not card.isVisible()
-    window.preferences.set(folder=str(out))
+    assert session.run.publish
+    window.preferences.set(folder=str(out), lsl=False)
+    assert not session.run.publish
     assert session.out == out
 
 
