@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from provenance import provenance
 
-HOLD, REST = 2.0, 1.0
+HOLD, REST = 1.0, 2.0
 KILL_EVERY = 30.0
 SUBSCRIBER = """
 import sys
@@ -81,7 +81,7 @@ def main() -> int:
 def measured(seconds: float, folder: Path) -> tuple[str, bool]:
     """The page, and whether nothing was lost; `folder` takes the run."""
     presses = round(seconds / (HOLD + REST + 0.5))
-    levels = json.dumps(["100 mN"] * presses)
+    levels = json.dumps(["160 mN"] * presses)
     verb = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime", "--json"]
     verb += ["--live", "lsl", "--no-report", "--out", str(folder / "runs")]
     for change in (
