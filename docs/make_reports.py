@@ -91,8 +91,11 @@ PAGES = {
     "study-kills": "tactile_lab/studies",
     "design-figures": f"tactile_lab/studies {SOLVER}",
     "window-figures": "gui",
+    "day-figures": f"tactile_lab/report {RUNS}",
+    "live-figures": RUNS,
 }
-"""What each page measures: if that has changed since, it may be out of date."""
+"""What each page measures: if that has changed since, it may be out of date. A page of
+figures that is not listed is taken to measure everything."""
 HASH = r"\b(?=[0-9a-f]*[0-9])(?=[0-9a-f]*[a-f])[0-9a-f]{7}\b"
 
 
@@ -115,7 +118,9 @@ def pages() -> str:
         "| page | measured at | commits since to what it measures |",
         "|---|---|---|",
     ]
-    for name, paths in PAGES.items():
+    figures = (ROOT / "docs").glob("*-figures.md")
+    whole = dict.fromkeys(sorted(page.stem for page in figures), ".")
+    for name, paths in (whole | PAGES).items():
         text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
         found = dict.fromkeys(re.findall(HASH, text))
         counts = {one: int(n) for one in found if (n := since(one, paths))}
