@@ -182,7 +182,7 @@ def test_one_that_never_stops_talking_is_let_go_of(server, capfd):
         with pytest.raises(OSError, match=r"reset|pipe"):
             while True:
                 link.sendall(flood)
-    server.tell("state", state="running", text="on")
+    server(events.StateChanged(events.RunState.RUNNING, "on"))
     with connected(server) as other, other.makefile() as lines:
         assert json.loads(next(lines))["text"] == "on"
     server.close()
