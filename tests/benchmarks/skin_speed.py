@@ -55,7 +55,7 @@ def plate(rows: int, columns: int, seconds: int, firm: bool = True) -> Skin:
     return load_skin(
         {
             "duration": f"{seconds} s",
-            "sensor": {"preset": "fig5b"},
+            "sensor": {"preset": "fig5b" if firm else "table1"},
             "array": {"grid": [rows, columns], "pitch": "1.5 mm"},
             "stimulus": [load],
         }
@@ -137,12 +137,14 @@ def rivals(seconds: int) -> tuple[list[str], int]:
     ]
     stepped(problems[0], 60.0, DORMAND_PRINCE, 1e-6)
     for tolerance in TOLERANCES:
-        began = time.process_time()
-        found = [
-            stepped(one, 60.0, DORMAND_PRINCE, tolerance).spike_times
-            for one in problems
-        ]
-        took = time.process_time() - began
+        took = np.inf
+        for _ in range(3):
+            began = time.process_time()
+            found = [
+                stepped(one, 60.0, DORMAND_PRINCE, tolerance).spike_times
+                for one in problems
+            ]
+            took = min(took, time.process_time() - began)
         rows.append(row("Dormand-Prince 5(4), numba", f"{tolerance:g}", found, took))
         print(rows[-1], flush=True)
     for step in STEPS:
@@ -202,7 +204,7 @@ each a specimen of its own, under a rough plate pressed once a second for
 ## The same equations by others
 
 {RIVALS} taxels, {count:,} spikes, one thread each. Errors are against our solver at
-1e-12 s. CPU time of ours is that of the whole `press` on one core, forces and file
+1e-12 s, which Dormand-Prince, another method, confirms as far as it goes. CPU time of ours is that of the whole `press` on one core, forces and file
 included; of the others that of the solution alone, compiling and the force left out.
 Dormand-Prince is compiled as ours is, has V_P in closed form, starts anew at each point
 of the force and locates spikes on its dense output. Brian2 (for its runs wall time, one
@@ -216,7 +218,8 @@ thread) is given a spike's place inside its step; ratios of one run on one machi
 ## Growth
 
 "Solved" are the taxels that could come to threshold, "fired" those of them that did;
-the last two rows are a ball on one spot, where nearly all taxels are left out.
+the last two rows are sensors of preset table1 under a ball on one spot, where nearly
+all taxels are left out.
 CPU times hold forces, events and the file.
 
 | {" | ".join(GROWN)} |
