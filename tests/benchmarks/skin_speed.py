@@ -204,11 +204,12 @@ each a specimen of its own, under a rough plate pressed once a second for
 ## The same equations by others
 
 {RIVALS} taxels, {count:,} spikes, one thread each. Errors are against our solver at
-1e-12 s, which Dormand-Prince, another method, confirms as far as it goes. CPU time of ours is that of the whole `press` on one core, forces and file
-included; of the others that of the solution alone, compiling and the force left out.
-Dormand-Prince is compiled as ours is, has V_P in closed form, starts anew at each point
-of the force and locates spikes on its dense output. Brian2 (for its runs wall time, one
-thread) is given a spike's place inside its step; ratios of one run on one machine, load
+1e-12 s, which Dormand-Prince, another method, confirms as far as it goes. CPU time of
+ours is that of the whole `press` on one core, forces and file included; of the others
+that of the solution alone, compiling and the force left out. Dormand-Prince is compiled
+as ours is, has V_P in closed form, starts anew at each point of the force and locates
+spikes on its dense output. Brian2 (for its runs wall time, one thread) is given a
+spike's place inside its step. Ratios of one run on one machine, load
 {os.getloadavg()[0]:.0f}.
 
 | {" | ".join(HEADS)} |
