@@ -152,7 +152,8 @@ def _show(skin: Path, out: Path, *others: object) -> None:
 
     with refusing():
         gui: click.Command = plugged_in("tactile_lab.verbs", "gui")
-    gui.main(["--skin", str(skin), "--out", str(out)], standalone_mode=False)
+    asked = ["--skin", str(skin), "--out", str(out)]
+    raise click.exceptions.Exit(gui.main(asked, standalone_mode=False) or 0)
 
 
 def _make_dataset(

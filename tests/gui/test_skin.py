@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QFileDialog
 from gui.skin.computing import Computing
 from gui.skin.film import DOTS, Dots, pixels
 from gui.skin.window import open_skin
+from tactile_lab.commands.skin import command
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.press import press
@@ -107,6 +109,12 @@ def test_what_cannot_be_shown_is_refused_or_told(lab, folder, tmp_path):
     lab.until(window.warning.isVisible)
     assert "file" in window.warning.text()
     window.close()
+
+
+def test_the_verb_that_cannot_show_it_ends_with_2(lab, tmp_path):
+    none = [str(tmp_path / "none.toml"), "--window"]
+    assert CliRunner().invoke(command, none).exit_code == 2
+    assert CliRunner().invoke(command, [*none, "--json"]).exit_code == 2
 
 
 def test_closing_the_window_ends_the_computing(folder, tmp_path):
