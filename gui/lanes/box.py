@@ -199,7 +199,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         level = self._stage.source.threshold
         if level is None or self.lane.key != "V_K":
             return False
-        return abs(self._frame(0.0).y1(level) + self.y() - y) <= NEAR
+        return bool(abs(self._frame(0.0).y1(level) + self.y() - y) <= NEAR)
 
     def value_at(self, y: float) -> float:
         """The value at a height in the scene, px, in shown units."""
