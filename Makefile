@@ -30,9 +30,10 @@ gui: $(DEV_STAMP)
 	$(BIN)/tactile-lab gui
 
 test: $(DEV_STAMP) $(SYSTEM_STAMP)
-	$(MAKE) --no-print-directory check
-	# fill the cache of compiled code once, or each worker compiles for itself
-	$(BIN)/tactile-lab simulate >/dev/null
+	# what is compiled is compiled once, beside the types, or each worker does it
+	{ $(BIN)/python tests/support/compile_once.py >$(VENV)/compiling 2>&1 || \
+	    { cat $(VENV)/compiling; exit 1; } } & compiling=$$!; \
+	    $(MAKE) --no-print-directory check && wait $$compiling
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(DEV_STAMP)

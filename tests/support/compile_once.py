@@ -1,0 +1,56 @@
+"""Have what is compiled on its first call compiled, once, before the tests begin.
+
+    python tests/support/compile_once.py
+
+Each worker of the tests would compile for itself what no other has kept yet. One core
+does this while another checks the types.
+"""
+
+import os
+import tempfile
+from pathlib import Path
+
+from tactile_lab.cli import cli
+
+SKIN = """
+duration = "0.1 s"
+[sensor]
+preset = "table1"
+{saturation}
+[array]
+grid = [2, 2]
+[[stimulus]]
+kind = "sphere"
+force = "3 N"
+"""
+STUDY = """
+scene = "hold_10s"
+on = "model"
+keep = ["spike_count"]
+[[axis]]
+key = "protocol.level"
+values = ["80 mN", "160 mN"]
+"""
+COMMANDS = (
+    ("run", "demo", "--set", "protocol.hold=0.2 s"),
+    ("simulate", "--set", "sensor.saturation=true"),
+    ("skin", "plain.toml"),
+    ("skin", "saturated.toml"),
+    ("study", "sweep.toml"),
+)
+
+
+def main() -> None:
+    """Run one command after another in a folder that is then removed."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        Path("plain.toml").write_text(SKIN.format(saturation=""))
+        Path("saturated.toml").write_text(SKIN.format(saturation="saturation = true"))
+        Path("sweep.toml").write_text(STUDY)
+        for command in COMMANDS:
+            cli.main(command, standalone_mode=False)
+        os.chdir("/")
+
+
+if __name__ == "__main__":
+    main()
