@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from tactile_lab.conclusion import Table
 from tactile_lab.plot import Plot
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT
+from tactile_lab.store.folder import replacing
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,46 @@ def picture(title: str, plot: Plot, svg: str) -> Picture:
     described = escape(f"{title}: {plot.caption}")
     inline = inline.replace("<svg", f'<svg role="img" aria-label="{described}"', 1)
     return Picture(Markup(inline), plot.caption)
+
+
+def write_page_of_runs(
+    file: Path,
+    *,
+    title: str,
+    simulated: bool,
+    key: Mapping[str, str],
+    said: Sequence[str],
+    drawn: Picture | None,
+    tables: Sequence[Table],
+) -> None:
+    """Write a page about several runs.
+
+    Args:
+        file: takes its name once it is whole.
+        title: of the page.
+        simulated: whether any of them is.
+        key: short facts at its head.
+        said: sentences.
+        drawn: the figure; None for none.
+        tables: below it.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    text = rendered(
+        "chart.html",
+        title=title,
+        subtitle="",
+        mark="Simulated" if simulated else "Measured",
+        measured=not simulated,
+        key=key,
+        said=said,
+        picture=drawn,
+        tables=tables,
+        made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
+    )
+    with replacing(file) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def _colours() -> str:

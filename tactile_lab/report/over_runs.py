@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from tactile_lab.errors import ParameterError
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import count, show
 from tactile_lab.report.canvas import draw, save
-from tactile_lab.report.html import picture, rendered
+from tactile_lab.report.html import picture, write_page_of_runs
 
 DAY = 86400.0
 
@@ -179,16 +179,12 @@ class OverRuns:
         every = Table(
             title="Runs", headings=("Run", "Started", "Sensor", self.key), rows=rows
         )
-        text = rendered(
-            "chart.html",
+        write_page_of_runs(
+            file,
             title=title,
-            subtitle="",
-            mark="Simulated" if simulated else "Measured",
-            measured=not simulated,
+            simulated=simulated,
             key={"Runs": str(len(self.points))},
             said=self.sentences,
-            picture=picture(title, self.plot, svg),
+            drawn=picture(title, self.plot, svg),
             tables=(self.table, every),
-            made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
         )
-        file.write_text(text, encoding="utf-8")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,10 @@ from tactile_lab.quantity import count, show
 from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
-from tactile_lab.report.html import picture, rendered
+from tactile_lab.report.html import picture, write_page_of_runs
 from tactile_lab.report.results import results
 from tactile_lab.store.catalogue import summary
 from tactile_lab.store.facts import Fact, grouped, of_results
-from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, each, nothing, share
 from tactile_lab.store.summary import RunSummary
 
@@ -238,20 +236,15 @@ class SeveralRuns:
             figure = draw(plot, title, "", simulated=simulated)
             drawn = picture(title, plot, save(figure, folder / plot.name, pdf=pdf)[1])
         progress(0.8)
-        text = rendered(
-            "chart.html",
+        write_page_of_runs(
+            folder / PAGE,
             title=title,
-            subtitle="",
-            mark="Simulated" if simulated else "Measured",
-            measured=not simulated,
+            simulated=simulated,
             key={"Runs": str(len(self.runs)), "Specimens": str(len(self.specimens))},
             said=self.sentences,
-            picture=drawn,
+            drawn=drawn,
             tables=(self.by_specimen, self.table),
-            made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
         )
-        with replacing(folder / PAGE) as new:
-            new.write_text(text, encoding="utf-8")
         return folder / PAGE
 
     def to_dict(self) -> dict[str, Any]:
