@@ -14,7 +14,7 @@ from gui.parts import STRETCH, Combo, column, label, push, row, say, scrolling
 from gui.plots.small_plot import SmallPlot
 from tactile_lab.errors import RunFolderError
 from tactile_lab.plot import Plot
-from tactile_lab.studies.live import look_at, studies_in
+from tactile_lab.studies.live import is_running, look_at, studies_in
 from tactile_lab.studies.page import REPORT
 
 AGAIN = 1000
@@ -106,18 +106,21 @@ class StudiesCard(Overlay):
         try:
             stamp = (
                 folder,
+                is_running(folder),
+                (folder / REPORT).is_file(),
                 *((p, p.stat().st_mtime_ns) for p in folder.glob("*.json")),
             )
+            if stamp == self._stamp:
+                return
             seen = look_at(folder)
         except (RunFolderError, OSError) as error:  # between two of its files
             say(self.text, str(error))
             return
         self.state.setText("Running" if seen.running else "At rest")
         self.page.setEnabled((folder / REPORT).is_file())
-        if stamp != self._stamp:
-            self._stamp = stamp
-            say(self.text, "\n".join((seen.title, *seen.sentences)))
-            self._draw(seen.plots)
+        self._stamp = stamp
+        say(self.text, "\n".join((seen.title, *seen.sentences)))
+        self._draw(seen.plots)
 
     def _draw(self, plots: tuple[Plot, ...]) -> None:
         while len(self.figures) < len(plots):

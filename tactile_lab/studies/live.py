@@ -115,7 +115,7 @@ def look_at(folder: Path) -> SeenStudy:
         RunFolderError: the folder holds none, or it cannot be read.
     """
     file = _told_in(folder) or folder / RESULTS
-    running = _is_held(folder / LOCK)
+    running = is_running(folder)
     try:
         told = json.loads(file.read_text(encoding="utf-8"))[SHOWN]
         sentences = tuple(map(str, told["sentences"]))
@@ -136,9 +136,10 @@ def _told_in(folder: Path) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
-def _is_held(file: Path) -> bool:
+def is_running(folder: Path) -> bool:
+    """Whether somebody carries out the study of this folder now."""
     try:
-        with file.open(encoding="utf-8") as held:
+        with (folder / LOCK).open(encoding="utf-8") as held:
             return not lock(held, shared=True)
     except OSError:
         return False
