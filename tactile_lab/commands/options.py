@@ -144,6 +144,19 @@ live_option: Decorator = click.option(
     help="Publish spikes, envelopes and events while it runs, by Lab Streaming Layer.",
 )
 
+
+def exports_option(help_: str) -> Decorator:
+    """``--export FILE``, repeatable, as `exports`; `help_` says what is written."""
+    return click.option(
+        "--export",
+        "exports",
+        type=click.Path(path_type=Path, dir_okay=False),
+        multiple=True,
+        metavar="FILE",
+        help=f"{help_}; repeatable.",
+    )
+
+
 notes_option: Decorator = click.option(
     "--note",
     "notes",

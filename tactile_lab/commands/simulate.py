@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.options import json_option, scene_options
+from tactile_lab.commands.options import exports_option, json_option, scene_options
 from tactile_lab.commands.terminal import fail, print_json, refusing, say, warn, working
 from tactile_lab.neuro.formats import CIRCUITS, circuit_format_of
 
@@ -35,14 +35,9 @@ MOST_SAMPLES = 10_000_000
     metavar="SECONDS",
     help="Error of spike times aimed at, s (and of V_C1, V).",
 )
-@click.option(
-    "--export",
-    "exports",
-    type=click.Path(path_type=Path, dir_okay=False),
-    multiple=True,
-    metavar="FILE",
-    help="Write the circuit under this force for another simulator; the ending says "
-    f"which: {', '.join(CIRCUITS)}; repeatable.",
+@exports_option(
+    "Write the circuit under this force for another simulator; the ending says which: "
+    + ", ".join(CIRCUITS)
 )
 @json_option
 def command(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactile_lab.commands.options import json_option
+from tactile_lab.commands.options import exports_option, json_option
 from tactile_lab.commands.terminal import (
     ProgressLine,
     print_json,
@@ -42,14 +42,9 @@ if TYPE_CHECKING:
     metavar="N",
     help="Threads; as many as cores unless given.",
 )
-@click.option(
-    "--export",
-    "exports",
-    type=click.Path(path_type=Path, dir_okay=False),
-    multiple=True,
-    metavar="FILE",
-    help="Also write the spikes as FILE, whose ending says how: "
-    f"{', '.join(one.ending for one in SPIKES.values())}; repeatable.",
+@exports_option(
+    "Also write the spikes as FILE, whose ending says how: "
+    + ", ".join(one.ending for one in SPIKES.values())
 )
 @click.option(
     "--window", is_flag=True, help="Show it in a window as it is computed; no page."
