@@ -6,7 +6,6 @@ from string import Template
 
 import numpy as np
 
-from tactile_lab.model.circuit import Circuit
 from tactile_lab.neuro.scripts import script
 from tactile_lab.neuro.solved import Solved
 
@@ -40,7 +39,7 @@ def text(solved: Solved) -> str:
         first = f"sensor.I_C = {solved.first['I_C']!r} * amp"
     return Template(script("circuit_brian2")).substitute(
         title=solved.title,
-        step=repr(step(solved.circuit, solved)),
+        step=repr(step(solved)),
         parameters="\n".join(lines),
         current=current,
         first_current=first,
@@ -48,9 +47,9 @@ def text(solved: Solved) -> str:
     )
 
 
-def step(circuit: Circuit, solved: Solved) -> float:
+def step(solved: Solved) -> float:
     """A step that the classical Runge-Kutta method follows V_C1 with, s."""
-    c = circuit
+    c = solved.circuit
     times = np.linspace(0.0, solved.result.duration, 10_001)
     V_P, V_C1 = (solved.result.sample(name, times) for name in ("V_P", "V_C1"))
     conductance = c.I_S / c.V_T * np.exp((c.V_GS + V_P) / (c.m * c.V_T) - V_C1 / c.V_T)

@@ -18,7 +18,7 @@ def block(events: Events) -> Any:
         RunFolderError: neo is not installed.
     """
     neo = library("neo")
-    about, second = events.about, 1.0
+    about = events.about
     made = neo.Block(name=str(about["name"]), description=str(about["title"]))
     made.annotate(physics=str(about.get("physics", "simulated")))
     segment = neo.Segment(name=made.name, index=0)
@@ -27,7 +27,7 @@ def block(events: Events) -> Any:
         x, y = events.places[taxel].tolist()
         segment.spiketrains.append(
             neo.SpikeTrain(
-                times, units="s", t_start=0.0, t_stop=events.duration * second,
+                times, units="s", t_start=0.0, t_stop=events.duration,
                 name=f"taxel {taxel}", taxel=taxel, x_m=x, y_m=y,
             )
         )  # fmt: skip

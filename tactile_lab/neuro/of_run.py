@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tactile_lab.errors import RunFolderError
@@ -30,13 +32,20 @@ def events_of(run: Run, selection: Selection | None = None) -> Events:
         )
     time = selection.of(run.spikes)["time"].astype(np.float64)
     trials = tables(run, selection).get("trials")
-    told = {key: value for key, value in about(run).items() if key != "scene.toml"}
+    told: dict[str, Any] = {
+        key: value for key, value in about(run).items() if key != "scene.toml"
+    }
     told |= {"name": run.path.resolve().name, "signal": run.detection.signal}
     told.setdefault("title", str(told["name"]))
-    force = None
+    told["trials"] = []
+    if trials is not None:
+        columns = (trials.columns[n].tolist() for n in ("label", "start", "end"))
+        told["trials"] = list(zip(*columns, strict=True))
+    most = np.nan
     if "force" in derivable(run):
-        force = run.force.time, run.force.value
-    most = float(np.max(force[1])) if force else np.nan
+        force = run.force
+        told["force"] = force.time, force.value
+        most = float(np.max(force.value))
     return Events(
         time=time,
         taxel=np.zeros(time.size, np.int32),
@@ -44,16 +53,5 @@ def events_of(run: Run, selection: Selection | None = None) -> Events:
         count=np.array([time.size]),
         role=np.zeros(1, np.uint8),
         largest_force=np.array([most]),
-        about=told
-        | ({"force": force} if force else {})
-        | {
-            "trials": []
-            if trials is None
-            else list(
-                zip(
-                    *(trials.columns[n].tolist() for n in ("label", "start", "end")),
-                    strict=True,
-                )
-            )
-        },
+        about=told,
     )
