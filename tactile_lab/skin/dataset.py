@@ -39,8 +39,6 @@ LABELS: Mapping[str, tuple[str, ...]] = {
     "slip": ("stays", "slips"),
 }
 """Answers of each task."""
-MOST = 100_000
-"""Most touches of a task."""
 
 
 def stimulus(task: str, label: str, drawn: np.random.Generator) -> dict[str, Any]:

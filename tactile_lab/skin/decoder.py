@@ -72,9 +72,9 @@ def features(data: Dataset, touches: NDArray[np.intp]) -> FloatArray:
 
 def score(data: Dataset, task: str) -> Estimate:
     """Logistic regression on standardized features, scikit-learn's defaults."""
-    from sklearn.linear_model import LogisticRegression  # type: ignore[import-untyped]
-    from sklearn.pipeline import make_pipeline  # type: ignore[import-untyped]
-    from sklearn.preprocessing import StandardScaler  # type: ignore[import-untyped]
+    from sklearn.linear_model import LogisticRegression
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
 
     known, asked = data.chosen(task, test=False), data.chosen(task, test=True)
     decoder = make_pipeline(StandardScaler(), LogisticRegression(max_iter=5000))
@@ -132,8 +132,8 @@ def coding(data: Dataset, task: str) -> Coding:
 
 def distances(trains: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Victor and Purpura's and van Rossum's distance of each pair, by elephant."""
-    import quantities as pq  # type: ignore[import-untyped]
-    from elephant.spike_train_dissimilarity import (  # type: ignore[import-untyped]
+    import quantities as pq
+    from elephant.spike_train_dissimilarity import (
         van_rossum_distance,
         victor_purpura_distance,
     )
