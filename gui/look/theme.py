@@ -38,17 +38,12 @@ class Theme(QObject):
         self.changed.emit()
 
     def dress(self, window: QWidget) -> None:
-        """Give a window and all in it the style sheet, now and in each theme.
+        """Give a window and all in it the style sheet of each theme, until it goes.
 
         A style sheet of the application is worked out for a widget as often as it has
         parents: that took a second and more with every change of the theme.
         """
-
-        def wear() -> None:
-            window.setStyleSheet(sheet(self.tokens))
-
-        self.changed.connect(wear)
-        wear()
+        _Dress(self, window).put_on()
 
     def _wanted(self) -> Tokens:
         if self.choice != "system":
@@ -59,6 +54,18 @@ class Theme(QObject):
     def _system_changed(self) -> None:
         if self.choice == "system":
             self.apply()
+
+
+class _Dress(QObject):
+    """The style sheet of one window: Qt disconnects a child that goes with it."""
+
+    def __init__(self, theme: Theme, window: QWidget) -> None:
+        super().__init__(window)
+        self._theme, self._window = theme, window
+        theme.changed.connect(self.put_on)
+
+    def put_on(self) -> None:
+        self._window.setStyleSheet(sheet(self._theme.tokens))
 
 
 def palette(tokens: Tokens) -> QPalette:

@@ -15,6 +15,8 @@ import threading
 import time
 import tty
 from abc import ABC, abstractmethod
+from collections import deque
+from typing import ClassVar
 
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import FarEnd
@@ -23,6 +25,9 @@ XOFF = b"\x13"
 
 POLL = 0.05
 """Longest wait before a server looks whether it should end, s."""
+
+RETIRED = 64
+"""Terminals whose numbers stay taken after their servers ended."""
 
 
 class SerialServer(ABC):
@@ -111,8 +116,11 @@ class PtyServer(SerialServer):
     """A pseudo-terminal: the POSIX code path of pyserial.
 
     The slave's descriptor stays open here, else the master could not be read before
-    and after each client.
+    and after each client. It outlives the server: a guard tries an address that is gone
+    for a minute, and would lock and switch off whatever got the same number.
     """
+
+    _retired: ClassVar[deque[int]] = deque()
 
     def __init__(self, far_end: FarEnd, *, paced: bool = False) -> None:
         super().__init__(far_end, paced=paced)
@@ -147,10 +155,13 @@ class PtyServer(SerialServer):
 
     def _release(self) -> None:
         with self._lock:
-            for end in (self._master, self._slave):
-                if end >= 0:
-                    os.close(end)
+            if self._master < 0:
+                return
+            os.close(self._master)
+            self._retired.append(self._slave)
             self._master = self._slave = -1
+            while len(self._retired) > RETIRED:
+                os.close(self._retired.popleft())
 
 
 class TcpServer(SerialServer):

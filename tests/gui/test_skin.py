@@ -6,6 +6,7 @@ from click.testing import CliRunner
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
+from shiboken6 import isValid
 
 from gui.skin.computing import Computing
 from gui.skin.film import DOTS, Dots, pixels
@@ -124,6 +125,15 @@ def test_closing_the_window_ends_the_computing(folder, tmp_path):
     computing.thread.join()
     told = [type(one).__name__ for one in computing.told()]
     assert told in ([], ["Trains", "Film"])  # it may have been done already
+
+
+def test_a_closed_window_is_no_longer_dressed(lab, folder, events):
+    window = shown(lab, folder / "ball.toml", folder)
+    window.close()
+    lab.until(lambda: not isValid(window))
+    theme = lab.window.panels.theme
+    theme.choose("dark")  # what a slot raises fails the test
+    theme.choose("light")
 
 
 def test_the_menu_opens_it_and_tells_what_prevents_it(lab, folder, tmp_path):

@@ -165,6 +165,19 @@ def test_a_second_program_is_kept_out(served):
         second.open()
 
 
+def test_the_address_of_a_server_that_ended_is_not_given_again():
+    """A guard tries its port for a minute: it once locked the next test's source."""
+    clock = RealClock()
+    given = set()
+    for _ in range(3):
+        source = SimCoilSource(Wireless(), "kepco-bop", clock)
+        server = PtyServer(FarEnd(source, FAST, clock, "coil"))
+        server.start()
+        given.add(server.url)
+        server.close()
+    assert len(given) == 3
+
+
 def test_seven_bits_on_a_pty_open_again_and_again():
     clock = RealClock()
     row = meter_dialect("lakeshore-425")
