@@ -19,9 +19,9 @@ from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
 from tactile_lab.studies.live import LOCK, Live
 from tactile_lab.studies.points import Points, Task
-from tactile_lab.studies.shelf import Batch, Shelf
+from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
-from tactile_lab.studies.workers import Alone, Workers, workers
+from tactile_lab.studies.workers import Alone, Finished, Workers, workers
 
 LONG = 1.0
 """Seconds a batch should take: little to lose, enough to be worth sending."""
@@ -164,14 +164,12 @@ def _carried_out(
     there = done
     if missing.size:
         live = Live(study, shelf, named, out / study.name)
-        with workers(study, points, count, scheduler) as crew:
+        with workers(study, points, shelf, count, scheduler) as crew:
             pace = _Pace(crew.count)
             tell(Progress(done, study.design.size, there, failed, crew.count))
-            for batch in _batches(study, missing, named, points, crew, pace):
-                shelf.put(batch)
-                size = batch.addresses.size
-                pace.tell(size)
-                done, failed = done + size, failed + len(batch.reasons)
+            for one in _batches(study, missing, named, points, shelf, crew, pace):
+                pace.tell(one.points)
+                done, failed = done + one.points, failed + one.failed
                 tell(Progress(done, study.design.size, there, failed, crew.count))
                 live.tell(done, failed)
         live.end()
@@ -192,9 +190,10 @@ def _batches(
     missing: NDArray[np.intp],
     named: NDArray[np.void],
     points: Points,
+    shelf: Shelf,
     crew: Workers,
     pace: _Pace,
-) -> Iterator[Batch]:
+) -> Iterator[Finished]:
     """All that is missing, as it is finished.
 
     The first point of a model is computed here, so that code is compiled once and
@@ -202,7 +201,7 @@ def _batches(
     """
     tasks = _tasks(study, missing, named, pace)
     if study.on == "model":
-        yield from Alone(points).batches(islice(tasks, 1))
+        yield from Alone(points, shelf).batches(islice(tasks, 1))
     yield from crew.batches(tasks)
 
 

@@ -52,10 +52,13 @@ class Shelf:
 
     Args:
         folder: made when the first batch is put into it.
+
+    Attributes:
+        folder: the same.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._files: list[Path] = []
         self._addresses: list[NDArray[np.void]] = []
         for path in sorted(folder.glob("*.npz")):
@@ -86,34 +89,10 @@ class Shelf:
         places.row[asked[there]] = place - begins[number]
         return places
 
-    def put(self, batch: Batch) -> None:
-        """Keep a batch; it is on disk when this returns.
-
-        Raises:
-            RecordingError: the folder cannot be written.
-        """
-        name = hashlib.blake2b(batch.addresses.tobytes(), digest_size=ADDRESS)
-        path = self._folder / f"{name.hexdigest()}.npz"
-        part = path.with_suffix(f".{os.getpid()}.part")
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            with part.open("wb") as file:
-                np.savez(file, **_arrays(batch))  # type: ignore[arg-type] # names ours
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(path)
-            descriptor = os.open(self._folder, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-        except OSError as reason:
-            raise RecordingError(
-                f"{path} cannot be written: {reason.strerror or reason}. What was "
-                "finished before is kept; make room and start the study again."
-            ) from reason
-        self._files.append(path)
-        self._addresses.append(batch.addresses)
+    def add(self, batch: Path, addresses: NDArray[np.void]) -> None:
+        """Find these points in a batch that `put` wrote, in this process or another."""
+        self._files.append(batch)
+        self._addresses.append(addresses)
 
     def gather(
         self, places: Places, names: Sequence[str]
@@ -150,8 +129,36 @@ class Shelf:
         except DAMAGED:
             return  # its points are computed again, into the same file
         if addresses.dtype == NAME:  # of an earlier version of this program
-            self._addresses.append(addresses)
-            self._files.append(path)
+            self.add(path, addresses)
+
+
+def put(batch: Batch, folder: Path) -> Path:
+    """Write a batch into a shelf's folder; it is on disk when this returns.
+
+    Raises:
+        RecordingError: the folder cannot be written.
+    """
+    name = hashlib.blake2b(batch.addresses.tobytes(), digest_size=ADDRESS)
+    path = folder / f"{name.hexdigest()}.npz"
+    part = path.with_suffix(f".{os.getpid()}.part")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            np.savez(file, **_arrays(batch))  # type: ignore[arg-type] # names ours
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as reason:
+        raise RecordingError(
+            f"{path} cannot be written: {reason.strerror or reason}. What was "
+            "finished before is kept; make room and start the study again."
+        ) from reason
+    return path
 
 
 def _arrays(batch: Batch) -> dict[str, NDArray[Any]]:

@@ -20,13 +20,14 @@ from dataclasses import replace
 from functools import lru_cache
 from multiprocessing import parent_process
 from multiprocessing.connection import wait as wait_for
+from pathlib import Path
 from threading import Thread
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
 from tactile_lab.studies.addresses import code_digests
 from tactile_lab.studies.points import Points, Task
-from tactile_lab.studies.shelf import Batch
+from tactile_lab.studies.shelf import Batch, Shelf, put
 from tactile_lab.studies.study import Study
 
 AHEAD = 2
@@ -39,13 +40,34 @@ MOST_ENDED = 3
 """So often in a row workers may be ended from outside before a batch is finished."""
 
 
+class Finished(NamedTuple):
+    """A batch that is on disk: how many points it has, how many of them failed."""
+
+    points: int
+    failed: int
+
+
+class Stored(NamedTuple):
+    """What a worker of this machine answers: its batch's file, how many failed.
+
+    Short, so that a pipe takes it whole or not at all: one who is killed within a long
+    answer leaves half of it there, and the rest is waited for without end.
+    """
+
+    path: Path
+    failed: int
+
+
 class Workers(Protocol):
     """Whoever computes batches."""
 
     count: int
 
-    def batches(self, tasks: Iterable[Task]) -> Iterator[Batch]:
-        """Each task's batch, in any order; tasks are taken as they are needed."""
+    def batches(self, tasks: Iterable[Task]) -> Iterator[Finished]:
+        """Each task's batch once it is on the shelf, in any order.
+
+        Tasks are taken as they are needed.
+        """
 
 
 class Alone:
@@ -53,16 +75,18 @@ class Alone:
 
     Args:
         points: computes them.
+        shelf: where they are put.
     """
 
     count = 1
 
-    def __init__(self, points: Points) -> None:
-        self._points = points
+    def __init__(self, points: Points, shelf: Shelf) -> None:
+        self._points, self._shelf = points, shelf
 
-    def batches(self, tasks: Iterable[Task]) -> Iterator[Batch]:
+    def batches(self, tasks: Iterable[Task]) -> Iterator[Finished]:
         """In the order of the tasks."""
-        return map(self._points.batch, tasks)
+        for task in tasks:
+            yield _shelved(self._points.batch(task), task, self._shelf)
 
 
 class Pool:
@@ -72,19 +96,25 @@ class Pool:
         start: gives an executor that sends them work; called again where all of its
             workers are gone.
         study: what they compute.
+        shelf: where the batches are put.
         count: how many they are.
         lost: what an executor raises where its workers are gone for good.
+        local: whether they write into the shelf's folder themselves.
     """
 
     def __init__(
         self,
         start: Callable[[], Executor],
         study: Study,
+        shelf: Shelf,
         count: int,
         lost: tuple[type[BaseException], ...] = (),
+        *,
+        local: bool = True,
     ) -> None:
         self.count = count
         self._start = start
+        self._shelf, self._into = shelf, shelf.folder if local else None
         self._study = pickle.dumps(_without_points(study))
         self._lost: tuple[type[BaseException], ...] = (
             BrokenExecutor,
@@ -92,14 +122,14 @@ class Pool:
             *lost,
         )
 
-    def batches(self, tasks: Iterable[Task]) -> Iterator[Batch]:
+    def batches(self, tasks: Iterable[Task]) -> Iterator[Finished]:
         """As they are finished; a worker that is ended is replaced.
 
         Raises:
             LinkLostError: workers are gone, or end again and again.
         """
         coming, waiting = iter(tasks), deque[Task]()
-        running: dict[Future[Batch], Task] = {}
+        running: dict[Future[Batch | Stored], Task] = {}
         executor, ended = self._start(), 0
         try:
             while True:
@@ -109,16 +139,17 @@ class Pool:
                         if task is None:
                             break
                         waiting.appendleft(task)  # until it is sent
-                        running[executor.submit(_on_worker, self._study, task)] = task
-                        waiting.popleft()
+                        sent = executor.submit(
+                            _on_worker, self._study, task, self._into
+                        )
+                        running[sent] = waiting.popleft()
                     if not running:
                         return
                     done, _ = wait(running, return_when=FIRST_COMPLETED)
                     for one in done:
-                        batch = one.result()
-                        del running[one]
+                        found = one.result()
                         ended = 0
-                        yield batch
+                        yield _shelved(found, running.pop(one), self._shelf)
                 except BrokenExecutor:
                     ended += 1
                     if ended > MOST_ENDED:
@@ -139,6 +170,14 @@ class Pool:
             executor.shutdown(wait=False)
 
 
+def _shelved(found: Batch | Stored, task: Task, shelf: Shelf) -> Finished:
+    """The points of a task are on the shelf when this returns."""
+    if isinstance(found, Batch):
+        found = Stored(put(found, shelf.folder), len(found.reasons))
+    shelf.add(found.path, task.addresses)
+    return Finished(task.addresses.size, found.failed)
+
+
 def _without_points(study: Study) -> Study:
     """The study as a worker needs it: the values of its points come with each task."""
     axes = tuple(replace(axis, values=axis.values[:1]) for axis in study.design.axes)
@@ -147,13 +186,18 @@ def _without_points(study: Study) -> Study:
 
 @contextmanager
 def workers(
-    study: Study, points: Points, count: int | None, scheduler: str | None
+    study: Study,
+    points: Points,
+    shelf: Shelf,
+    count: int | None,
+    scheduler: str | None,
 ) -> Iterator[Workers]:
     """Whoever computes this study.
 
     Args:
         study: which.
         points: computes them in this process.
+        shelf: where they are put.
         count: processes; as many as cores unless given.
         scheduler: address of a Dask scheduler; None for this machine.
 
@@ -167,18 +211,19 @@ def workers(
                 'on = "bench" plays one run after another on this machine\'s '
                 "instruments; leave --scheduler out."
             )
-        yield Alone(points)
+        yield Alone(points, shelf)
     elif scheduler is not None:
         with _client(scheduler) as client:
             from distributed.scheduler import KilledWorker
 
             threads = sum(client.nthreads().values())
-            yield Pool(client.get_executor, study, threads, (KilledWorker, OSError))
+            lost = (KilledWorker, OSError)
+            yield Pool(client.get_executor, study, shelf, threads, lost, local=False)
     elif count == 1:
-        yield Alone(points)
+        yield Alone(points, shelf)
     else:
         count = count or os.cpu_count() or 1
-        yield Pool(lambda: _processes(count), study, count)
+        yield Pool(lambda: _processes(count), study, shelf, count)
 
 
 def _processes(count: int) -> Executor:
@@ -261,5 +306,7 @@ def _points(study: bytes) -> Points:
     return Points(pickle.loads(study))
 
 
-def _on_worker(study: bytes, task: Task) -> Batch:
-    return _points(study).batch(task)
+def _on_worker(study: bytes, task: Task, into: Path | None) -> Batch | Stored:
+    """The batch of a task, or its file where there is a folder to put it into."""
+    batch = _points(study).batch(task)
+    return Stored(put(batch, into), len(batch.reasons)) if into else batch

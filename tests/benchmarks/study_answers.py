@@ -132,14 +132,13 @@ def scale() -> str:
     began = time.process_time()
     batch = points.batch(task(some, named))
     computing = (time.process_time() - began) / some.size
-    from tactile_lab.studies.shelf import Shelf
+    from tactile_lab.studies.shelf import put
 
     with tempfile.TemporaryDirectory() as name:
-        shelf = Shelf(Path(name))
         began, wall = time.process_time(), time.perf_counter()
         for i in range(20):
             mine = replace(batch, addresses=np.roll(batch.addresses, i))
-            shelf.put(mine)
+            put(mine, Path(name))
         putting = (time.process_time() - began) / 20
         waiting = (time.perf_counter() - wall) / 20
         size = sum(f.stat().st_size for f in Path(name).iterdir()) / 20 / some.size

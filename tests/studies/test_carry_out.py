@@ -1,6 +1,7 @@
 """A study on disk: the same whoever computes it, and never twice."""
 
 import multiprocessing
+import multiprocessing.connection
 import os
 import signal
 import subprocess
@@ -357,6 +358,30 @@ def test_a_worker_that_is_killed_is_replaced(tmp_path: Path) -> None:
 
     found = carry_out(asked, tmp_path, count=2, tell=tell)
     assert hit and same(found, done(asked, tmp_path / "alone")[0])
+
+
+def test_workers_answer_so_briefly_that_no_kill_leaves_half_an_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The client would wait for the rest of it without end.
+
+    What a pipe takes at once it has whole or not at all.
+    """
+    send, most = multiprocessing.connection.Connection._send, 512  # by POSIX
+    (tmp_path / "answers").touch()
+
+    def watched(self, message, *how) -> None:
+        if multiprocessing.parent_process() is not None:
+            with (tmp_path / "answers").open("a") as told:
+                told.write(f"{len(message)}\n")
+        send(self, message, *how)
+
+    monkeypatch.setattr(multiprocessing.connection.Connection, "_send", watched)
+    asked = load_study({**LEVELS, "draw": {"points": 100}})
+    pool, _ = done(asked, tmp_path, count=2)
+    sizes = [int(line) for line in (tmp_path / "answers").read_text().split()]
+    assert sizes and max(sizes) <= most
+    assert pool.failed == 0
 
 
 def test_a_dask_cluster_gives_the_same(tmp_path: Path) -> None:
