@@ -13,6 +13,7 @@ import sys
 import traceback
 from functools import cache
 from importlib import metadata, resources
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +23,20 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from importlib.resources.abc import Traversable
     from types import ModuleType
+    from typing import NoReturn
 
     from tactile_lab.trial import Protocol
+
+
+class _AsWritten(SourceFileLoader):
+    """Loads a Python file without byte code, which would lie beside it and may be old.
+
+    What runs is what the file says now, also where it was changed twice in a second.
+    """
+
+    def path_stats(self, path: object) -> NoReturn:
+        """Nothing that byte code could be compared with."""
+        raise OSError(f"no byte code of {path} is used")
 
 
 @cache
@@ -67,15 +80,16 @@ def module_from_file(path: Path, what: str) -> ModuleType:
         raise SceneError(f"{what} file {path} does not exist or is not a file.")
     mark = hashlib.sha256(str(path).encode()).hexdigest()[:8]
     name = f"_{what.lower()}_{path.stem}_{mark}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
+    loader = _AsWritten(name, str(path))
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    if spec is None or path.suffix != ".py":
         raise SceneError(f"{what} file {path} is not Python; its name must end in .py.")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # annotations of the class are resolved there
+    sys.modules[name] = module  # annotations of the class are resolved there
     try:
-        spec.loader.exec_module(module)
+        loader.exec_module(module)
     except (Exception, SystemExit) as reason:
-        del sys.modules[spec.name]
+        del sys.modules[name]
         frames = traceback.extract_tb(reason.__traceback__)
         lines = [f.lineno for f in frames if f.filename == str(path)]
         line = f" (line {lines[-1]})" if lines else ""

@@ -1,5 +1,6 @@
 """Protocols, scenes and dialects are found by name, never by import."""
 
+import os
 import subprocess
 import sys
 
@@ -60,6 +61,16 @@ def test_a_field_may_be_a_list_as_well_as_a_tuple(tmp_path):
     path.write_text(GOOD + fields)
     scene = load(str(path), {"protocol.levels": [0.2, 0.3], "protocol.holds": [2.0]})
     assert scene.protocol.model_dump() == {"levels": [0.2, 0.3], "holds": (2.0,)}
+
+
+def test_a_file_runs_as_it_is_now_and_leaves_nothing_beside_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    path = tmp_path / "mine.py"
+    for title in ("Mine", "Main"):  # as long, and of the same instant
+        path.write_text(GOOD.replace('"Mine"', f'"{title}"'))
+        os.utime(path, (1e9, 1e9))
+        assert protocol_from_file(path).title == title
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_users_file_never_shadows_ours(tmp_path):
