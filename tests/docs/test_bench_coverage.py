@@ -28,7 +28,8 @@ def test_one_number_repeated_is_no_share_of_hits(values, share):
 def test_a_case_that_was_not_measured_here_stays_on_the_page():
     made = runpy.run_path(str(PAGE))
     line = (
-        "| wiring_check | V_GS | 26 | 100.0 % | -0.03 | 0.21 | 0 of 26 | – | 0000000 |"
+        "| wiring_check | V_GS | 26 of 26 | 100.0 % | 86.8 to 100.0 % | cannot tell "
+        "| -0.03 | 0.21 | 0 of 26 | – | 0000000 |"
     )
     row = {
         "case": "rate_force, three forces", "seed": 0, "commit": "1111111",
@@ -37,7 +38,32 @@ def test_a_case_that_was_not_measured_here_stays_on_the_page():
     page = made["table"]([row], f"| run |\n{line}\n| rate_force, three forces | old |")
     assert line in page
     assert "| old |" not in page
-    assert "| rate_force, three forces | V_GS | 1 |" in page
+    assert "| rate_force, three forces | V_GS | 1 of 1 |" in page
+
+
+@pytest.mark.parametrize(
+    ("runs", "outside", "said"),
+    [(26, 3, "cannot tell"), (100, 0, "cannot tell"), (200, 0, "no"),
+     (200, 20, "cannot tell"), (1000, 50, "yes"), (1000, 100, "no")],
+)  # fmt: skip
+def test_93_to_97_is_said_of_runs_that_can_tell_it(runs, outside, said):
+    # three numbers of one run that hold or miss together are one draw
+    rows = [
+        {
+            "case": "force_check", "seed": seed, "commit": "0000000", "cpu": 1.0,
+            "told": [
+                ["F(I) - F(0) by the field", 1.0, 0.9, 1.1, 1.0 if held else 2.0]
+                for _ in range(3)
+            ],
+        }
+        for seed, held in enumerate([False] * outside + [True] * (runs - outside))
+    ]  # fmt: skip
+    rows[-1]["told"][0][1] = 1.01  # or it is one number repeated
+    page = runpy.run_path(str(PAGE))["table"](rows)
+    (row,) = [line for line in page.splitlines() if "F(0) by the field |" in line]
+    cells = row.split(" | ")
+    assert cells[2] == f"{3 * runs} of {runs}"
+    assert cells[5] == said
 
 
 def test_every_page_that_measures_is_listed_with_what_it_measures():
