@@ -25,6 +25,10 @@ CELLS = 4_000_000
 """Most counts in a film."""
 FRAMES = 200
 """Frames of a film unless there are too many taxels for as many."""
+PAUSE = 50
+"""Time for which a frame is shown, ms."""
+FADING = 0.75
+"""What is left of a spike's colour in the next frame."""
 DOTS = 20_000
 """Most events in the raster; of more, every so many-th is drawn."""
 BINS = 200
@@ -143,7 +147,7 @@ def raster(events: Events) -> Plot:
 
 
 def _film(skin: Skin, events: Events) -> dict[str, Any]:
-    size = events.places.shape[0]
+    array, size = skin.array, events.places.shape[0]
     frames = max(1, min(FRAMES, CELLS // size))
     counts = np.zeros((frames, size), np.int64)
     time, taxel, step = events.time, events.taxel, 1 << 22
@@ -152,27 +156,42 @@ def _film(skin: Skin, events: Events) -> dict[str, Any]:
         at = np.minimum(when, frames - 1), taxel[first : first + step]
         np.add.at(counts, at, 1)
     long = events.duration / frames
+    whole = ~array.named(array.stuck)
+    faded, brightest = np.zeros(size), 0.0
+    for frame in counts:
+        faded = FADING * faded + frame
+        brightest = max(brightest, float(faded[whole].max(initial=0.0)))
+    most_of_all = events.count[whole].max(initial=1)
+    kind = np.dtype(np.uint8 if counts.max() < 1 << 8 else "<u2")
     data = {
         "x": events.places[:, 0].tolist(),
         "y": events.places[:, 1].tolist(),
-        "side": skin.array.side,
+        "side": array.side,
+        "dead": array.dead,
+        "stuck": array.stuck,
         "frames": frames,
-        "fullest": int(counts.sum(axis=1).argmax()),
+        "pause": PAUSE,
+        "fullest": int(counts[:, whole].sum(axis=1).argmax()),
         "from": long / 2,
         "step": long,
-        "most": int(max(counts.max(), 1)),
-        "most_of_all": int(max(events.count.max(), 1)),
+        "fading": FADING,
+        "most": brightest or 1.0,
+        "most_of_all": int(most_of_all),
+        "bytes": kind.itemsize,
         "counts": base64.b64encode(
-            np.minimum(counts, 255).astype(np.uint8).tobytes()
+            np.minimum(counts, np.iinfo(kind).max).astype(kind).tobytes()
         ).decode(),
     }
     script = resources.files("tactile_lab.report") / "film.js"
+    broken = "" if not array.dead else " Crossed out: dead."
+    broken += "" if not array.stuck else " Framed: stuck, left out of full colour."
     return {
         "frames": frames,
         "data": Markup(json.dumps(data).replace("<", "\\u003c")),
         "script": Markup(script.read_text(encoding="utf-8")),
         "caption": "Each square is a taxel where it lies, seen from above, x to the "
-        f"right. A frame lasts {show(long, 's', 2)}; a spike fades by a quarter from "
-        f"frame to frame. Full colour: {data['most']} in a frame, "
-        f"{data['most_of_all']} of all spikes.",
+        f"right. A frame lasts {show(long, 's', 2)} and is played in {PAUSE} ms; "
+        f"{100 - 100 * FADING:.0f} % of a spike's colour fades from frame to frame. "
+        f"Full colour: the most any taxel comes to, {most_of_all:,} for all spikes."
+        f"{broken}",
     }
