@@ -14,6 +14,7 @@ from serial.tools import list_ports
 from drivers.coil.source import CoilSource
 from drivers.serial_line.link import SerialLink
 from drivers.teslameter import Teslameter
+from drivers.thermometer import Thermometer
 from drivers.usb_presence import present
 from drivers.voltage_source import SourceMeter
 from tactile_lab.bench import CoilLimits
@@ -23,7 +24,8 @@ from tactile_lab.instruments.dialects import (
     coil_dialect,
     dialect_ids,
     load_dialect,
-    meter_dialect,
+    teslameter_dialect,
+    thermometer_dialect,
     voltage_dialect,
 )
 from tactile_lab.instruments.serial_dialect import SerialDialect, SerialSettings
@@ -96,7 +98,7 @@ def try_out(
         UnsafeError: a source's output could not be verified off.
     """
     clock = RealClock()
-    device: CoilSource | Teslameter | SourceMeter
+    device: CoilSource | Teslameter | Thermometer | SourceMeter
     role = load_dialect(dialect).role
     if role == "coil":
         row = coil_dialect(dialect)
@@ -105,8 +107,11 @@ def try_out(
         speaks = voltage_dialect(dialect)
         most = VoltageLimits(highest=speaks.ranges[0].full)
         device = SourceMeter("voltage", speaks, address, most, clock, baud=baud)
+    elif role == "thermometer":
+        warm = thermometer_dialect(dialect).at(None)
+        device = Thermometer(warm, address, clock, baud=baud)
     else:
-        device = Teslameter(meter_dialect(dialect), address, clock, baud=baud)
+        device = Teslameter(teslameter_dialect(dialect), address, clock, baud=baud)
     if transcript is not None:
         device.record(transcript)
     try:

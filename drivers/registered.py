@@ -13,14 +13,16 @@ from tactile_lab.errors import SceneError
 from tactile_lab.generator import AnalogueInput
 from tactile_lab.instruments.dialects import (
     coil_dialect,
-    meter_dialect,
     scope_dialect,
+    teslameter_dialect,
+    thermometer_dialect,
     voltage_dialect,
 )
 from tactile_lab.instruments.registry import (
     CoilDriver,
     FieldMeterDriver,
     ScopeDriver,
+    ThermometerDriver,
     VoltageSourceDriver,
 )
 
@@ -28,15 +30,18 @@ if TYPE_CHECKING:
     from drivers.coil.source import CoilSource
     from drivers.picoscope.scope import PicoScope
     from drivers.teslameter import Teslameter
+    from drivers.thermometer import Thermometer
     from drivers.usbtmc.scope import UsbtmcScope
     from drivers.voltage_source import SourceMeter
     from tactile_lab.clock import Clock
+    from tactile_lab.instruments.meter_dialect import ThermometerDialect
     from tactile_lab.instruments.scope_dialect import ScopeDialect
     from tactile_lab.instruments.serial_dialect import CoilDialect
     from tactile_lab.scene.bench_file import (
         CoilSpec,
         FieldMeterSpec,
         ScopeSpec,
+        ThermometerSpec,
         VoltageSourceSpec,
     )
     from tactile_lab.voltage_source import VoltageSourceCapability
@@ -140,7 +145,20 @@ def usbtmc_dialect(table: ScopeSpec) -> ScopeDialect:
 def _teslameter(table: FieldMeterSpec, clock: Clock) -> Teslameter:
     from drivers.teslameter import Teslameter
 
-    return Teslameter(meter_dialect(table.dialect), table.port, clock, baud=table.baud)
+    return Teslameter(
+        teslameter_dialect(table.dialect), table.port, clock, baud=table.baud
+    )
+
+
+def _thermometer(table: ThermometerSpec, clock: Clock) -> Thermometer:
+    from drivers.thermometer import Thermometer
+
+    return Thermometer(thermometer_row(table), table.port, clock, baud=table.baud)
+
+
+def thermometer_row(table: ThermometerSpec) -> ThermometerDialect:
+    """How the thermometer of a bench file speaks of the input that it names."""
+    return thermometer_dialect(table.dialect).at(table.input)
 
 
 def _source_meter(table: VoltageSourceSpec, clock: Clock) -> SourceMeter:
@@ -162,6 +180,7 @@ PS3000A = ScopeDriver(
 )
 USBTMC = ScopeDriver(make=_usbtmc_scope, capability=_usbtmc_capability)
 SERIAL_METER = FieldMeterDriver(make=_teslameter)
+SERIAL_THERMOMETER = ThermometerDriver(make=_thermometer, check=thermometer_row)
 SERIAL_VOLTAGE_SOURCE = VoltageSourceDriver(
     make=_source_meter, capability=_source_meter_capability
 )

@@ -4,74 +4,20 @@ from __future__ import annotations
 
 import re
 
-from drivers.serial_line.conversation import Conversation
-from drivers.serial_line.instrument import SerialInstrument
-from drivers.serial_line.link import SerialLink, Spy
+from drivers.serial_line.meter import SerialMeter
 from tactile_lab.bench import Reading
-from tactile_lab.clock import Clock
 from tactile_lab.errors import BadReplyError, LimitError
-from tactile_lab.instruments.serial_dialect import MULTIPLIERS, MeterDialect
+from tactile_lab.instruments.meter_dialect import MULTIPLIERS, TeslameterDialect
 
 MOST_READINGS = 4
 """Readings to take until two in a row have one multiplier."""
 
 
-class Teslameter(SerialInstrument[Conversation[MeterDialect]]):
-    """A field meter behind a serial port.
+class Teslameter(SerialMeter[TeslameterDialect]):
+    """A field meter behind a serial port."""
 
-    Args:
-        dialect: how the model speaks.
-        port: address for pyserial.
-        clock: the bench's time.
-        baud: instead of the row's.
-        spy: told of every byte, or None.
-    """
-
-    def __init__(
-        self,
-        dialect: MeterDialect,
-        port: str,
-        clock: Clock,
-        *,
-        baud: int | None = None,
-        spy: Spy | None = None,
-    ) -> None:
-        self.dialect = dialect
-        wire = dialect.serial.at(baud)
-        link = SerialLink(
-            port, wire, clock, what="teslameter", identify=dialect.identify, spy=spy
-        )
-        self._clock = clock
-        super().__init__(Conversation(link, dialect))
-        self._last_factor = 1.0
-
-    @property
-    def interval(self) -> float:
-        """Shortest time between two readings, s."""
-        return self.dialect.interval
-
-    def open(self) -> None:
-        """Connect, identify, set unit and range, and read back that they were taken.
-
-        Raises:
-            NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
-            BadReplyError: another instrument answers, or it does not take its settings.
-        """
-        try:
-            self._wire.connect()
-            self._wire.set_up("its readings could be in another unit")
-        except BaseException:
-            self._wire.link.close()
-            raise
-
-    def look(self) -> str:
-        """Who answers: asked and closed, nothing is set.
-
-        Raises:
-            InstrumentError: the port or what is behind it, as `open`.
-        """
-        with self._met():
-            return self.identity
+    what = "teslameter"
+    _last_factor = 1.0
 
     def read(self) -> Reading:
         """Magnetic flux density, T.
@@ -90,22 +36,6 @@ class Teslameter(SerialInstrument[Conversation[MeterDialect]]):
             "The teslameter changes its multiplier from reading to reading. Fix its "
             "range at its front panel, or keep the field steady."
         )
-
-    def settings(self) -> dict[str, str]:
-        """Settings read back, for the run's record."""
-        link = self._wire.link
-        known = {
-            "identity": self.identity,
-            "dialect": self.dialect.id,
-            "port": link.port,
-            "baud": str(link.wire.baud),
-        }
-        asked = {k: self._wire.query(line) for k, line in self.dialect.report.items()}
-        return known | asked
-
-    def close(self) -> None:
-        """Let go of the port; idempotent."""
-        self._let_go()
 
     def _value(self) -> float:
         """What the meter shows, in its unit.

@@ -87,6 +87,7 @@ def open_bench(
     scope_faults: Sequence[Any] = (),
     coil_faults: Sequence[Any] = (),
     meter_faults: Sequence[Any] = (),
+    thermometer_faults: Sequence[Any] = (),
     voltage_faults: Sequence[Any] = (),
     world: PlantOptions | None = None,
     make: Any = None,
@@ -100,6 +101,7 @@ def open_bench(
         scope_faults: what goes wrong with the scope, and when, as its far end takes it.
         coil_faults: the same for the current source.
         meter_faults: the same for the teslameter.
+        thermometer_faults: the same for the thermometer.
         voltage_faults: the same for each source of a voltage.
         world: physics with its wiring faults, instead of the scene's.
         make: what scope there is, and how it is connected, as its far end takes it.
@@ -124,6 +126,7 @@ def open_bench(
             "coil": coil_faults,
             "scope": scope_faults,
             "field_meter": meter_faults,
+            "thermometer": thermometer_faults,
             "voltage_source": voltage_faults,
         },
         make=make,

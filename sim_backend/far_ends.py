@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from drivers.registered import usbtmc_dialect
+from drivers.registered import thermometer_row, usbtmc_dialect
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.dialects import (
     coil_dialect,
-    meter_dialect,
+    teslameter_dialect,
     voltage_dialect,
 )
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from drivers.coil.source import CoilSource
     from drivers.picoscope.scope import PicoScope
     from drivers.teslameter import Teslameter
+    from drivers.thermometer import Thermometer
     from drivers.usbtmc.scope import UsbtmcScope
     from drivers.voltage_source import SourceMeter
     from sim_backend.world import WiredInputs, World
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         CoilSpec,
         FieldMeterSpec,
         ScopeSpec,
+        ThermometerSpec,
         VoltageSourceSpec,
     )
 
@@ -118,7 +120,7 @@ def serial_meter(table: FieldMeterSpec, world: World) -> Teslameter:
     from sim_backend.serial_line.wires import plug_in
     from sim_backend.teslameter import meter_far_end
 
-    row = meter_dialect(table.dialect)
+    row = teslameter_dialect(table.dialect)
     probe = meter_far_end(
         world.plant,
         row,
@@ -129,6 +131,23 @@ def serial_meter(table: FieldMeterSpec, world: World) -> Teslameter:
     faults = world.faults.get("field_meter", ())
     far_end = plug_in(probe, row.serial, world.clock, "field-meter", faults)
     return Teslameter(row, far_end.url, world.clock)
+
+
+def serial_thermometer(table: ThermometerSpec, world: World) -> Thermometer:
+    """A serial thermometer at the plant's sensor."""
+    from drivers.thermometer import Thermometer
+    from sim_backend.serial_line.wires import plug_in
+    from sim_backend.thermometer import SensorFault, thermometer_far_end
+
+    row = thermometer_row(table)
+    warm = thermometer_far_end(world.plant, row, world.clock, seed=world.simulated.seed)
+    given = world.faults.get("thermometer", ())
+    for one in given:
+        if isinstance(one, SensorFault):
+            warm.fault = one
+    faults = [one for one in given if not isinstance(one, SensorFault)]
+    far_end = plug_in(warm, row.serial, world.clock, "thermometer", faults)
+    return Thermometer(row, far_end.url, world.clock)
 
 
 def serial_voltage_source(table: VoltageSourceSpec, world: World) -> SourceMeter:

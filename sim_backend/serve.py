@@ -1,4 +1,4 @@
-"""The simulated serial instruments for other programs: one coil behind both."""
+"""The simulated serial instruments for other programs: one coil behind them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from sim_backend.plant.options import PlantOptions
 from sim_backend.serial_line.servers import PtyServer, SerialServer, TcpServer
 from sim_backend.serial_line.wires import FarEnd, LineInstrument
 from sim_backend.teslameter import meter_far_end
+from sim_backend.thermometer import thermometer_far_end
 from sim_backend.voltage_source import voltage_far_end
 from tactile_lab.clock import Clock, RealClock
 from tactile_lab.errors import InstrumentError, SceneError
 from tactile_lab.instruments.dialects import (
     coil_dialect,
-    meter_dialect,
+    teslameter_dialect,
+    thermometer_dialect,
     voltage_dialect,
 )
 from tactile_lab.instruments.serial_dialect import SerialSettings
@@ -64,6 +66,14 @@ class Gate:
         self.volts[name] = volts
 
 
+class Air:
+    """The air of the room, in which a thermometer's sensor hangs."""
+
+    def temperature(self, time: float) -> float:
+        """Its temperature at any `time` s, K."""
+        return 293.15
+
+
 class ServedBench:
     """Simulated instruments at addresses other programs can open.
 
@@ -71,8 +81,9 @@ class ServedBench:
         coil: `pty`, `tcp:PORT` (0 for any free port) or None for no source.
         teslameter: the same for the teslameter.
         voltage_source: the same for a source meter that holds V_GS.
-        coil_row, meter_row, voltage_row: ids of the dialect rows they speak, or files
-            with one.
+        thermometer: the same for a thermometer.
+        coil_row, meter_row, voltage_row, thermometer_row: ids of the dialect rows they
+            speak, or files with one.
         baud: of the source instead of its row's.
         paced: let bytes take the time the baud rate gives them, and the instruments
             the time they take to act.
@@ -94,9 +105,11 @@ class ServedBench:
         coil: str | None = "pty",
         teslameter: str | None = None,
         voltage_source: str | None = None,
+        thermometer: str | None = None,
         coil_row: str = "kepco-bop",
         meter_row: str = "lakeshore-425",
         voltage_row: str = "keithley-2400-voltage",
+        thermometer_row: str = "lakeshore-218",
         baud: int | None = None,
         paced: bool = False,
         log: Path | None = None,
@@ -117,7 +130,7 @@ class ServedBench:
                     source.on_change = _writer(self._log)
                 self._add("coil", coil, source, wire.at(baud), clock, paced)
             if teslameter is not None:
-                known = meter_dialect(meter_row)
+                known = teslameter_dialect(meter_row)
                 meter = meter_far_end(plant, known, clock, noise=2e-6, seed=seed)
                 self._add("teslameter", teslameter, meter, known.serial, clock, paced)
             if voltage_source is not None:
@@ -126,6 +139,10 @@ class ServedBench:
                 self._add(
                     "voltage_source", voltage_source, held, speaks.serial, clock, paced
                 )
+            if thermometer is not None:
+                warm = thermometer_dialect(thermometer_row).at(None)
+                sensor = thermometer_far_end(Air(), warm, clock, seed=seed)
+                self._add("thermometer", thermometer, sensor, warm.serial, clock, paced)
         except BaseException:
             self.close()
             raise

@@ -20,6 +20,9 @@ from tactile_lab.commands.terminal import print_json, refusing, say
     help="Serve a source meter that holds V_GS there.",
 )
 @click.option(
+    "--thermometer", metavar="pty|tcp:PORT", help="Serve a thermometer there."
+)
+@click.option(
     "--coil-dialect",
     default="kepco-bop",
     show_default=True,
@@ -40,6 +43,13 @@ from tactile_lab.commands.terminal import print_json, refusing, say
     metavar="ROW|FILE",
     help="What the source meter speaks.",
 )
+@click.option(
+    "--thermometer-dialect",
+    default="lakeshore-218",
+    show_default=True,
+    metavar="ROW|FILE",
+    help="What the thermometer speaks.",
+)
 @click.option("--baud", type=click.IntRange(50, 4_000_000), help="Of the source.")
 @click.option(
     "--paced", is_flag=True, help="Let bytes take the time the baud rate gives them."
@@ -54,9 +64,11 @@ def command(
     coil: str | None,
     teslameter: str | None,
     voltage_source: str | None,
+    thermometer: str | None,
     coil_dialect: str,
     teslameter_dialect: str,
     voltage_dialect: str,
+    thermometer_dialect: str,
     baud: int | None,
     paced: bool,
     log: Path | None,
@@ -70,16 +82,18 @@ def command(
     """
     from sim_backend.serve import ServedBench
 
-    if coil is None and teslameter is None and voltage_source is None:
+    if not any((coil, teslameter, voltage_source, thermometer)):
         coil = teslameter = "pty"
     with refusing():
         served = ServedBench(
             coil=coil,
             teslameter=teslameter,
             voltage_source=voltage_source,
+            thermometer=thermometer,
             coil_row=coil_dialect,
             meter_row=teslameter_dialect,
             voltage_row=voltage_dialect,
+            thermometer_row=thermometer_dialect,
             baud=baud,
             paced=paced,
             log=log,

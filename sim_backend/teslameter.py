@@ -12,7 +12,7 @@ from sim_backend.serial_line.from_row import Answer, RowParser, invented
 from sim_backend.serial_line.scpi import Handler, ScpiError, ScpiParser, number
 from tactile_lab.clock import Clock
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.serial_dialect import MULTIPLIERS, MeterDialect
+from tactile_lab.instruments.meter_dialect import MULTIPLIERS, TeslameterDialect
 
 PER_TESLA = {1: 1e4, 2: 1.0, 3: 1e4, 4: 1.0 / (4e-7 * np.pi)}
 """Answer per tesla for unit 1 G, 2 T, 3 Oe, 4 A/m."""
@@ -213,7 +213,7 @@ class RowMeter:
         SceneError: no answer can be made from one of its patterns.
     """
 
-    def __init__(self, plant: DrivenCoil, row: MeterDialect, clock: Clock) -> None:
+    def __init__(self, plant: DrivenCoil, row: TeslameterDialect, clock: Clock) -> None:
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")
         self.gap = row.serial.min_gap
@@ -237,7 +237,7 @@ class RowMeter:
 
 def meter_far_end(
     plant: DrivenCoil,
-    row: MeterDialect,
+    row: TeslameterDialect,
     clock: Clock,
     *,
     noise: float = 0.0,

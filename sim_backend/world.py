@@ -76,7 +76,8 @@ class World:
         inputs: what lies at the scope's inputs; None where no scope is needed.
         simulated: the scene's ``[simulated]`` table.
         faults: what goes wrong and when, by kind of instrument ("coil", "scope",
-            "field_meter", "voltage_source"), as its far end takes it; for tests.
+            "field_meter", "thermometer", "voltage_source"), as its far end takes it;
+            for tests.
         make: what scope there is and how it is connected, as its far end takes it.
     """
 

@@ -467,8 +467,8 @@ class GeneratorScope(Scope, Protocol):
         ...
 
 
-class FieldMeter(Protocol):
-    """A teslameter."""
+class Meter(Protocol):
+    """What reads one quantity: a teslameter, a thermometer."""
 
     @property
     def identity(self) -> str:
@@ -480,7 +480,7 @@ class FieldMeter(Protocol):
         ...
 
     def read(self) -> Reading:
-        """Magnetic flux density, T."""
+        """Magnetic flux density, T; temperature, K."""
         ...
 
     def settings(self) -> dict[str, str]:
@@ -512,7 +512,8 @@ class Bench:
     clock: Clock
     coil: Coil | None = None
     scope: Scope | None = None
-    field_meter: FieldMeter | None = None
+    field_meter: Meter | None = None
+    thermometer: Meter | None = None
     generator: Generator | None = None
     voltage_sources: Mapping[str, VoltageSource] = field(default_factory=dict)
     place_probes: Callable[[str], None] | None = None

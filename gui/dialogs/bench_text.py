@@ -78,6 +78,8 @@ def bench_text(choice: BenchChoice) -> str:
     }
     if sources:
         data["voltage_source"] = sources
+    if not base.get("thermometer", {"port": "sim:"})["port"].startswith("sim:"):
+        data["thermometer"] = base["thermometer"]
     if choice.coil_port:
         same = base.get("coil", {}).get("dialect") == choice.coil_dialect
         data["coil"] = {

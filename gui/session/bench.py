@@ -41,6 +41,7 @@ ROLES = {
     "coil": "Coil source",
     "scope": "Oscilloscope",
     "meter": "Teslameter",
+    "thermometer": "Thermometer",
     **{name: f"Source of {name}" for name in SOURCED},
 }
 

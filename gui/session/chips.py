@@ -46,6 +46,8 @@ class Chips:
                 views.append(self._scope(plan))
             elif role == "meter":
                 views.append(self._meter())
+            elif role == "thermometer":
+                views.append(self._thermometer())
             elif plan is not None:
                 views.append(self._voltage(role, plan.needs.voltages[role]))
         if plan is not None and plan.preview.traces:
@@ -61,6 +63,7 @@ class Chips:
             "coil": needs.coil,
             "scope": bool(needs.channels),
             "meter": needs.field_meter or needs.asked_field,
+            "thermometer": needs.thermometer,
             **dict.fromkeys(needs.voltages, True),
         }
         return [role for role, used in wanted.items() if used]
@@ -125,8 +128,15 @@ class Chips:
         value = "—" if field is None else show(round(field, 5), "T", 3)
         if self._status.state is WindowState.RUNNING and field is not None:
             lamp = Lamp.ACTIVE
-        short = " ".join(words.split(",")[:2])  # maker and model of an *IDN? answer
-        return InstrumentView(ROLES["meter"], lamp, short, value)
+        return InstrumentView(ROLES["meter"], lamp, _maker_and_model(words), value)
+
+    def _thermometer(self) -> InstrumentView:
+        lamp, words = self._found("thermometer")
+        value, kelvin = "—", self._run.kelvin
+        if self._status.state is WindowState.RUNNING and kelvin is not None:
+            lamp, value = Lamp.ACTIVE, show(kelvin, "K", 5)
+        short = _maker_and_model(words)
+        return InstrumentView(ROLES["thermometer"], lamp, short, value)
 
     def _voltage(self, name: str, wanted: float) -> InstrumentView:
         """What the source of a voltage is to hold, V, and what it holds in a run."""
@@ -152,3 +162,8 @@ class Chips:
             lamp = Lamp.WARNING
         words = "in step" if seen.in_step else "beside the run"
         return InstrumentView("Model", lamp, words, f"NRMSE {seen.text}")
+
+
+def _maker_and_model(answer: str) -> str:
+    """Maker and model of an answer to *IDN?."""
+    return " ".join(answer.split(",")[:2])

@@ -51,6 +51,7 @@ class LiveRun(LiveTask):
         folder: of the last run; None before any.
         trial: number and label of the step in progress.
         voltages: what source meters were read back to hold, V.
+        kelvin: temperature of the sensor as read last, K; None before.
         probes: what the probes touch in this trial: the circuit, or something else.
         asked: what it waits for a person to do; None while nobody is asked.
         elapsed, expected: run time, s.
@@ -87,6 +88,7 @@ class LiveRun(LiveTask):
         self.probes = "circuit"
         self.asked: PersonAsked | None = None
         self.voltages: dict[str, float] = {}
+        self.kelvin: float | None = None
         self.elapsed = 0.0
         self.expected: float | None = None
         self.agreement: Agreement | None = None
@@ -107,7 +109,7 @@ class LiveRun(LiveTask):
         """
         self.source, self.trial, self.agreement = None, None, None
         self.elapsed, self.expected, self.asked = 0.0, None, None
-        self.voltages = {}
+        self.voltages, self.kelvin = {}, None
         self.request, self.expectation = request, expectation
         self.title = self.name = title
         notes = dict(self.notes)
@@ -177,6 +179,7 @@ class LiveRun(LiveTask):
                 self._field_read(field)
                 source.add_field(at, field)
             case events.TemperatureRead(time=at, kelvin=kelvin):
+                self.kelvin = kelvin
                 source.add_reading("temperature", at, kelvin)
             case events.VoltageRead(name=name, held=held):
                 self.voltages[name] = held.voltage

@@ -115,6 +115,10 @@ class Plant(DrivenCoil):
             self._reach(time)
             return float(self.magnet.field(self._effective(time)))
 
+    def temperature(self, time: float) -> float:
+        """Temperature of the sensor at `time` s, K."""
+        return self._kelvin + self.options.warmer(time)
+
     def force(self, time: float) -> float:
         """Force on the cantilever at `time` s, the constant attraction included, N."""
         with self._lock:
@@ -262,8 +266,7 @@ class Plant(DrivenCoil):
             return self._electromagnet.currents(start, end)
         if signal == "temperature":
             knots = np.linspace(start, max(end, start + 1e-9), 3)
-            kelvin = [self._kelvin + self.options.warmer(at) for at in knots]
-            return Pieces.through(knots, np.array(kelvin))
+            return Pieces.through(knots, np.array([*map(self.temperature, knots)]))
         if signal == "field":
             return self._field_pieces(start, end)
         return self._sensor.pieces(signal, start, end)

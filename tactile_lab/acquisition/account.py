@@ -165,10 +165,10 @@ class Account:
             self.emit(events.SpikesSeen(times, tuple(rates.tolist()), amplitudes))
 
     def readings(self, instruments: Instruments) -> None:
-        """Take what coil and meter have told since last time."""
+        """Take what the instruments but the scope have told since last time."""
         if self.journal is None:
             return
-        coil, meter = instruments.coil, instruments.meter
+        coil = instruments.coil
         if coil is not None:
             for text in coil.take_warnings():
                 self.warn(text)
@@ -183,9 +183,12 @@ class Account:
                 self.emit(events.CoilCurrent(*row, asked=self.axis(applied.asked)))
             if not any(one.listed for one in self._unwritten):
                 self.write_current()
-        if meter is not None:
-            for reading in meter.take_readings():
-                self.field(self.axis(reading.time), reading.value)
+        for meter, tell in (
+            (instruments.meter, self.field),
+            (instruments.thermometer, self.temperature),
+        ):
+            for reading in meter.take_readings() if meter is not None else ():
+                tell(self.axis(reading.time), reading.value)
         for thread in instruments.voltages:
             for held in thread.take_readings():
                 self._held(thread.voltage, replace(held, time=self.axis(held.time)))

@@ -8,19 +8,23 @@ from dataclasses import dataclass
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instrument_thread import InstrumentThread
-from tactile_lab.acquisition.meter_thread import MeterThread
+from tactile_lab.acquisition.meter_thread import (
+    READ_FIELD,
+    READ_TEMPERATURE,
+    MeterThread,
+)
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.acquisition.voltage_thread import VoltageThread
-from tactile_lab.bench import Bench, OffReport
+from tactile_lab.bench import Bench, Meter, OffReport
 from tactile_lab.voltage_source import RestReport
 
 CLOSING = 10.0
 """Seconds an instrument thread gets to close before it is given up."""
 
-MOVED = frozenset({"output", "setpoint_A", "setpoint_V", "range"})
-"""Settings that a run itself moves: the recorded current tells of the coil's, and a
-teslameter picks its range as the field needs it."""
+MOVED = frozenset({"output", "setpoint_A", "setpoint_V", "range", "temperature"})
+"""What is read back and moves by itself in a run: the recorded current tells of the
+coil's, and a teslameter picks its range as the field needs it."""
 
 Wait = Callable[[Callable[[], bool]], None]
 
@@ -32,6 +36,7 @@ class Instruments:
     coil: CoilThread | None
     scope: ScopeThread | None
     meter: MeterThread | None
+    thermometer: MeterThread | None = None
     voltages: tuple[VoltageThread, ...] = ()
 
     @classmethod
@@ -43,10 +48,15 @@ class Instruments:
         if coil is not None and scope is not None and bench.generator is not None:
             slew = coil.coil.limits.slew
             coil.generator = GeneratorPlayer(bench.generator, scope, slew)
+
+        def read(name: str, meter: Meter | None, every: float) -> MeterThread | None:
+            return MeterThread(name, meter, clock, every) if meter else None
+
         return cls(
             coil=coil,
             scope=scope,
-            meter=MeterThread(bench.field_meter, clock) if bench.field_meter else None,
+            meter=read("field meter", bench.field_meter, READ_FIELD),
+            thermometer=read("thermometer", bench.thermometer, READ_TEMPERATURE),
             voltages=tuple(
                 VoltageThread(name, source, clock)
                 for name, source in bench.voltage_sources.items()
@@ -56,7 +66,8 @@ class Instruments:
     @property
     def threads(self) -> list[InstrumentThread]:
         """Those that exist, the coil first: it is the one that must be made safe."""
-        every = (self.coil, self.scope, self.meter, *self.voltages)
+        meters = self.thermometer, self.meter
+        every = (self.coil, self.scope, *meters, *self.voltages)
         return [thread for thread in every if thread is not None]
 
     def hold(self, voltages: Mapping[str, float]) -> list[VoltageThread]:

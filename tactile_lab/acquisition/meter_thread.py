@@ -1,24 +1,32 @@
-"""The teslameter's thread: a reading now and then, as fast as the meter allows."""
+"""The thread of a teslameter or thermometer: a reading now and then."""
 
 from __future__ import annotations
 
 from collections import deque
 
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
-from tactile_lab.bench import FieldMeter, Reading
+from tactile_lab.bench import Meter, Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError
 
-READ_EVERY = 0.1
-"""Seconds between readings."""
+READ_FIELD, READ_TEMPERATURE = 0.1, 0.5
+"""Seconds between readings; a slower instrument gives them as fast as it can."""
 
 
 class MeterThread(InstrumentThread):
-    """Owns the teslameter."""
+    """Owns one instrument that reads one quantity.
 
-    def __init__(self, meter: FieldMeter, clock: Clock) -> None:
-        super().__init__("field meter", clock)
+    Args:
+        name: of the instrument.
+        meter: to read.
+        clock: the bench's time.
+        every: time between readings, s.
+    """
+
+    def __init__(self, name: str, meter: Meter, clock: Clock, every: float) -> None:
+        super().__init__(name, clock)
         self.meter = meter
+        self._every = every
         self._readings: deque[Reading] = deque()
 
     def take_readings(self) -> list[Reading]:
@@ -33,7 +41,7 @@ class MeterThread(InstrumentThread):
     def work(self) -> None:
         """Read until told to leave."""
         while not self._leaving:
-            due = self.clock.now() + READ_EVERY
+            due = self.clock.now() + self._every
             self._readings.append(self.meter.read())
             self.clock.wait_for(lambda: self._leaving, due)
 

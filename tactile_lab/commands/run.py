@@ -194,8 +194,11 @@ def record(bench: Bench, folder: Path) -> None:
         raise SceneError(
             f"Transcripts cannot be put into {folder}: {reason}"
         ) from reason
-    for name in ("coil", "field_meter"):
-        start = getattr(getattr(bench, name), "record", None)
+    names = ("coil", "field_meter", "thermometer")
+    found = {name: getattr(bench, name) for name in names}
+    found |= dict(bench.voltage_sources)
+    for name, instrument in found.items():
+        start = getattr(instrument, "record", None)
         if start is not None:
             start(folder / f"{name}.txt")
 

@@ -13,6 +13,7 @@ from tactile_lab.instruments.registry import (
     Driver,
     FieldMeterDriver,
     ScopeDriver,
+    ThermometerDriver,
     VoltageSourceDriver,
     find_driver,
 )
@@ -26,6 +27,7 @@ _WANTED = {
     "coil": "drives the coil",
     "scope": "needs scope channels",
     "field_meter": "reads the field",
+    "thermometer": "reads the temperature",
 }
 
 
@@ -96,6 +98,7 @@ def equipped(
         scope=scope,
         generator=getattr(scope, "generator", None) if wired else None,
         field_meter=instrument(FieldMeterDriver, needed.field_meter),
+        thermometer=instrument(ThermometerDriver, needed.thermometer),
         voltage_sources={
             name: make(VoltageSourceDriver, spec.voltage_sources[name])
             for name in needed.voltages

@@ -25,7 +25,7 @@ from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
     from tactile_lab.analysis.noise import Noise
-    from tactile_lab.bench import Bench, Coil, FieldMeter, OffReport, Scope, SeenOutput
+    from tactile_lab.bench import Bench, Coil, Meter, OffReport, Scope, SeenOutput
     from tactile_lab.engine.manual import FieldReading
     from tactile_lab.engine.model_parts import StoredParts
     from tactile_lab.engine.monitor import Monitor
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tactile_lab.trace import FloatArray
     from tactile_lab.voltage_source import VoltageSource
 
-    Instrument = Coil | Scope | FieldMeter | VoltageSource
+    Instrument = Coil | Scope | Meter | VoltageSource
 
 LONGEST = 300.0
 """Seconds a report may take."""
@@ -50,7 +50,7 @@ class InstrumentAnswer:
     """One instrument answered, or did not.
 
     Attributes:
-        role: coil, scope, meter, or the voltage that it holds.
+        role: coil, scope, meter, thermometer, or the voltage that it holds.
         identity: as it answered.
         problem: why it did not, "" if it did.
     """
@@ -168,6 +168,7 @@ def _answers(
         ("coil", bench.coil),
         ("scope", bench.scope),
         ("meter", bench.field_meter),
+        ("thermometer", bench.thermometer),
         *bench.voltage_sources.items(),
     )
     with bench.clock.taking_part("check"):

@@ -56,6 +56,7 @@ def bench_request(
     signals = [channel.signal for channel in channels]
     signals += ["force"] if spec.coil is not None else []
     signals += ["field"] if spec.field_meter is not None else []
+    signals += ["temperature"] if spec.thermometer is not None else []
     sources = spec.voltage_sources
     believed = Circuit().at(cast("dict[str, float]", spec.hand_set))
     allowed = [

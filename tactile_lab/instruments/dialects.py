@@ -14,16 +14,21 @@ from typing import TypeVar
 
 from tactile_lab.complaint import validated
 from tactile_lab.errors import SceneError, choices
+from tactile_lab.instruments.meter_dialect import (
+    TeslameterDialect,
+    ThermometerDialect,
+)
 from tactile_lab.instruments.scope_dialect import ScopeDialect
-from tactile_lab.instruments.serial_dialect import CoilDialect, Dialect, MeterDialect
+from tactile_lab.instruments.serial_dialect import CoilDialect, Dialect
 from tactile_lab.instruments.voltage_dialect import VoltageDialect
 
 D = TypeVar("D", bound=Dialect)
 
 ROLES: dict[str, type[Dialect]] = {
     "coil": CoilDialect,
-    "field meter": MeterDialect,
+    "field meter": TeslameterDialect,
     "scope": ScopeDialect,
+    "thermometer": ThermometerDialect,
     "voltage source": VoltageDialect,
 }
 """What a dialect may be for, and the keys it then has."""
@@ -41,9 +46,14 @@ def coil_dialect(name: str) -> CoilDialect:
     return _for_role(load_dialect(name), name, CoilDialect)
 
 
-def meter_dialect(name: str) -> MeterDialect:
+def teslameter_dialect(name: str) -> TeslameterDialect:
     """The dialect `name`, which must be a teslameter's; see `load_dialect`."""
-    return _for_role(load_dialect(name), name, MeterDialect)
+    return _for_role(load_dialect(name), name, TeslameterDialect)
+
+
+def thermometer_dialect(name: str) -> ThermometerDialect:
+    """The dialect `name`, which must be a thermometer's; see `load_dialect`."""
+    return _for_role(load_dialect(name), name, ThermometerDialect)
 
 
 def scope_dialect(name: str) -> ScopeDialect:

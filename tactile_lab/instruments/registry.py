@@ -1,10 +1,9 @@
 """The registry of drivers: what each can do, and how it is made, without importing it.
 
-A driver is one `CoilDriver`, `ScopeDriver`, `FieldMeterDriver` or
-`VoltageSourceDriver`. Those of installed
-distributions are entry points of the group `tactile_lab.drivers`, named by their kind
-and name (`scope.ps3000a`); one of the user's own stands in a Python file that the bench
-file names (`driver = "my_scope.py"`).
+A driver is one `CoilDriver`, `ScopeDriver`, `FieldMeterDriver`, `ThermometerDriver` or
+`VoltageSourceDriver`. Those of installed distributions are entry points of the group
+`tactile_lab.drivers`, named by their kind and name (`scope.ps3000a`); one of the user's
+own stands in a Python file that the bench file names (`driver = "my_scope.py"`).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from tactile_lab.bench import (
     Channel,
     Coil,
     CoilCapability,
-    FieldMeter,
+    Meter,
     Scope,
     ScopeCapability,
 )
@@ -121,11 +120,24 @@ class ScopeDriver(Driver[Scope]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FieldMeterDriver(Driver[FieldMeter]):
+class FieldMeterDriver(Driver[Meter]):
     """A driver of teslameters."""
 
     kind: ClassVar[str] = "field_meter"
-    interface: ClassVar[type] = FieldMeter
+    interface: ClassVar[type] = Meter
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThermometerDriver(Driver[Meter]):
+    """A driver of thermometers.
+
+    Attributes:
+        check: refuses by SceneError a table whose thermometer cannot do what it says.
+    """
+
+    kind: ClassVar[str] = "thermometer"
+    interface: ClassVar[type] = Meter
+    check: Callable[[Any], object] = lambda table: None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,6 +232,15 @@ def voltage_capability(table: InstrumentTable) -> VoltageSourceCapability:
     return find_driver(VoltageSourceDriver, table).capability(table)
 
 
+def check_thermometer(table: InstrumentTable) -> None:
+    """Refuse what a thermometer cannot do.
+
+    Raises:
+        SceneError: no such driver, dialect or input.
+    """
+    find_driver(ThermometerDriver, table).check(table)
+
+
 def check_scope(
     table: InstrumentTable, channels: Sequence[Channel], rate: float
 ) -> float:
@@ -262,6 +283,9 @@ CoilDriverName = Annotated[str, AfterValidator(partial(_check_name, CoilDriver, 
 ScopeDriverName = Annotated[str, AfterValidator(partial(_check_name, ScopeDriver, ()))]
 MeterDriverName = Annotated[
     str, AfterValidator(partial(_check_name, FieldMeterDriver, (BY_PERSON,)))
+]
+ThermometerDriverName = Annotated[
+    str, AfterValidator(partial(_check_name, ThermometerDriver, ()))
 ]
 VoltageDriverName = Annotated[
     str, AfterValidator(partial(_check_name, VoltageSourceDriver, ()))

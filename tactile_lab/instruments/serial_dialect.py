@@ -20,9 +20,6 @@ from tactile_lab.quantity import Current, Duration, Pause, Unit, Voltage, show
 MARGIN = 1.5
 """Factor by which the promised update interval exceeds the typical one."""
 
-MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
-"""Meaning of the prefix letters some meters answer separately."""
-
 
 def _pattern(text: str) -> str:
     try:
@@ -375,24 +372,3 @@ class CoilDialect(SourceDialect):
         answer = len('0,"No error"\r\n') if self.error else 0
         typical = (sent + answer) * wire.character_time
         return typical + len(lines) * (wire.latency + wire.min_gap)
-
-
-class MeterDialect(SerialDialect):
-    """How a teslameter speaks.
-
-    Attributes:
-        field: query of the field.
-        scale: tesla per unit of the answer.
-        multiplier: query of a prefix letter (empty, u, m, k) that scales the answer.
-        overload: pattern of an answer that says the range is exceeded.
-        report: queries whose answers are kept with the run, by name.
-        interval: shortest time between two readings, s.
-    """
-
-    role: Literal["field meter"]
-    field: str
-    scale: float = 1.0
-    multiplier: str | None = None
-    overload: Pattern = r"(?i)^\s*O(V)?L"
-    report: dict[str, str] = Field(default={})
-    interval: Pause = 0.1

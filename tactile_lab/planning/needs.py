@@ -14,6 +14,7 @@ from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.instruments.registry import (
     BY_PERSON,
     check_scope,
+    check_thermometer,
     scope_capability,
     voltage_capability,
 )
@@ -23,7 +24,7 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import AVERAGED, SIGNALS
 from tactile_lab.voltage_source import why_not
 
-SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current", "temperature")
+SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
 """Signals that come from a scope channel and in no other way."""
 
 
@@ -35,6 +36,7 @@ class Needs:
         coil: whether the current source is opened: not where no trial asks for force.
         field_meter: whether the teslameter is opened.
         asked_field: whether a person is asked for the field at each hold.
+        thermometer: whether the thermometer is opened.
         voltages: of the circuit, by name, V, that source meters hold as it begins.
         channels: scope channels to enable, in the bench's order; none: no scope.
         stored: signals of those that are stored sample by sample.
@@ -52,6 +54,7 @@ class Needs:
     coil: bool
     field_meter: bool
     asked_field: bool
+    thermometer: bool
     voltages: Mapping[str, float]
     channels: tuple[Channel, ...]
     stored: tuple[str, ...]
@@ -92,12 +95,16 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
             "neither [field_meter] nor a scope channel with the signal field."
         )
     by_hand = meter is not None and meter.driver == BY_PERSON
+    warm = "temperature" in asked and "temperature" not in wired
+    if warm:
+        _check_thermometer(scene)
     seen = expected(scene, channels, drive)
     channels, rate, gapless = _as_the_scope_can(scene, channels, seen, detect_on)
     return Needs(
         coil=drive.drives,
         field_meter=metered and not by_hand,
         asked_field=metered and by_hand,
+        thermometer=warm,
         voltages=_voltages(scene, drive),
         channels=channels,
         stored=tuple(
@@ -160,9 +167,17 @@ def _streamed(scene: Scene, asked: Set[str], wired: Mapping[str, Channel]) -> se
     names = {name for name in SAMPLED if name in asked}
     if "I_DS" in asked:
         names.add("I_DS" if "I_DS" in wired else "V_C1")
-    if "field" in asked and "field" in wired:
-        names.add("field")
-    return names
+    return names | {name for name in AVERAGED if name in asked and name in wired}
+
+
+def _check_thermometer(scene: Scene) -> None:
+    thermometer = scene.bench.thermometer
+    if thermometer is None:
+        raise SceneError(
+            f"{scene.name} records the temperature, but bench {scene.bench.name} has "
+            "neither [thermometer] nor a scope channel with the signal temperature."
+        )
+    check_thermometer(thermometer)
 
 
 def _check_wired(

@@ -40,6 +40,9 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
         found.append((f"channel {channel.input}: {name}", why))
     if needed.field_meter and bench.field_meter is not None:
         found.append(("teslameter", f"{bench.field_meter.dialect} reads the field"))
+    if needed.thermometer and bench.thermometer is not None:
+        read = f"{bench.thermometer.dialect} reads the sensor's temperature"
+        found.append(("thermometer", read))
     if needed.asked_field:
         found.append(("a person", "reads the teslameter at each hold"))
     for name, volts in needed.voltages.items():
@@ -88,6 +91,8 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
     elif not needed.field_meter:
         why = "a scope channel has the field" if "field" in enabled else NOT_RECORDED
         found.append(("teslameter", why))
+    if bench.thermometer is not None and not needed.thermometer:
+        found.append(("thermometer", "temperature is not recorded"))
     found += [
         (f"source of {name}", "neither [sensor] sourced nor the protocol names it")
         for name in bench.voltage_sources

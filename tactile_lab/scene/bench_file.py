@@ -20,6 +20,7 @@ from tactile_lab.instruments.registry import (
     CoilDriverName,
     MeterDriverName,
     ScopeDriverName,
+    ThermometerDriverName,
     VoltageDriverName,
 )
 from tactile_lab.magnetics import Magnet
@@ -169,6 +170,27 @@ class FieldMeterSpec(SceneTable):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ThermometerSpec(SceneTable):
+    """``[thermometer]``: the thermometer at the sensor.
+
+    Attributes:
+        driver: "serial", or path of a Python file with a `ThermometerDriver`.
+        dialect: id of one that ships, or path of a TOML file with one.
+        port: serial port or pyserial URL.
+        input: of the thermometer, where the sensor's is; the row's first unless given.
+        baud: symbols a second; the row's own unless given.
+        options: keys of the driver's own.
+    """
+
+    driver: Annotated[ThermometerDriverName, Located] = "serial"
+    dialect: Annotated[str, Located] = "lakeshore-218"
+    port: Port = "sim://thermometer"
+    input: str | None = None
+    baud: Baud | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
 class VoltageSourceSpec(SceneTable):
     """``[voltage_source.V_GS]``: a source meter that holds that voltage.
 
@@ -216,14 +238,15 @@ class BenchSpec(SceneTable):
         name: for people.
         simulated: compute the physics instead of opening instruments.
         notes: kept with each run.
-        coil, scope, field_meter: None where the bench has none.
+        coil, scope, field_meter, thermometer: None where the bench has none.
         voltage_source: source meters, by the circuit's voltage that each holds.
         magnet: force per current.
         followers: between circuit and scope; None: no follower loads the circuit.
         hand_set: circuit voltages set by hand, by name, V.
 
     Raises:
-        ValueError: a port is missing or used twice, or the field is measured twice.
+        ValueError: a port is missing or used twice, or field or temperature are
+            measured twice.
     """
 
     file: str | None = None
@@ -233,6 +256,7 @@ class BenchSpec(SceneTable):
     coil: CoilSpec | None = None
     scope: ScopeSpec | None = None
     field_meter: FieldMeterSpec | None = None
+    thermometer: ThermometerSpec | None = None
     voltage_source: VoltageSources = field(default_factory=VoltageSources)
     magnet: Magnet
     followers: Followers | None = None
@@ -253,11 +277,12 @@ class BenchSpec(SceneTable):
                     f'[{other}] and [{name}] both have port = "{spec.port}"; a port '
                     "has one instrument, so correct one of them"
                 )
-        if self.field_meter is not None and "field" in self.signals:
-            raise ValueError(
-                "the field is measured twice, by [field_meter] and on a scope channel; "
-                "leave one of them out"
-            )
+        for signal, table in (("field", "field_meter"), ("temperature", "thermometer")):
+            if getattr(self, table) is not None and signal in self.signals:
+                raise ValueError(
+                    f"the {signal} is measured twice, by [{table}] and on a scope "
+                    "channel; leave one of them out"
+                )
 
     @property
     def voltage_sources(self) -> dict[str, VoltageSourceSpec]:
@@ -268,11 +293,13 @@ class BenchSpec(SceneTable):
     @property
     def _wired_by_port(
         self,
-    ) -> dict[str, CoilSpec | FieldMeterSpec | VoltageSourceSpec]:
+    ) -> dict[str, CoilSpec | FieldMeterSpec | ThermometerSpec | VoltageSourceSpec]:
         """Instruments that may stand behind a serial port, by their tables' names."""
-        every = {"coil": self.coil, "field_meter": self.field_meter} | {
-            f"voltage_source.{name}": one for name, one in self.voltage_sources.items()
-        }
+        every = {
+            "coil": self.coil,
+            "field_meter": self.field_meter,
+            "thermometer": self.thermometer,
+        } | {f"voltage_source.{name}": s for name, s in self.voltage_sources.items()}
         return {name: one for name, one in every.items() if one is not None}
 
     @property
@@ -288,8 +315,11 @@ class BenchSpec(SceneTable):
 
     def measures(self, signal: str) -> bool:
         """Whether an instrument of this bench measures that signal by itself."""
-        metered = self.field_meter is not None and not self._by_hand
-        return signal in self.signals or (signal == "field" and metered)
+        read = {
+            "field": self.field_meter is not None and not self._by_hand,
+            "temperature": self.thermometer is not None,
+        }
+        return signal in self.signals or read.get(signal, False)
 
     @property
     def _by_hand(self) -> bool:

@@ -17,6 +17,7 @@ Overrides = Sequence[str] | Mapping[str, Any]
 FILES = (
     "protocol.file", "protocol.source", "bench.file", "bench.magnet.calibration",
     "bench.coil.dialect", "bench.scope.dialect", "bench.field_meter.dialect",
+    "bench.thermometer.dialect",
 )  # fmt: skip
 """Keys that name a file: one that lies where the program was started is meant."""
 

@@ -104,6 +104,7 @@ class Scene:
             self.bench.coil,
             self.bench.scope,
             self.bench.field_meter,
+            self.bench.thermometer,
             *of_voltages,
         ):
             if spec is not None:

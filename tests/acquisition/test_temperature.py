@@ -1,11 +1,14 @@
-"""The sensor's temperature: an analogue thermometer on a scope channel."""
+"""The sensor's temperature: an analogue thermometer on a scope channel, or a serial."""
 
 import numpy as np
 import pytest
 from benches import WITH_A_SOURCE_METER
 
+from sim_backend.bench import open_bench
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
+from sim_backend.serial_line.faults import SerialFault
+from sim_backend.thermometer import SensorFault
 from tactile_lab.acquisition.events import RunState, TemperatureRead
 from tactile_lab.bench import Channel
 from tactile_lab.engine.execution import Execution
@@ -18,6 +21,7 @@ from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
+from tactile_lab.store.folder import read_info
 from tactile_lab.store.run import Run
 
 THERMOMETER = """
@@ -94,8 +98,90 @@ def test_it_is_left_out_where_the_scene_does_not_record_it(scene):
 
 
 def test_a_bench_without_a_thermometer_is_told_so(tmp_path):
-    with pytest.raises(SceneError, match="needs temperature, but bench"):
+    with pytest.raises(
+        SceneError, match=r"neither \[thermometer\] nor a scope channel"
+    ):
         needs(load("monitor", QUIET))
+
+
+SERIAL = """
+[thermometer]
+dialect = "lakeshore-335"
+input = "A"
+[magnet]
+"""
+
+
+@pytest.fixture
+def serial(tmp_path):
+    file = tmp_path / "serial.toml"
+    file.write_text(WITH_A_SOURCE_METER.replace("[magnet]", SERIAL))
+    return lambda *overrides: load("monitor", (*QUIET, *overrides), file)
+
+
+def test_a_serial_one_is_read_kept_and_exported(serial, tmp_path):
+    seen, made = [], serial()
+    done = Execution(made, tmp_path / "runs", emit=seen.append).run()
+    assert done.state is RunState.COMPLETE, done.reason
+    believed = temperature(made.circuit)
+    with Run.load(done.folder) as run:
+        rows = run.temperature
+        assert len(rows) >= 8
+        assert rows["temperature"] == pytest.approx(believed, abs=0.03)
+        assert len(run.to_pandas("temperature")) == len(rows)
+    assert sum(isinstance(one, TemperatureRead) for one in seen) == len(rows)
+    info = read_info(done.folder)
+    assert info["temperature"]["from"] == "thermometer"
+    assert info["temperature"]["K"] == pytest.approx(believed, abs=0.03)
+    assert info["instruments"]["thermometer"]["identity"].startswith("LSCI,MODEL335")
+    assert info["instruments_changed"] == []  # it is no setting that moved
+    found = dict(plan(made).uses)
+    assert found["thermometer"] == "lakeshore-335 reads the sensor's temperature"
+
+
+def test_a_serial_one_is_left_out_where_the_scene_does_not_record_it(serial):
+    quiet = serial('record.signals=["V_C1"]')
+    assert not needs(quiet).thermometer
+    assert ("thermometer", "temperature is not recorded") in plan(quiet).leaves_out
+    made = open_bench(quiet, needs(quiet))
+    assert made.thermometer is None
+
+
+def test_a_serial_ones_input_is_checked_before_anything_is_opened(serial):
+    with pytest.raises(SceneError, match=r'\[thermometer\] input = "E".* Known: A, B'):
+        needs(serial("bench.thermometer.input=E"))
+
+
+def test_the_temperature_is_not_measured_twice(tmp_path):
+    file = tmp_path / "bench.toml"
+    both = WITH_A_SOURCE_METER.replace("[magnet]", THERMOMETER)
+    file.write_text(both.replace("[magnet]", SERIAL))
+    with pytest.raises(SceneError, match="the temperature is measured twice"):
+        load("monitor", QUIET, file)
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (SensorFault(after=2.0), "480 K at its input A is no reading"),
+        (SerialFault(kind="unplug", after=2.0, times=None), "link to the thermometer"),
+        (SerialFault(kind="missing", after=2.0, times=None), "thermometer at"),
+    ],
+)
+def test_a_thermometer_that_fails_ends_the_run_with_what_was_read(
+    serial, tmp_path, fault, said
+):
+    made = serial('record.signals=["V_C1", "temperature"]')
+
+    bench = open_bench(made, needs(made), thermometer_faults=(fault,))
+    done = Execution(made, tmp_path / "runs", bench=bench).run()
+    assert done.state is RunState.FAULTED
+    assert said in done.reason
+    assert done.off.verified
+    with Run.load(done.folder) as run:
+        kelvin = run.temperature["temperature"]
+        assert len(kelvin) >= 3
+        assert kelvin == pytest.approx(temperature(made.circuit), abs=0.03)
 
 
 def test_the_simulated_sensor_warms_and_its_voltages_follow(scene, tmp_path):

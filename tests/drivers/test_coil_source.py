@@ -16,7 +16,7 @@ from tactile_lab.errors import (
     LimitError,
     NoReplyError,
 )
-from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+from tactile_lab.instruments.dialects import coil_dialect, teslameter_dialect
 
 KEPCO = coil_dialect("kepco-bop")
 
@@ -257,7 +257,7 @@ def test_teslameter_reads_tesla(resistor):
     clock, plant = SimulatedClock(), resistor
     plant.output(0, True)
     plant.set_current(0, 0.5)
-    row = meter_dialect("lakeshore-425")
+    row = teslameter_dialect("lakeshore-425")
     end = plug_in(SimTeslameter(plant, row.id, clock), row.serial, clock, "meter")
     meter = Teslameter(row, end.url, clock)
     with clock.taking_part("test"):

@@ -14,8 +14,8 @@ from tactile_lab.instruments.dialects import (
     coil_dialect,
     dialect_ids,
     load_dialect,
-    meter_dialect,
     parse_dialect,
+    teslameter_dialect,
 )
 
 COILS = dialect_ids("coil")
@@ -87,7 +87,7 @@ def test_a_row_of_the_wrong_role():
     with pytest.raises(SceneError, match="is a field meter"):
         coil_dialect("lakeshore-425")
     with pytest.raises(SceneError, match="is a coil"):
-        meter_dialect("kepco-bop")
+        teslameter_dialect("kepco-bop")
 
 
 def text_of(name="kepco-bop"):
@@ -149,8 +149,9 @@ def test_limits_beyond_the_rating_are_refused():
 def test_dialects_are_listed_by_role():
     coils, meters = dialect_ids("coil"), dialect_ids("field meter")
     assert "kepco-bop" in coils and "lakeshore-425" in meters
-    others = (*dialect_ids("scope"), *dialect_ids("voltage source"))
-    assert sorted((*coils, *meters, *others)) == list(dialect_ids())
+    others = map(dialect_ids, ("scope", "thermometer", "voltage source"))
+    every = [*coils, *meters, *(name for one in others for name in one)]
+    assert sorted(every) == list(dialect_ids())
 
 
 @pytest.mark.parametrize("name", dialect_ids())

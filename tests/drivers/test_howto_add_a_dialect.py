@@ -16,8 +16,9 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 def test_the_page_works(tmp_path, monkeypatch):
     blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
     kinds = [kind for kind, _ in blocks]
-    shown = ["toml", "text", "python", "toml", "python"]
-    assert kinds == [*shown, "toml", "toml", "toml", "python"]
+    meters = ["toml", "text", "python", "toml", "python"]
+    source = ["toml", "python", "toml", "toml", "toml", "python"]
+    assert kinds == [*meters, *source]
     monkeypatch.chdir(tmp_path)
     name = ""
     for kind, text in blocks:

@@ -8,7 +8,7 @@ import serial
 from drivers.serial_line import link as link_module
 from drivers.serial_line.link import SerialLink
 from tactile_lab.clock import SimulatedClock
-from tactile_lab.instruments.dialects import meter_dialect
+from tactile_lab.instruments.dialects import teslameter_dialect
 
 
 class Buffering(serial.SerialBase):
@@ -50,7 +50,7 @@ class Buffering(serial.SerialBase):
 
 @pytest.mark.parametrize("model", ["421", "425", "455", "475"])
 def test_no_line_begins_too_soon_after_the_one_before(model, monkeypatch):
-    wire, clock = meter_dialect(f"lakeshore-{model}").serial, SimulatedClock()
+    wire, clock = teslameter_dialect(f"lakeshore-{model}").serial, SimulatedClock()
     port = Buffering(clock, wire)
     monkeypatch.setattr(link_module, "open_port", lambda *_: port)
     line = SerialLink("somewhere", wire, clock, what="teslameter")

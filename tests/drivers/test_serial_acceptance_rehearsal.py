@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[2]
 TOLD = {
     "coil_source": ("FACT answer after 99 A: -222", "2 skipped"),  # need a person
     "teslameter": ("FACT their standard deviation, T",),
+    "thermometer": ("FACT their standard deviation, K", "30 ms between messages"),
     "voltage_source": ("FACT left: V_GS at",),
 }
 """What is read in the answer of each."""
@@ -42,7 +43,9 @@ def begun(which: str, port: str, state: Path) -> subprocess.Popen[str]:
 
 def test_the_checklists_pass_on_served_instruments(tmp_path: Path) -> None:
     """All at once: they wait for their instruments, not for each other."""
-    bench = ServedBench(coil="pty", teslameter="tcp:0", voltage_source="pty")
+    bench = ServedBench(
+        coil="pty", teslameter="tcp:0", voltage_source="pty", thermometer="pty"
+    )
     bench.start()
     ports = bench.addresses | {"coil_source": bench.addresses["coil"]}
     running = {}

@@ -8,9 +8,11 @@ from replay import Replay, read_transcript
 from drivers.coil.source import CoilSource
 from drivers.serial_line.transcript import Transcript
 from drivers.teslameter import Teslameter
+from drivers.thermometer import Thermometer
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.teslameter import SimTeslameter
+from sim_backend.thermometer import SimThermometer
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import SceneError
@@ -26,7 +28,10 @@ def converse(name, instrument, clock, spy=None):
     url = plug_in(instrument, row.serial, clock, name).url
     with clock.taking_part("test"):
         if not isinstance(row, CoilDialect):
-            meter = Teslameter(row, url, clock, spy=spy)
+            if row.role == "thermometer":
+                meter = Thermometer(row.at(None), url, clock, spy=spy)
+            else:
+                meter = Teslameter(row, url, clock, spy=spy)
             meter.open()
             reading = meter.read().value
             meter.settings()
@@ -48,22 +53,29 @@ def converse(name, instrument, clock, spy=None):
 
 
 def far_end(name, plant, clock):
-    if isinstance(load_dialect(name), CoilDialect):
+    role = load_dialect(name).role
+    if role == "coil":
         return SimCoilSource(plant, name, clock)
+    if role == "thermometer":
+        plant.temperature = lambda time: 295.15
+        return SimThermometer(plant, name, clock)
     plant.output(0, True)
     plant.set_current(0, 0.25)
     return SimTeslameter(plant, name, clock)
 
 
-@pytest.mark.parametrize("name", [*dialect_ids("coil"), *dialect_ids("field meter")])
+READ = {"coil": 0.25, "field meter": 2.75e-3, "thermometer": 295.15}
+
+
+@pytest.mark.parametrize("name", [one for role in READ for one in dialect_ids(role)])
 def test_the_row_says_exactly_this(name):
     replay = Replay(FOLDER / f"{name}.txt")
     reading = converse(name, replay, SimulatedClock())
     replay.finish()
-    assert reading == pytest.approx(0.25 if reading > 0.1 else 2.75e-3, rel=1e-3)
+    assert reading == pytest.approx(READ[load_dialect(name).role], rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["kepco-bop", "lakeshore-421"])
+@pytest.mark.parametrize("name", ["kepco-bop", "lakeshore-421", "lakeshore-218"])
 def test_what_is_recorded_replays(name, resistor, tmp_path):
     clock = SimulatedClock()
     spy = Transcript(tmp_path / "talk.txt", about=name)

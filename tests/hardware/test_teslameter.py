@@ -16,7 +16,7 @@ import pytest
 
 from drivers.teslameter import Teslameter
 from tactile_lab.clock import RealClock
-from tactile_lab.instruments.dialects import meter_dialect
+from tactile_lab.instruments.dialects import teslameter_dialect
 
 pytestmark = [
     pytest.mark.hardware,
@@ -34,7 +34,7 @@ def fact(name: str, value: object) -> None:
 
 @pytest.fixture
 def meter() -> Iterator[Teslameter]:
-    row = meter_dialect(os.environ.get("TACTILE_LAB_DIALECT", "lakeshore-425"))
+    row = teslameter_dialect(os.environ.get("TACTILE_LAB_DIALECT", "lakeshore-425"))
     # how busy this computer is, is not asked here
     wire = row.serial.model_copy(update={"timeout": 2.0})
     row = row.model_copy(update={"serial": wire})

@@ -17,7 +17,7 @@ from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LinkLostError, NotFoundError
-from tactile_lab.instruments.dialects import coil_dialect, meter_dialect
+from tactile_lab.instruments.dialects import coil_dialect, teslameter_dialect
 
 KEPCO = coil_dialect("kepco-bop")
 TIMEOUT = 1.5
@@ -180,7 +180,7 @@ def test_the_address_of_a_server_that_ended_is_not_given_again():
 
 def test_seven_bits_on_a_pty_open_again_and_again():
     clock = RealClock()
-    row = meter_dialect("lakeshore-425")
+    row = teslameter_dialect("lakeshore-425")
     wire = row.serial.model_copy(update={"latency": 0.0})
     end = FarEnd(SimTeslameter(Wireless(), row.id, clock), wire, clock, "meter")
     server = PtyServer(end)
@@ -201,7 +201,7 @@ def test_seven_odd_one_reaches_pyserial(monkeypatch):
         raise serial.SerialException(2, "no such port")
 
     monkeypatch.setattr(serial, "serial_for_url", seen)
-    meter = Teslameter(meter_dialect("lakeshore-425"), "/dev/ttyUSB9", RealClock())
+    meter = Teslameter(teslameter_dialect("lakeshore-425"), "/dev/ttyUSB9", RealClock())
     with pytest.raises(NotFoundError):
         meter.open()
     assert (asked["bytesize"], asked["parity"], asked["stopbits"]) == (7, "O", 1)

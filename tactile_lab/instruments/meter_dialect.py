@@ -1,0 +1,103 @@
+"""How an instrument speaks that reads one quantity: a teslameter, a thermometer."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from tactile_lab.errors import SceneError, choices
+from tactile_lab.instruments.serial_dialect import (
+    Lines,
+    Pattern,
+    SerialDialect,
+    frozen,
+)
+from tactile_lab.quantity import Pause, Unit
+
+MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
+"""Meaning of the prefix letters some meters answer separately."""
+
+
+class MeterDialect(SerialDialect):
+    """What the dialect of every such instrument has.
+
+    Attributes:
+        report: queries whose answers are kept with the run, by name.
+        interval: shortest time between two readings, s.
+    """
+
+    report: dict[str, str] = Field(default={})
+    interval: Pause = 0.1
+
+
+class TeslameterDialect(MeterDialect):
+    """How a teslameter speaks.
+
+    Attributes:
+        field: query of the field.
+        scale: tesla per unit of the answer.
+        multiplier: query of a prefix letter (empty, u, m, k) that scales the answer.
+        overload: pattern of an answer that says the range is exceeded.
+    """
+
+    role: Literal["field meter"]
+    field: str
+    scale: float = 1.0
+    multiplier: str | None = None
+    overload: Pattern = r"(?i)^\s*O(V)?L"
+
+
+class ThermometerDialect(MeterDialect):
+    """How a thermometer speaks; in its queries `{input}` is where the sensor is.
+
+    Attributes:
+        temperature: query of the temperature.
+        zero: what an answer of 0 means, K: 273.15 K where it answers in °C.
+        inputs: names of its inputs; the first unless a bench file says another.
+        status: query of whether the last reading is one; None where nobody can ask.
+        status_ok: pattern of its answer if it is.
+    """
+
+    role: Literal["thermometer"]
+    temperature: str
+    zero: Annotated[float, Unit("K", least=0.0)] = 0.0
+    inputs: Annotated[Lines, BeforeValidator(frozen)] = ("",)
+    status: str | None = None
+    status_ok: Pattern = r"^\+?0+$"
+
+    def try_templates(self, where: str) -> None:
+        """Fill in every template.
+
+        Raises:
+            SceneError: a placeholder that is not known.
+        """
+        try:
+            self.at(None)
+        except (KeyError, IndexError, ValueError) as reason:
+            raise SceneError(
+                f"Dialect {where}: a template cannot be filled in ({reason!r}); it "
+                "takes {input} for the input of the sensor."
+            ) from reason
+
+    def at(self, name: str | None) -> ThermometerDialect:
+        """The row with its queries for the input `name`; its first where None is given.
+
+        Raises:
+            SceneError: the model has no such input.
+        """
+        chosen = self.inputs[0] if name is None else name
+        if chosen not in self.inputs:
+            raise SceneError(
+                f'[thermometer] input = "{chosen}": {self.title} has none of that '
+                f"name; {choices(chosen, self.inputs)}"
+            )
+        lines = {key: one.format(input=chosen) for key, one in self.report.items()}
+        return self.model_copy(
+            update={
+                "temperature": self.temperature.format(input=chosen),
+                "status": self.status and self.status.format(input=chosen),
+                "report": lines,
+                "inputs": (chosen,),
+            }
+        )
