@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from tactile_lab.engine.task import Task
 
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+INTERRUPTED = 130
+"""Exit code of a program that was asked to end, by Ctrl-C or another program."""
+
 STARTING = b"stopping before anything is opened; once more ends it at once\n"
 
 E = TypeVar("E", bound="Ending")
@@ -39,10 +42,12 @@ class Signals:
 
     Attributes:
         caught: their numbers, as they came.
+        asked: reason of a stop that another program asked for; "" for none.
     """
 
     def __init__(self, acts: Mapping[str, Callable[[], None]] | None = None) -> None:
         self.caught: list[int] = []
+        self.asked = ""
         self.acts = acts or {}
         self.opened = False
         self._before: dict[int, Any] = {}
@@ -57,14 +62,25 @@ class Signals:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
+    def ask(self, reason: str) -> None:
+        """Another program wants what goes on ended, and nothing more begun."""
+        self.asked = reason
+
+    @property
+    def ending(self) -> int:
+        """128 and the signal that came, `INTERRUPTED` for a program; else 0."""
+        if self.caught:
+            return 128 + self.caught[0]
+        return INTERRUPTED if self.asked else 0
+
     def look(self) -> None:
-        """Leave the program if one came; nothing is open yet.
+        """Leave the program if it is to end; nothing is open yet.
 
         Raises:
-            click.exceptions.Exit: with 128 and the signal's number.
+            click.exceptions.Exit: with the code of `ending`.
         """
-        if self.caught:
-            raise click.exceptions.Exit(128 + self.caught[0])
+        if self.ending:
+            raise click.exceptions.Exit(self.ending)
 
     def _note(self, number: int, _: FrameType | None) -> None:
         self.caught.append(number)
@@ -117,6 +133,9 @@ def run_attended(
                 signals.acts[name]()
             else:
                 task.stop(f"stopped by {name}", signal=number)
+        if signals.asked:
+            reason, signals.asked = signals.asked, ""
+            task.stop(reason)
 
     def work() -> None:
         try:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.attended import Signals
+from tactile_lab.commands.attended import INTERRUPTED, Signals
 from tactile_lab.commands.one_run import finished, prepared, tell_of
 from tactile_lab.commands.options import noted, notes_option
 from tactile_lab.commands.terminal import fail, refusing, say, somebody, warn
@@ -194,7 +194,8 @@ def command(
                     run = prepared(scene, out / "runs", kept_notes)
                 done = finished(run[0], signals, run[1])
                 signals.opened = False
-                tell_of(done, run[1], no_report=False)
+                if not tell_of(done, run[1], no_report=False):
+                    fail("stopped while it told of the run", INTERRUPTED)
                 wrong = day.ran(step, done)
             say(f"  to see: {step.see}")
             if wrong:

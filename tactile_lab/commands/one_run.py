@@ -125,7 +125,7 @@ class Watchers:
 
 
 def tell_others(
-    status: str | None, live: str | None, until: ExitStack
+    status: str | None, live: str | None, until: ExitStack, signals: Signals
 ) -> tuple[StatusServer | LslStreams, ...]:
     """Who tells other programs of runs until that stack is left; nobody unless asked.
 
@@ -133,6 +133,7 @@ def tell_others(
         status: address of `--status`.
         live: kind of `--live`.
         until: closes them.
+        signals: are told of a stop that another program asks for.
 
     Raises:
         SceneError: that is no address or cannot be listened at, or LSL is not there.
@@ -141,7 +142,7 @@ def tell_others(
     if status is not None:
         from tactile_lab.commands.status_server import StatusServer
 
-        server = StatusServer(status)
+        server = StatusServer(status, signals.ask)
         until.callback(server.close)
         others.append(server)
         say(f"status {server.address}", sys.stderr)
@@ -293,10 +294,11 @@ def overrange(done: Executed) -> tuple[str, ...]:
 
 def concluded(
     done: Executed, *, no_report: bool, tell: Callable[[Executed, Report | None], None]
-) -> None:
+) -> bool:
     """Tell of a run that ended, write its report, and do what follows a run.
 
-    Nothing in here changes how the run ended: what fails is told.
+    Nothing in here changes how the run ended: what fails is told. False where a signal
+    cut it short: then whoever has more to do ends, too.
 
     Args:
         done: how it ended.
@@ -314,12 +316,14 @@ def concluded(
             _follow(done.folder)
         except (Exception, KeyboardInterrupt) as failure:
             _unreported(done.folder, failure)
+            return not isinstance(failure, KeyboardInterrupt)
+    return True
 
 
-def caught_up(folder: Path, *, no_report: bool) -> None:
+def caught_up(folder: Path, *, no_report: bool) -> bool:
     """Do for a run that is complete what the program was killed before doing.
 
-    Nothing that fails in here is more than told.
+    Nothing that fails in here is more than told; False where a signal cut it short.
 
     Args:
         folder: of the run.
@@ -332,6 +336,8 @@ def caught_up(folder: Path, *, no_report: bool) -> None:
             _follow(folder)
         except (Exception, KeyboardInterrupt) as failure:
             _unreported(folder, failure)
+            return not isinstance(failure, KeyboardInterrupt)
+    return True
 
 
 def _follow(folder: Path) -> None:
@@ -354,7 +360,7 @@ def _unreported(folder: Path, failure: BaseException) -> None:
     )
 
 
-def tell_of(done: Executed, watchers: Watchers, *, no_report: bool) -> None:
+def tell_of(done: Executed, watchers: Watchers, *, no_report: bool) -> bool:
     """Tell of a run that ended, as text and to other programs; see `concluded`."""
     began = time.monotonic() - done.took
 
@@ -362,7 +368,7 @@ def tell_of(done: Executed, watchers: Watchers, *, no_report: bool) -> None:
         watchers.end(answer(done, report))
         print_run(done, report, time.monotonic() - began)
 
-    concluded(done, no_report=no_report, tell=tell)
+    return concluded(done, no_report=no_report, tell=tell)
 
 
 def leave(done: Executed) -> NoReturn:

@@ -136,7 +136,7 @@ def command(
                 loaded,
                 out,
                 noted(notes),
-                tell_others(status, live, served),
+                tell_others(status, live, served, signals),
                 realtime=realtime,
                 field=field,
             )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.attended import Signals
+from tactile_lab.commands.attended import INTERRUPTED, Signals
 from tactile_lab.commands.one_run import (
     caught_up,
     finished,
@@ -105,7 +105,7 @@ def command(
     """Run each SCENE in turn, or those of a FILE with [[run]] tables.
 
     All are planned before anything is opened. What was done is kept in the folder of
-    the runs. The exit code is that of the last run.
+    the runs. The exit code is that of the last run, or says what signal ended it.
     """
     code = 0
     with Signals() as signals, ExitStack() as served:
@@ -117,15 +117,20 @@ def command(
             _plan_all(steps)
             kept_notes = noted(notes)
             start = None if begin is None else _time(begin)
-            others = tell_others(status, live, served)
+            others = tell_others(status, live, served, signals)
             signals.look()
             _keep(state, steps)
         if start is not None:
             _wait(start, signals)
         for number, step in enumerate(steps):
+            if signals.ending:
+                code = signals.ending
+                break
             if step.status == "complete":
                 if not step.told:
-                    caught_up(Path(step.run), no_report=no_report)
+                    if not caught_up(Path(step.run), no_report=no_report):
+                        code = INTERRUPTED
+                        break
                     steps[number] = replace(step, told=True)
                     _keep(state, steps)
                 continue
@@ -146,7 +151,9 @@ def command(
             signals.opened = False
             steps[number] = replace(step, status=str(done.state), run=run)
             _keep(state, steps)
-            tell_of(done, watchers, no_report=no_report)
+            if not tell_of(done, watchers, no_report=no_report):
+                code = done.exit_code or INTERRUPTED
+                break
             steps[number] = replace(steps[number], told=True)
             _keep(state, steps)
             code = done.exit_code

@@ -48,19 +48,19 @@ class StatusServer:
 
     Args:
         address: such as "tcp://127.0.0.1:5025"; port 0 takes a free one.
+        stop: ends the run, or what is about to begin one; takes the reason.
 
     Attributes:
         address: with the port that was taken.
         local: whether only programs on this computer reach it.
-        stop: asks the run to stop; takes the reason. None while there is none.
 
     Raises:
         SceneError: the address is none, or cannot be listened at.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, stop: Callable[[str], None]) -> None:
         host, port = _parsed(address)
-        self.stop: Callable[[str], None] | None = None
+        self._stop = stop
         self._clients: set[asyncio.StreamWriter] = set()
         self._newest: dict[str, dict[str, Any]] = {}
         self._told_progress = float("-inf")
@@ -97,13 +97,11 @@ class StatusServer:
             self._tell(line)
 
     def begin(self, execution: Execution) -> None:
-        """This is about to run; from now on it can be stopped."""
-        self.stop = execution.stop
+        """This is about to run."""
         self._tell(execution.documented)
 
     def end(self, result: dict[str, Any]) -> None:
         """Tell what came of it, as ``--json`` prints it."""
-        self.stop = None
         self._tell({"event": "result", **result})
 
     def _tell(self, line: dict[str, Any]) -> None:
@@ -153,7 +151,8 @@ class StatusServer:
             pass
         except asyncio.CancelledError:
             return
-        self._clients.discard(writer)
+        finally:
+            self._clients.discard(writer)
         writer.close()
 
     def _answered(self, line: bytes) -> dict[str, Any]:
@@ -161,15 +160,14 @@ class StatusServer:
         try:
             asked = json.loads(line)
             what = asked.get("do") if isinstance(asked, dict) else None
-        except ValueError:
+        except (ValueError, RecursionError):
             what = None
         if what != "stop":
             text = 'not understood; send {"do": "stop"}'
             return {"event": "refused", "text": text}
-        if self.stop is None:
-            return {"event": "refused", "text": "there is no run to stop"}
-        self.stop("stopped by another program")
-        return {"event": "stopping", "text": "the coil is being made safe"}
+        self._stop("stopped by another program")
+        text = "a run in progress ends with the coil made safe; no other begins"
+        return {"event": "stopping", "text": text}
 
     async def _leave(self) -> None:
         self._server.close()

@@ -1,11 +1,16 @@
 """Several runs in turn: planned before, kept on disk, gone on with after a fault."""
 
 import json
+import signal
+import socket
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
+
+from tactile_lab.commands.status_server import StatusServer
+from tactile_lab.lab import Lab
 
 SHORT = {
     "protocol.hold": "0.2 s",
@@ -101,6 +106,36 @@ def test_a_fault_ends_it_and_resume_goes_on_with_that_run(
     assert kept(tmp_path)[:3] == done[:3], "what was complete was run again"
     assert [status for status, _ in kept(tmp_path)] == ["complete"] * 5
     assert all(Path(run).is_dir() for _, run in kept(tmp_path))
+
+
+def test_a_stop_between_two_runs_begins_no_other(
+    sequence, asked, tmp_path, monkeypatch
+):
+    ended = StatusServer.end
+
+    def stopped_by_another_program(server, result):
+        ended(server, result)
+        host, port = server.address.removeprefix("tcp://").split(":")
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(b'{"do": "stop"}\n')
+            told = (json.loads(line)["event"] for line in link.makefile())
+            assert "stopping" in told
+
+    monkeypatch.setattr(StatusServer, "end", stopped_by_another_program)
+    runs = asked({"scene": "demo", "times": 2})
+    answer = sequence(runs, "--status", "tcp://127.0.0.1:0")
+    assert answer.code == 130, answer.err
+    assert [status for status, _ in kept(tmp_path)] == ["complete", ""]
+
+
+def test_ctrl_c_while_a_run_is_told_of_begins_no_other(
+    sequence, asked, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(Lab, "follow", lambda *_: signal.raise_signal(signal.SIGINT))
+    answer = sequence(asked({"scene": "demo", "times": 2}))
+    assert answer.code == 130, answer.err
+    assert "cut short" in answer.err
+    assert [status for status, _ in kept(tmp_path)] == ["complete", ""]
 
 
 def test_nothing_is_begun_if_one_of_them_cannot_be(sequence, asked, tmp_path):

@@ -17,8 +17,13 @@ HOW_TO = Path(__file__).parents[2] / "docs/how-to/work-with-other-programs.md"
 
 
 @pytest.fixture
-def server():
-    served = StatusServer("tcp://127.0.0.1:0")
+def stopped():
+    return []
+
+
+@pytest.fixture
+def server(stopped):
+    served = StatusServer("tcp://127.0.0.1:0", stopped.append)
     yield served
     served.close()
 
@@ -92,10 +97,10 @@ def test_who_comes_late_hears_the_newest_state_first(server):
         }
 
 
-@pytest.mark.parametrize("said", [b"stop\n", b"[]\n", b'{"do": "start"}\n', b"\xff\n"])
-def test_what_is_no_request_is_refused_and_does_nothing(server, said):
-    stopped = []
-    server.stop = stopped.append
+@pytest.mark.parametrize(
+    "said", [b"stop\n", b"[]\n", b'{"do": "start"}\n', b"\xff\n", b"[" * 4000 + b"\n"]
+)
+def test_what_is_no_request_is_refused_and_does_nothing(server, stopped, said):
     with connected(server) as link, link.makefile() as lines:
         link.sendall(said)
         assert json.loads(next(lines))["event"] == "refused"
@@ -134,7 +139,7 @@ def test_a_client_that_does_not_read_is_let_go_of_and_delays_nobody(server):
 )
 def test_an_address_that_is_none_is_refused(address):
     with pytest.raises(SceneError, match=r"write tcp://HOST:PORT"):
-        StatusServer(address)
+        StatusServer(address, str)
 
 
 def test_a_port_that_is_taken_is_refused_before_anything_is_opened(
