@@ -20,7 +20,7 @@ from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.drain_current import BOXCAR_3DB
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, printed, show
+from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.levels import Levels
 from tactile_lab.trial import Trials
@@ -253,13 +253,10 @@ def _change(run: Measurement, trial: MeasuredTrial, found: Estimate) -> dict[str
 def _told(change: dict[str, Any]) -> str:
     value, half = change["change_A"], change["change_uncertainty_A_95"]
     verb = "raises" if value > 0 else "lowers"
-    return (
-        f"{change['label']} {verb} I_DS by {show(abs(value), 'A', 3)} ± "
-        f"{show(half, 'A', 2)}"
-    )
+    return f"{change['label']} {verb} I_DS by {plus_minus(abs(value), half, 'A')}"
 
 
 def _sensitivity(change: dict[str, Any]) -> str:
     value = change["sensitivity_A_per_N"] * 1e6
     half = change["sensitivity_uncertainty_A_per_N_95"] * 1e6
-    return printed(f"{show(change['level_N'], 'N')} {value:.3g} ± {half:.2g} nA/mN")
+    return f"{show(change['level_N'], 'N')} {plus_minus(value, half, 'nA/mN')}"

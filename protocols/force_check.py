@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
-from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol, pause, step
 from tactile_lab.trial import Trials
 
@@ -69,8 +69,8 @@ class ForceCheck(ForceProtocol):
             "F_minus_F0_uncertainty_N_95": bands,
         }
         known = [
-            f"{t.label} as {show(force, 'N', 3)}"
-            + ("" if band is None else f" ± {show(band, 'N', 2)}")
+            f"{t.label} as "
+            + (show(force, "N", 3) if band is None else plus_minus(force, band, "N"))
             for t, force, band in zip(trials, by_field, bands, strict=True)
             if force is not None
         ]
@@ -104,7 +104,7 @@ class ForceCheck(ForceProtocol):
         error = float(np.sqrt(np.sum(left**2) / freedom / strength))
         known = Estimate.of(scale, error, freedom)
         said = (
-            f"The force read is {scale:.3g} ± {known.half:.2g} (95 %) times that of "
+            f"The force read is {plus_minus(scale, known.half)} (95 %) times that of "
             "Eq. (2)."
         )
         if 0.05 < scale < 0.2:

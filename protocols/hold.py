@@ -16,7 +16,7 @@ from tactile_lab.analysis.spike_train import within
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
@@ -206,5 +206,4 @@ def _by_exponential(trial: MeasuredTrial) -> Conclusion:
 
 
 def _gate(law: CircuitAdaptation) -> str:
-    half = show(law.V_GS.half, "V", 2)
-    return f"V_GS = {law.V_GS.value:.4f} V ± {half}"
+    return f"V_GS = {plus_minus(law.V_GS.value, law.V_GS.half, 'V')}"

@@ -17,7 +17,7 @@ from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.levels import Levels
 from tactile_lab.stimulus.recovery import Recovering, first_rest
@@ -120,8 +120,8 @@ def _slope(run: Measurement) -> Conclusion:
     )
     said = (
         f"The rate at the end of the ramp rises by {told}: the slope of Eq. (15) with "
-        f"a V_GS of {law.V_GS.value:.4f} V ± {show(law.V_GS.half, 'V', 2)} and "
-        f"{law.scale.value:.3f} ± {law.scale.half:.2g} of the stated force, fitted to "
+        f"a V_GS of {plus_minus(law.V_GS.value, law.V_GS.half, 'V')} and "
+        f"{plus_minus(law.scale.value, law.scale.half)} of the stated force, fitted to "
         f"the {law.intervals} intervals in the holds."
     )
     values = {

@@ -15,7 +15,15 @@ from tactile_lab.conclusion import NOT_STATED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, QuantityError
 from tactile_lab.measurement import FloatArray, MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed
+from tactile_lab.quantity import (
+    Duration,
+    Force,
+    Pause,
+    Unit,
+    parse,
+    plus_minus,
+    printed,
+)
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
 from tactile_lab.stimulus.recovery import TABLE_1_TAU
@@ -265,14 +273,16 @@ def _row(found: Gain, model: Gain | None) -> tuple[str, ...]:
     """One frequency of the table."""
     cells = [
         f"{found.frequency:.3g} Hz",
-        f"{found.gain.value:.3g} ± {found.gain.half:.2g}",
-        f"{_degrees(found.phase.value):.1f} ± {math.degrees(found.phase.half):.2g}",
+        plus_minus(found.gain.value, found.gain.half),
+        plus_minus(_degrees(found.phase.value), math.degrees(found.phase.half)),
     ]
     if model is None:
         cells += ["—", "—"]
     else:
-        phase = f"{_degrees(model.phase.value):.1f}"
-        cells += [f"{model.gain.value:.3g}", phase]
+        # to the digit to which the bench's are known, so that they can be compared
+        size = plus_minus(model.gain.value, found.gain.half)
+        phase = plus_minus(_degrees(model.phase.value), math.degrees(found.phase.half))
+        cells += [text.partition(" ±")[0] for text in (size, phase)]
     return tuple(printed(cell) for cell in cells)
 
 

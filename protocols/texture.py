@@ -18,7 +18,7 @@ from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, SceneError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, Unit, show
+from tactile_lab.quantity import Duration, Force, Pause, Unit, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.stimulus.indentation import on_indentation
 from tactile_lab.trial import Trial, Trials
@@ -131,9 +131,9 @@ class Texture(ForceProtocol):
                 (
                     show(speed, "m/s"),
                     str(spikes),
-                    f"{found:.3g} ± {half:.2g} Hz",
+                    plus_minus(found, half, "Hz"),
                     f"{expected:.3g} Hz",
-                    f"{show(period, 'm', 3)} ± {show(period * half / found, 'm', 2)}",
+                    plus_minus(period, period * half / found, "m"),
                 )
             )
             values.append(

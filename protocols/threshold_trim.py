@@ -16,7 +16,7 @@ from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
-from tactile_lab.quantity import Duration, Pause, Unit, Voltage, show
+from tactile_lab.quantity import Duration, Pause, Unit, Voltage, plus_minus, show
 from tactile_lab.stimulus.force import pause, step
 from tactile_lab.stimulus.recovery import Recovering
 from tactile_lab.trial import Outcome, Trial, Trials
@@ -221,7 +221,7 @@ class TrimmedGate(Bracket):
             "critical_force_N": wanted,
         }
         sentences = [
-            f"V_GS = {show(self.middle, 'V', 6)} ± {show(self.half_width, 'V', 2)}, as "
+            f"V_GS = {plus_minus(self.middle, self.half_width, 'V')}, as "
             f"its source reads it, puts the critical force at {show(wanted, 'N')} for "
             f"a ramp of {asked.ramp:g} s and a hold of {asked.hold:g} s: silent at "
             f"{show(self.silent, 'V', 6)}, fires at {show(self.fires, 'V', 6)}. To use "

@@ -23,7 +23,7 @@ from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.quantity import Duration, Unit, show
+from tactile_lab.quantity import Duration, Unit, plus_minus, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.trial import Probes, Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
@@ -84,7 +84,12 @@ class WiringCheck(Protocol):
         calibrations, faults = _calibrated(run, run.circuit, windows)
         rest, push = (_found(run, windows[w], calibrations) for w in ("rest", "push"))
         expected = _expected(run, run.circuit, windows)
-        verdicts = judge(SignalLevels(rest, push), expected, faults)
+        bands = {
+            t.signal: _bands(run, t, calibrations.get(t.signal))
+            for t in run.traces
+            if t.signal in NODES
+        }
+        verdicts = judge(SignalLevels(rest, push, bands), expected, faults)
         channels: dict[str, dict[str, Any]] = {}
         sentences = []
         for verdict in verdicts:
@@ -125,9 +130,9 @@ class WiringCheck(Protocol):
         size = shown / abs(trace.scale)
         half = (trace.code or CODE) / abs(trace.scale) / 2
         # half a code of the converter is as fine as it can be told
-        said = f"{1e3 * size:.2g} ± {1e3 * half:.2g} mV"
+        said = plus_minus(size, half, "V")
         if size <= half:
-            said = f"below {1e3 * half:.2g} mV"
+            said = f"below {show(half, 'V', 2)}"
         return size, f"; {self.mains:g} Hz hum {said}"
 
 
@@ -140,6 +145,15 @@ def _window(trial: MeasuredTrial) -> Window:
 def _known(run: Measurement, trace: RecordedSignal) -> float:
     """Half of the 95 % band of a mean: what a converter's steps may leave, V."""
     return run.step_bias(trace.signal) if trace.code else CODE / 2
+
+
+def _bands(
+    run: Measurement, trace: RecordedSignal | None, known: ChannelCalibration | None
+) -> tuple[float, float]:
+    """Halves of the 95 % bands of a voltage's mean and of a change of it, V."""
+    one = CODE if trace is None else _known(run, trace)
+    # without a calibration the channel's offset may be a code; a change knows neither
+    return Z95 * known.error if known else math.hypot(one, CODE), 2 * one
 
 
 def _calibrated(
@@ -205,7 +219,7 @@ def _expected(
                 "field": amperes * (run.field_per_ampere or 0.0),
             }
         )
-    return SignalLevels(*levels)
+    return SignalLevels(levels[0], levels[1])
 
 
 def _gate(
@@ -214,20 +228,17 @@ def _gate(
     """V_GS that explains V_C1 at rest."""
     from tactile_lab.model.equations import rest_V_C1
 
-    trace = run.trace("V_C1")
-    one = CODE if trace is None else _known(run, trace)
-    # without a calibration the channel's offset may be a code
-    error = known.error if known else math.hypot(one, CODE) / Z95
+    half, _ = _bands(run, run.trace("V_C1"), known)
     try:
-        gate = explaining_V_GS(circuit, V_C1, error)
+        gate = explaining_V_GS(circuit, V_C1, half / Z95)
     except NotIdentifiableError as reason:
         said = f"{str(reason)[0].upper()}{str(reason)[1:]}."
         return Conclusion((said,), {"V_GS": None})
     said = (
-        f"V_C1 rests at {show(V_C1, 'V')}, the model at "
+        f"V_C1 rests at {plus_minus(V_C1, half, 'V')}, the model at "
         f"{show(rest_V_C1(circuit), 'V')}: a V_GS of {show(gate.value, 'V')} "
         f"({show(gate.low, 'V')} to {show(gate.high, 'V')}, 95 %) explains it; "
-        "threshold_search refines it (0.65 mN per mV)."
+        f"threshold_search refines it ({1 / abs(circuit.k_F):.2g} mN per mV)."
     )
     values = {"value": gate.value, "low_95": gate.low, "high_95": gate.high}
     return Conclusion((said,), {"V_GS": values})

@@ -155,6 +155,24 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     return printed(f"{text} {prefix}{unit}").rstrip()
 
 
+def plus_minus(value: float, half: float, unit: str = "", digits: int = 2) -> str:
+    """A value and half of its band (SI) for a person: "50.000 ± 0.025 mN".
+
+    Both have one prefix and end at the same digit, the `digits`-th of the band.
+    """
+    if not 0 < half < math.inf:
+        return show(value, unit)
+    size = max(abs(value), half)
+    prefix = prefix_of(size, unit)
+    scale = 10.0 ** (_power(size) if prefix else 0)
+    last = int(f"{half / scale:.{digits - 1}e}".partition("e")[2]) - digits + 1
+    # what rounds to nothing is shown without its sign
+    number, known = (round(x / scale, -last) + 0.0 for x in (value, half))
+    places = max(-last, 0)
+    text = f"{number:.{places}f} ± {known:.{places}f} {prefix}{unit}"
+    return printed(text).rstrip()
+
+
 def exact(value: float, unit: str) -> str:
     """The shortest text with a prefix that `parse` reads back to the same value."""
     for digits in range(4, 18):

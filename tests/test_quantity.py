@@ -8,7 +8,15 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from tactile_lab.errors import QuantityError
-from tactile_lab.quantity import PREFIXES, Duration, Force, Unit, parse, show
+from tactile_lab.quantity import (
+    PREFIXES,
+    Duration,
+    Force,
+    Unit,
+    parse,
+    plus_minus,
+    show,
+)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 POWERS = {k: round(math.log10(v)) for k, v in PREFIXES.items()}
@@ -156,3 +164,23 @@ def test_a_number_without_unit_is_answered_with_what_it_may_mean(text, unit, hin
     with pytest.raises(QuantityError) as why:
         parse(text, unit)
     assert hint in str(why.value)
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "unit", "told"),
+    [
+        (0.05, 25e-6, "N", "50.000 ± 0.025 mN"),
+        (2.741e-3, 8.4e-7, "T", "2.74100 ± 0.00084 mT"),
+        (-1.37e-6, 14e-6, "V", "−1 ± 14 µV"),
+        (-1.37e-6, 20e-3, "V", "0 ± 20 mV"),
+        (1.12679, 0.00088, "V/N", "1.12679 ± 0.00088 V/N"),
+        (-118.742, 0.0321, "", "−118.742 ± 0.032"),
+        (12345.6, 123.0, "", "12350 ± 120"),
+        (0.2, 8.5e-3, "N", "200.0 ± 8.5 mN"),
+        (1.0, 0.0996, "", "1.00 ± 0.10"),
+        (0.05, 0.0, "N", "50 mN"),
+        (0.05, math.nan, "N", "50 mN"),
+    ],
+)
+def test_a_value_is_told_as_far_as_it_is_known(value, half, unit, told):
+    assert plus_minus(value, half, unit) == told

@@ -25,7 +25,7 @@ from tactile_lab.acquisition.journal import Journal
 from tactile_lab.bench import Reading, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
-from tactile_lab.quantity import show
+from tactile_lab.quantity import plus_minus, show
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome, Trial
@@ -264,10 +264,11 @@ class Account:
             sure = code / 2 / float(np.ptp(played.points.currents))
             if played.generated and abs(seen.scale - 1) > MOST_SCALED + sure:
                 self.warn(
-                    f"The coil current that was sampled is {seen.scale:.3g} ± "
-                    f"{sure:.1g} (half a code) of the one that the generator was to "
-                    "give. What was sampled is kept. Multiply gain in [coil.generator] "
-                    "by that, or check the shunt's resistance."
+                    "The coil current that was sampled is "
+                    f"{plus_minus(seen.scale, sure, digits=1)} (half a code) of the "
+                    "one that the generator was to give. What was sampled is kept. "
+                    "Multiply gain in [coil.generator] by that, or check the shunt's "
+                    "resistance."
                 )
             if abs(seen.longer) > MOST_LONGER:
                 self.warn(

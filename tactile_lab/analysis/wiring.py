@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from tactile_lab.analysis.estimate import Z95, Estimate
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.quantity import show
+from tactile_lab.quantity import plus_minus, show
 
 NODES = ("V_C1", "V_C2", "V_K")
 """Voltages of the circuit, each on a probe of its own."""
@@ -47,10 +47,15 @@ class ChannelVerdict:
 
 @dataclass(frozen=True)
 class SignalLevels:
-    """Mean of each signal at rest and during the push, by name, SI."""
+    """Mean of each signal at rest and during the push, by name, SI.
+
+    Attributes:
+        known: of a voltage, halves of the 95 % bands of its mean and of a change of it.
+    """
 
     rest: Mapping[str, float]
     push: Mapping[str, float]
+    known: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -97,8 +102,8 @@ class ChannelCalibration:
     def text(self) -> str:
         """For a person: offset and gain with their uncertainty, and what is done."""
         said = (
-            f"offset {show(self.offset, 'V', 2)} ± {show(self.known, 'V', 2)}, gain "
-            f"{self.gain:.3f} ± {self.gain_known:.2g} by 0 V and V_S (95 %)"
+            f"offset {plus_minus(self.offset, self.known, 'V')}, gain "
+            f"{plus_minus(self.gain, self.gain_known)} by 0 V and V_S (95 %)"
         )
         if self.corrects:
             return f"{said}, corrected"
@@ -170,6 +175,12 @@ def _voltage(
     change = found.push[signal] - rest
     wanted = expected.push[signal] - should
     says = f"{show(rest, 'V', 3)} at rest, {_signed(change)} by the push"
+    if signal in found.known:
+        of_mean, of_change = found.known[signal]
+        says = (
+            f"{plus_minus(rest, of_mean, 'V')} at rest, "
+            f"{_signed(change, half=of_change)} by the push"
+        )
 
     def wrong(text: str) -> ChannelVerdict:
         return ChannelVerdict(signal, False, f"{says}{text}")
@@ -250,8 +261,9 @@ def _similar(value: float, should: float) -> bool:
     return 0.3 * abs(should) <= abs(value) <= 3 * abs(should)
 
 
-def _signed(value: float, unit: str = "V") -> str:
-    return ("+" if value >= 0 else "") + show(value, unit, 3)
+def _signed(value: float, unit: str = "V", half: float | None = None) -> str:
+    text = show(value, unit, 3) if half is None else plus_minus(value, half, unit)
+    return text if text.startswith("−") else f"+{text}"
 
 
 def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:

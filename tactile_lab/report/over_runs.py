@@ -20,7 +20,7 @@ from tactile_lab.analysis.control_chart import (
 from tactile_lab.conclusion import Table
 from tactile_lab.errors import ParameterError
 from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import count, show
+from tactile_lab.quantity import count, plus_minus, show
 from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.html import picture, write_page_of_runs
 
@@ -84,8 +84,8 @@ class OverRuns:
         values = [one.value for one in self.points]
         mean, error = mean_and_error(values)
         of = count(len(values), "run")
-        known = "" if math.isnan(error) else f" ± {show(error, self.unit)}"
-        said = [f"{self.key}: {show(mean, self.unit)}{known} (standard error, {of})."]
+        known = plus_minus(mean, error, self.unit)
+        said = [f"{self.key}: {known} (standard error, {of})."]
         simulated = sum(one.simulated for one in self.points)
         if 0 < simulated < len(self.points):
             said.append(

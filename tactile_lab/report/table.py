@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
-from tactile_lab.quantity import printed, show
+from tactile_lab.quantity import plus_minus, printed, show
 
 NONE = "–"
 
@@ -107,8 +107,8 @@ def circuit_fits_table(run: Measurement) -> Table:
             (
                 _name(trial),
                 _ranged(fit.tau, "s"),
-                f"{fit.V_GS.value:.4f} V ± {show(fit.V_GS.half, 'V', 2)}",
-                f"{show(fit.V_P.value, 'V', 4)} ± {show(fit.V_P.half, 'V', 2)}",
+                plus_minus(fit.V_GS.value, fit.V_GS.half, "V"),
+                plus_minus(fit.V_P.value, fit.V_P.half, "V"),
                 show(fit.rms, "Hz", 2),
                 last,
                 str(fit.intervals),
@@ -175,8 +175,9 @@ def _ranged(estimate: Estimate, unit: str) -> str:
 
 def _with(value: float, uncertainty: float | None, unit: str, digits: int) -> str:
     """A value with its uncertainty, where that is known."""
-    text = show(value, unit, digits)
-    return text if uncertainty is None else f"{text} ± {show(uncertainty, unit, 2)}"
+    if uncertainty is None:
+        return show(value, unit, digits)
+    return plus_minus(value, uncertainty, unit)
 
 
 def _shown(value: float | None, unit: str, digits: int = 3) -> str:

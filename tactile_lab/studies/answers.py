@@ -15,7 +15,7 @@ from tactile_lab.analysis.control_chart import mean_and_error
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import count, printed, show
+from tactile_lab.quantity import count, plus_minus, printed, show
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import Gathered
 
@@ -221,8 +221,7 @@ def _with_error(found: Gathered, name: str, values: FloatArray) -> str:
     if not known.size:
         return "none"
     mean, error = mean_and_error(known.tolist())
-    of = "" if math.isnan(error) else f" ± {show(error, found.unit(name))}"
-    return f"{_told(found, name, mean)}{of}"
+    return plus_minus(mean, error, found.unit(name))
 
 
 def _combinations(found: Gathered) -> Iterator[tuple[str, ...]]:

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import re
 
 import pytest
 
@@ -91,7 +92,7 @@ def test_a_calibrated_run_states_what_it_knows(calibrated, tmp_path):
     assert 6e-3 < trial["level_uncertainty_N_95"] < 8e-3
     assert 0 < trial["latency_uncertainty_s"] < 0.02
     assert found["calibration"]["Coil"] == KEPCO
-    assert "120 mN ± " in report.html.read_text(encoding="utf-8")
+    assert re.search(r"120\.\d+ ± \d\.\d+ mN", report.html.read_text(encoding="utf-8"))
 
 
 def test_another_coil_is_refused_before_it_is_switched_on(calibrated, tmp_path):

@@ -363,7 +363,11 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
     (found,) = told.plain["V_C1_over_force"]
     ((frequency_, gain, phase_, *model),) = told.tables[0].rows
     assert frequency_ == "0.5 Hz"
-    assert gain.startswith(f"{found['gain_V_per_N']['value']:.3g} ± ")
+    shown, half = (part.partition(".")[2] for part in gain.split(" ± "))
+    assert len(shown) == len(half) > 1, "the gain is told as far as it is known"
+    assert float(gain.split(" ± ")[0]) == pytest.approx(
+        found["gain_V_per_N"]["value"], abs=found["gain_V_per_N"]["error"]
+    )
     assert float(model[0]) == pytest.approx(found["gain_V_per_N"]["value"], rel=0.02)
     assert phase_.startswith("−1") and model[1].startswith("−1")
     # small signal: dV_C1/dF = -k_F g_m R, low-passed by node A at 27 Hz
@@ -413,8 +417,8 @@ def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
     assert last["latency_uncertainty_s"] == 2e-3
     assert first["latency_uncertainty_s"] is None, "it was silent"
     page = report.html.read_text(encoding="utf-8")
-    assert "200 mN ± 8.5 mN" in page
-    assert "± 2 ms" in page
+    assert "200.0 ± 8.5 mN" in page
+    assert "± 2.0 ms" in page
     (answer,) = report.findings.answers
     assert draw(answer, "a run").axes[0].collections, "error bars"
 
