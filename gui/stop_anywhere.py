@@ -46,9 +46,13 @@ class StopAnywhere(QObject):
             watched.setWindowModality(Qt.WindowModality.NonModal)
             return False
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
+            if event.key() not in (Qt.Key.Key_F12, Qt.Key.Key_Escape):
+                return False
+            if event.isAutoRepeat():
+                return True  # held down; what it first meant was done
             if event.key() == Qt.Key.Key_F12:
                 return self._act("STOP by F12")
-            return event.key() == Qt.Key.Key_Escape and self._escape()
+            return self._escape()
         if isinstance(event, QMouseEvent) and self._meant_for_stop(event):
             return self._act("STOP in the window")
         return False

@@ -106,8 +106,7 @@ class Window(QMainWindow):
         if self._bench_changed():
             self.review.manual.show_bench(self.session.bench.spec)
         self.centre.show_empty(
-            snapshot.state in (WindowState.DISCONNECTED, WindowState.CONNECTING)
-            and self.screen_.run is None
+            snapshot.state is WindowState.DISCONNECTED and self.screen_.run is None
         )
         self.centre.log.note.setPlaceholderText(self.runs.note_goes_to)
         tools = self.centre.tools
@@ -116,12 +115,16 @@ class Window(QMainWindow):
         if focus is not None and not (focus.isEnabled() and focus.isVisible()):
             # what had it is locked or gone: Space shall not press what comes next
             self.page.setFocus()
-        self._close_when_off()
+        self._render_closing(snapshot)
 
     def render_clock(self, snapshot: Snapshot) -> None:
         """Render what changes all the time: header, STOP, manual."""
         self.header.render_snapshot(snapshot)
         self._render_manual(snapshot)
+        self._render_closing(snapshot)
+
+    def _render_closing(self, snapshot: Snapshot) -> None:
+        self.closing.render_snapshot(snapshot, busy=self.session.busy)
         self._close_when_off()
 
     def _render_manual(self, snapshot: Snapshot) -> None:

@@ -10,17 +10,17 @@ from gui.dialogs.overlay import Overlay
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import label, push
-from gui.state import Snapshot, milliamperes, minutes
+from gui.state import Snapshot, minutes, stop_text
 
 
 class Closing(Overlay):
     """Keep running (the default, and Esc) or stop, verify off and close."""
 
-    kept = Signal()
     stopped = Signal()
 
     def __init__(self, window: QWidget, theme: Theme) -> None:
         super().__init__(window, 490)
+        self._asking = False
         self._theme = theme
         self._sign = QLabel()
         self._title = label("", "big", wrap=True)
@@ -37,7 +37,6 @@ class Closing(Overlay):
     def ask(self, snapshot: Snapshot) -> None:
         """Ask; says what happens to coil and data."""
         self._sign.setPixmap(pixmap("warning", self._theme.tokens.amber, 28))
-        current = milliamperes(snapshot.coil.current) if snapshot.coil else "not in use"
         if snapshot.manual:
             self._title.setText("The coil is driven by hand. Close anyway?")
             self._text.setText(
@@ -48,22 +47,34 @@ class Closing(Overlay):
         else:
             self._title.setText("A run is in progress. Close anyway?")
             self._text.setText(
-                f"Closing stops <b>{snapshot.title}</b> at {snapshot.elapsed:.1f} s, "
+                f"Closing stops <b>{snapshot.title}</b> where it is, "
                 "ramps the coil to <b>0 mA</b>, verifies it by read-back, and keeps "
                 "the data so far as an <i>aborted</i> run."
             )
             self.keep.setText("Keep running")
+        self.open()
+        self._asking = True
+        self.render_snapshot(snapshot, busy=True)
+        self.keep.setDefault(True)
+        self.keep.setFocus()
+
+    def render_snapshot(self, snapshot: Snapshot, *, busy: bool) -> None:
+        """While it asks, tell what the coil does now; go where nothing is in use."""
+        if not self._asking:
+            return
+        if not busy:
+            self._keep()
+            return
+        said = stop_text(snapshot.state, snapshot.coil).detail
         left = ""
         if snapshot.expected is not None and not snapshot.manual:
             rest = max(0.0, snapshot.expected - snapshot.elapsed)
             left = f" · remaining {minutes(rest)}"
-        self.now.setText(f"Coil now {current}{left}")
-        self.open()
-        self.keep.setDefault(True)
-        self.keep.setFocus()
+        self.now.setText(f"Coil: {said}{left}")
 
     def say(self, title: str, text: str) -> None:
         """Tell how the closing goes, without a question."""
+        self._asking = False
         self._title.setText(title)
         self._text.setText(text)
         self.now.setText("")
@@ -81,8 +92,8 @@ class Closing(Overlay):
             super().keyPressEvent(event)
 
     def _keep(self) -> None:
+        self._asking = False
         self.hide()
-        self.kept.emit()
 
     def _stop(self) -> None:
         self.stopped.emit()

@@ -35,8 +35,11 @@ APART = 5
 NAMES = 14
 """Height at the top lane's top that is left free for the names of holds, px."""
 
-LINE = 13
-"""Height that a number on the axis needs, px."""
+LINE, HALF = 13, 4
+"""Height that a number on the axis needs, and half of its figures', px."""
+
+MOST = 12
+"""Numbers on the axis of the highest lane."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,25 @@ class Drawing:
     frame: Frame
     source: Source
     tokens: Tokens
+
+
+def heights_of(
+    low: float, high: float, height: float
+) -> list[tuple[str, float, float]]:
+    """Numbers on an axis so high, px: each with the heights of its line and its words.
+
+    At an end the words would stand half in the lane beside it, or be cut off there.
+    """
+    frame = Frame(0.0, 1.0, 0.0, height, 0.0, 1.0, low, high)
+    step, values = value_ticks(low, high, min(max(2, int(height / 21)), MOST))
+    lines = [round(frame.y1(value)) + 0.5 for value in values]
+    if len(values) > 2 and lines[0] - lines[1] < LINE:
+        # told beside each other, they would overlap: both ends
+        values, lines = [values[0], values[-1]], [lines[0], lines[-1]]
+    return [
+        (number(value, decimals(step)), y, min(max(y, HALF), height - HALF))
+        for value, y in zip(values, lines, strict=True)
+    ]
 
 
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]
@@ -64,21 +86,13 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
             return
         tokens, box = self._stage.tokens, self._box
         width, height = box.width(), box.height()
-        low, high = box.shown
-        frame = Frame(AXIS, AXIS + width, 0.0, height, 0.0, 1.0, low, high)
-        step, values = value_ticks(low, high, max(2, int(height / 21)))
-        found = [(value, number(value, decimals(step))) for value in values]
-        heights = [round(frame.y1(value)) + 0.5 for value, _ in found]
-        if len(found) > 2 and heights[0] - heights[1] < LINE:
-            # told beside each other, they would overlap: both ends
-            found, heights = [found[0], found[-1]], [heights[0], heights[-1]]
+        found = heights_of(*box.shown, height)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.setPen(paint.pen(tokens.grid))
-        painter.drawLines([QLineF(frame.left, y, frame.right, y) for y in heights])
-        for (_, words), y in zip(found, heights, strict=True):
-            if 1 <= y <= height + 1:
-                at = QPointF(AXIS - 8, y)
-                paint.write(painter, at, words, tokens.muted, align=1.0)
+        painter.drawLines([QLineF(AXIS, y, AXIS + width, y) for _, y, _ in found])
+        for words, _, y in found:
+            at = QPointF(AXIS - 8, y)
+            paint.write(painter, at, words, tokens.muted, align=1.0)
         painter.setPen(paint.pen(tokens.border_strong))
         painter.drawLine(QPointF(AXIS - 0.5, -1), QPointF(AXIS - 0.5, height))
 

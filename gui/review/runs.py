@@ -245,9 +245,12 @@ class RunsView(QWidget):
             button.setEnabled(entry is not None)
             button.setToolTip(words if entry is not None else "Choose a run first")
         cut = entry is not None and entry.status == "cut short"
-        self.recover.setVisible(cut)
         self.recover.setToolTip("Make it readable by any program; works on a copy")
-        self.open.setVisible(not cut)
+        other, offered = (self.open, self.recover) if cut else (self.recover, self.open)
+        offered.setVisible(True)
+        if other.hasFocus():  # or Qt would give the keyboard to whatever comes next
+            offered.setFocus()
+        other.setVisible(False)
         many = len(self.ticked())
         self.compare.setEnabled(many in (2, 3))
         self.compare.setText(

@@ -166,6 +166,7 @@ class Centre(QWidget):
     def _show_lanes(self, lanes: Sequence[Lane] | None) -> None:
         if lanes is not None:
             self.stack.show_lanes(lanes)
+            self.empty.raise_()  # the cards of new lanes lie above what was there
 
     def show_empty(self, wanted: bool) -> None:
         """Show or hide the card of the empty state."""

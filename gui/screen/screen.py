@@ -223,7 +223,8 @@ class Screen(QObject):
         if source is session.run.source:
             self.ending = ""
             expectation = session.run.expectation
-            steps = expectation.estimate.trials if expectation else 0
+            holds = expectation.preview.holds if expectation else []
+            steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
             self.results.begin(steps, fires=searched)
         self.changed.emit()

@@ -19,7 +19,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu
 
 from gui.lanes.arrangement import Arrangement
-from gui.lanes.box import LaneBox
+from gui.lanes.box import LaneBox, heights_of
 from gui.lanes.card import LaneCard
 from gui.lanes.expected import Stretch
 from gui.lanes.floor import AXIS
@@ -123,6 +123,16 @@ def test_the_threshold_is_dragged_to_where_the_next_run_counts(
     assert stack.scene.grab().toImage() == bare, "the run's own stays where it was"
     drag(stack, start, QPoint(start.x(), round(lane.geometry().bottom()) - 1))
     assert len(asked) == 1, "below 0 nothing can be counted"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "height"), [(-25, 200, 39), (3.8, 4.45, 55), (-5, 55, 500)]
+)
+def test_a_low_axis_tells_two_heights_and_a_high_one_not_too_many(low, high, height):
+    found = heights_of(low, high, height)
+    assert 2 <= len(found) <= 13
+    assert all(4 <= told <= height - 4 for _, _, told in found), "none is cut off"
+    assert all(abs(line - told) <= 4.5 for _, line, told in found)
 
 
 def span(lane: LaneBox) -> float:

@@ -1,6 +1,7 @@
 """A run from start to end, as the window shows and stops it."""
 
 import threading
+from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
@@ -10,10 +11,12 @@ from PySide6.QtWidgets import (
 )
 
 from gui.dialogs.help import Help
-from gui.lanes.source import PlanSource
-from gui.state import CoilKnowledge, WindowState, truth
+from gui.lanes.expected import Preview, Stretch
+from gui.lanes.source import LiveSource, PlanSource
+from gui.state import CoilKnowledge, WindowState, stop_text, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
+from tactile_lab.waveform import Waveform
 
 
 def newest_coil() -> serial_wires.FarEnd:
@@ -120,6 +123,35 @@ def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
     assert not window.closing.isVisible()
     assert session.state is WindowState.RUNNING, "Esc in the question is not STOP"
     assert window.isVisible()
+
+
+def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) -> None:
+    window, run = lab.window, lab.session.run
+    source = LiveSource(None, 1.0)
+    force = Waveform.through([(0.0, 0.0), (4.0, 0.0)])
+    holds = [Stretch(0, 1, "80 mN"), Stretch(1, 3, "", pause=True), Stretch(3, 4, "b")]
+    expected = replace(
+        lab.session.plan.expectation, preview=Preview(force, holds=holds)
+    )
+    monkeypatch.setattr(run, "source", source)
+    monkeypatch.setattr(run, "expectation", expected)
+    window.screen_.follow_run(source)
+    assert window.review.results.mark.text() == "preliminary · 0 of 2 steps"
+
+
+def test_the_question_on_closing_tells_what_the_coil_does_now(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
+    assert not window.close()
+    window.closing.now.setText("as it was")
+    lab.until(lambda: window.closing.now.text() != "as it was")
+    coil = session.coil_view()
+    assert stop_text(session.state, coil).detail in window.closing.now.text()
+    session.stop("while it is asked")
+    lab.until(lambda: not session.busy)
+    lab.until(lambda: not window.closing.isVisible())
+    assert window.isVisible(), "nobody answered"
 
 
 def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:

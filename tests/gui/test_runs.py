@@ -138,3 +138,15 @@ def test_only_a_run_that_was_cut_short_is_recovered(runs: RunsView) -> None:
     assert "Recover" in menu and "Delete …" in menu
     QTest.mouseClick(runs.cards[0], Qt.MouseButton.LeftButton)
     assert runs.recover.isHidden() and not runs.open.isHidden()
+
+
+def test_the_keyboard_stays_where_recover_was(runs: RunsView, qtbot) -> None:
+    cut = summary("d", "Pulses", "cut short")
+    runs.show_entries([*ENTRIES, cut])
+    runs.show()
+    runs.activateWindow()
+    runs._choose(cut)
+    runs.recover.setFocus()
+    qtbot.waitUntil(runs.recover.hasFocus)
+    runs.show_entries([*ENTRIES, summary("d", "Pulses", "recovered")])
+    assert runs.open.hasFocus()

@@ -1,8 +1,16 @@
 """STOP reaches the coil whatever Qt itself opens."""
 
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QMessageBox
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QFileDialog,
+    QLineEdit,
+    QMessageBox,
+    QToolButton,
+)
 
+from gui.dialogs.overlay import Overlay
 from gui.state import WindowState
 
 
@@ -26,15 +34,37 @@ def seen_within(box_opens) -> dict[str, object]:
     return seen
 
 
+def drawn(button: QToolButton) -> int:
+    """How many of its pixels, its border aside, are no background."""
+    image = button.grab().toImage()
+    ground, inner = image.pixel(4, 4), range(4, image.width() - 4)
+    return sum(image.pixel(x, y) != ground for x in inner for y in inner)
+
+
 def test_a_question_of_a_file_dialog_is_not_modal(lab) -> None:
     window = lab.window
     window.screen_.ask_run()
     (dialog,) = window.findChildren(QFileDialog)
     dialog.findChild(QLineEdit, "fileNameEdit").setText("/no/such/folder")
+    assert drawn(dialog.findChild(QToolButton, "toParentButton")) > 50, "not a speck"
     seen = seen_within(dialog.accept)
     assert seen["asked"] == 1, "Qt says that there is no such folder"
     assert seen["modal"] is None, "or no click would reach STOP"
     dialog.close()
+
+
+def test_a_key_that_is_held_down_acts_once(lab) -> None:
+    window, log = lab.window, lab.session.log
+    window.actions_.show_help()
+    before = len(log.lines)
+    for repeated in (False, True, True):
+        pressed = QKeyEvent(
+            QEvent.Type.KeyPress, Qt.Key.Key_Escape, Qt.KeyboardModifier.NoModifier,
+            "", repeated,
+        )  # fmt: skip
+        QApplication.sendEvent(window, pressed)
+    assert not any(card.isVisible() for card in window.findChildren(Overlay))
+    assert len(log.lines) == before, "Esc closed the help; nothing was switched off"
 
 
 def test_stop_acts_while_qt_waits_for_an_answer(lab) -> None:
