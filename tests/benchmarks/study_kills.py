@@ -53,6 +53,8 @@ SHARES = {
 """Of a hundred kills, what is killed."""
 HALF = 2.0
 """Mean time from the start to a kill, s."""
+STANDS = 600.0
+"""One that has not ended after so long stands still, even at the lowest priority, s."""
 
 
 def carried_out(folder: Path, scheduler: str | None) -> None:
@@ -167,7 +169,7 @@ def _killed(
     before = on_disk(folder)
     own = children(pid)
     os.kill(draw.choice(targets), signal.SIGKILL)
-    client.join(120)
+    client.join(STANDS)
     if client.is_alive():
         client.kill()
         return "hangs"
