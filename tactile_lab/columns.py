@@ -8,11 +8,13 @@ import math
 import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from tactile_lab.errors import SceneError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LARGEST_FILE = 256 * 2**20
 """Bytes; a scene's force table may be long, but not endless."""
@@ -81,6 +83,8 @@ def read_columns(
         SceneError: not readable, another header, a row of another length, or a value
             that is not a finite number; the line is named.
     """
+    import numpy as np  # heavy, and most read texts alone
+
     wanted = " or ".join(",".join(names) for names in headers)
     header: tuple[str, ...] | None = None
     rows: list[list[float]] = []

@@ -35,7 +35,7 @@ def command(key: str, root: Path, where: str, out: Path | None, as_json: bool) -
         points, unit = [], ""
         with Catalogue(root) as listed:
             entries = listed.runs(where=where)
-            known = listed.known(entries)
+            known = listed.known(entries, key)
         for entry, facts in zip(entries, known, strict=True):
             told = facts.get(key, [])
             numbers = [one.number for one in told if one.number is not None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,33 +81,38 @@ def command(
                 words=search,
                 where=where,
             )
-            facts = found.known(entries) if sort or keys or as_csv else []
-        if sort:
-            order = ordered(facts, sort)
+            key = sort.removeprefix("-") if sort else None
+            if key is not None:
+                _check_key(key, found.keys())
+            whole = keys or as_csv
+            facts = found.known(entries, None if whole else key or "")
+        if key is not None:
+            order = ordered(facts, key, backwards=sort != key)
             entries, facts = [entries[i] for i in order], [facts[i] for i in order]
     if keys:
-        for key, example in sorted(examples(facts).items()):
-            say(f"{key:<34} {example}")
+        for name, example in sorted(examples(facts).items()):
+            say(f"{name:<34} {example}")
     elif as_csv:
         print_csv(facts)
     elif as_json:
         print_json({"runs": [entry.to_dict() for entry in entries]})
     else:
-        print_list(entries, sort, facts)
+        print_list(entries, key, facts)
     if not entries:
         say(f"No run in {root} matches.", sys.stderr)
 
 
-def ordered(facts: Sequence[Known], sort: str) -> list[int]:
-    """The order of runs by a key, those without it last.
+def _check_key(key: str, keys: Collection[str]) -> None:
+    """Refuse a key that no run has and none could be known to have."""
+    from tactile_lab.store.facts import KNOWN
 
-    Raises:
-        SceneError: no run has the key.
-    """
-    key, backwards = sort.removeprefix("-"), sort.startswith("-")
-    if facts and not any(key in table for table in facts):
-        told = choices(key, sorted(examples(facts)), "Keys")
+    if keys and key not in (known := {*keys, *KNOWN}):
+        told = choices(key, sorted(known), "Keys")
         raise SceneError(f'--sort: no run has "{key}"; {told}')
+
+
+def ordered(facts: Sequence[Known], key: str, *, backwards: bool) -> list[int]:
+    """The order of runs by a key, those without it last."""
 
     def place(i: int) -> tuple[float, str]:
         first = facts[i][key][0]
@@ -136,7 +141,7 @@ def shown(found: Sequence[Fact]) -> str:
 
 
 def print_list(
-    entries: Sequence[RunSummary], sort: str | None, facts: Sequence[Known]
+    entries: Sequence[RunSummary], key: str | None, facts: Sequence[Known]
 ) -> None:
     """One line a run, under headings."""
     from tactile_lab.quantity import count
@@ -147,15 +152,15 @@ def print_list(
         length = "" if entry.duration is None else f"{entry.duration:.1f} s"
         spikes = "" if entry.spikes is None else count(entry.spikes, "spike")
         told = entry.trouble or entry.loss
-        if sort:
-            told = shown(facts[i].get(sort.removeprefix("-"), ()))
+        if key is not None:
+            told = shown(facts[i].get(key, ()))
         elif not entry.trouble:
             star = "* " if entry.starred else ""
             told = f"{star}{' '.join(f'#{tag}' for tag in entry.tags)} {told}".strip()
         rows.append((entry.name, entry.status, kind, length, spikes, told))
     if len(rows) == 1:
         return
-    rows[0] = (*rows[0][:-1], sort.removeprefix("-") if sort else "samples")
+    rows[0] = (*rows[0][:-1], key or "samples")
     wide = max(len(row[0]) for row in rows)
     for name, status, kind, length, spikes, told in rows:
         line = f"{name:<{wide}} {status:<10} {kind:<4} {length:>9} {spikes:>12}  {told}"

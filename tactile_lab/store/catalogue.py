@@ -98,9 +98,20 @@ class Catalogue:
             chosen.append(entry)
         return sorted(chosen, key=lambda entry: (entry.started, entry.name))
 
-    def known(self, entries: Sequence[RunSummary]) -> list[dict[str, list[Fact]]]:
-        """All that is known of these runs, by key; of a key with a list each item."""
-        found = self._index.facts([entry.name for entry in entries])
+    def keys(self) -> list[str]:
+        """Every key that a run of the folder has."""
+        return self._index.keys()
+
+    def known(
+        self, entries: Sequence[RunSummary], key: str | None = None
+    ) -> list[dict[str, list[Fact]]]:
+        """What is known of these runs, by key; of a key with a list each item.
+
+        Args:
+            entries: which runs.
+            key: this alone, which is much faster; None for all.
+        """
+        found = self._index.facts([entry.name for entry in entries], key)
         return [grouped(found[entry.name]) for entry in entries]
 
     def _fitting(self, where: str) -> Iterator[RunSummary]:
@@ -123,7 +134,7 @@ def _folders(root: Path) -> Iterator[tuple[str, list[int]]]:
                 if not item.is_dir():
                     continue
                 try:
-                    state = os.stat(os.path.join(item.path, INFO))
+                    state = os.stat(f"{item.path}{os.sep}{INFO}")
                     changed = item.stat().st_mtime_ns
                 except OSError:
                     continue  # some other folder

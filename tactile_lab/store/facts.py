@@ -30,6 +30,13 @@ _OF_TRIALS = (
     ("time_constant", "adaptation", "time_constant_s"),
 )
 """Keys of the trials, unless the protocol concludes them: table of the trial, name."""
+KNOWN: Mapping[str, str | None] = {
+    **dict.fromkeys((*TEXTS, "tag", "note")),
+    **dict.fromkeys(("starred", "simulated", "spikes"), ""),
+    "duration": "s",
+    **{key: name.rpartition("_")[2] for key, _, name in _OF_TRIALS},
+}
+"""Keys that may be asked for where no run has them, and their units; None of texts."""
 
 
 class Fact(NamedTuple):

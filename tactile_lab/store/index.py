@@ -13,21 +13,34 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tactile_lab.store.facts import Fact
+from tactile_lab.store.facts import KNOWN, Fact
 from tactile_lab.store.where import Condition, condition
 
 FILE = ".index.sqlite"
-VERSION = 2
+VERSION = 3
 """Of the tables; another one is thrown away."""
 PATIENCE = 2.0
 """Longest wait for another program that writes the index, s."""
 _TABLES = f"""
-CREATE TABLE runs (run TEXT PRIMARY KEY, stamp TEXT, entry TEXT) WITHOUT ROWID;
-CREATE TABLE facts (run TEXT, key TEXT, number REAL, text TEXT, folded TEXT, unit TEXT);
-CREATE INDEX by_key ON facts (key, number);
-CREATE INDEX by_run ON facts (run);
+CREATE TABLE runs (run INTEGER PRIMARY KEY, name TEXT UNIQUE, stamp TEXT, entry TEXT);
+CREATE TABLE facts (
+    run INTEGER, place INTEGER, key TEXT, number REAL, text TEXT, folded TEXT,
+    unit TEXT, PRIMARY KEY (run, place)
+) WITHOUT ROWID;
+CREATE INDEX by_number ON facts (key, unit, number);
+CREATE INDEX by_text ON facts (key, folded);
 PRAGMA user_version = {VERSION};
 """
+_RUN = "(SELECT run FROM runs WHERE name = ?)"
+_KEYS = """
+WITH RECURSIVE found (key) AS (
+    SELECT min(key) FROM facts
+    UNION ALL SELECT (SELECT min(key) FROM facts WHERE key > found.key)
+    FROM found WHERE key NOT NULL
+)
+SELECT key FROM found WHERE key NOT NULL
+"""
+"""Jumps from each key to the next: there are a few dozen, in many thousands of rows."""
 Read = Callable[[str], tuple[dict[str, Any], list[Fact]]]
 """Reads a run's entry and its facts, by the name of its folder."""
 
@@ -57,35 +70,39 @@ class Index:
             self._update(stamps, read)
 
     def _update(self, stamps: Mapping[str, list[int]], read: Read) -> None:
-        known = dict(self._base.execute("SELECT run, stamp FROM runs"))
-        now = {run: json.dumps(stamp) for run, stamp in stamps.items()}
-        changed = [run for run, stamp in now.items() if known.get(run) != stamp]
-        gone = [run for run in known if run not in now]
+        known = dict(self._base.execute("SELECT name, stamp FROM runs"))
+        now = {name: " ".join(map(str, stamp)) for name, stamp in stamps.items()}
+        changed = [name for name, stamp in now.items() if known.get(name) != stamp]
+        gone = [name for name in known if name not in now]
         if not (changed or gone):
             return
         with self._base:
-            drop = [(run,) for run in (*gone, *changed)]
-            self._base.executemany("DELETE FROM runs WHERE run = ?", drop)
-            self._base.executemany("DELETE FROM facts WHERE run = ?", drop)
-            for run in changed:
-                entry, facts = read(run)
-                self._base.execute(
-                    "INSERT INTO runs VALUES (?, ?, ?)",
-                    (run, now[run], json.dumps(entry, default=str)),
-                )
+            drop = [(name,) for name in (*gone, *changed)]
+            self._base.executemany(f"DELETE FROM facts WHERE run = {_RUN}", drop)
+            self._base.executemany("DELETE FROM runs WHERE name = ?", drop)
+            for name in changed:
+                entry, facts = read(name)
+                run = self._base.execute(
+                    "INSERT INTO runs (name, stamp, entry) VALUES (?, ?, ?)",
+                    (name, now[name], json.dumps(entry, default=str)),
+                ).lastrowid
                 self._base.executemany(
-                    "INSERT INTO facts VALUES (?, ?, ?, ?, ?, ?)",
-                    ((run, f.key, f.number, f.text, _folded(f), f.unit) for f in facts),
+                    "INSERT INTO facts VALUES (?, ?, ?, ?, ?, ?, ?)",
+                    (
+                        (run, place, f.key, f.number, f.text, _folded(f), f.unit)
+                        for place, f in enumerate(facts)
+                    ),
                 )
 
     def keys(self) -> list[str]:
         """Every key that a run has."""
-        return [key for (key,) in self._base.execute("SELECT DISTINCT key FROM facts")]
+        return [key for (key,) in self._base.execute(_KEYS)]
 
     def units(self, key: str) -> Collection[str]:
         """Units of a key's numbers; empty where it holds texts alone."""
         asked = "SELECT DISTINCT unit FROM facts WHERE key = ? AND number NOT NULL"
-        return {unit for (unit,) in self._base.execute(asked, (key,))}
+        found = {unit for (unit,) in self._base.execute(asked, (key,))}
+        return found or {unit for unit in (KNOWN.get(key),) if unit is not None}
 
     def entries(self, where: str = "") -> list[tuple[str, dict[str, Any]]]:
         """Name and entry of the runs that fit, in order of their names.
@@ -95,18 +112,28 @@ class Index:
         """
         fits = Condition("1", ())
         if where:
-            fits = condition(where, self.keys(), self.units)
+            keys = self.keys()
+            fits = condition(where, keys and {*keys, *KNOWN}, self.units)
         sql, values = fits
-        asked = f"SELECT run, entry FROM runs WHERE {sql} ORDER BY run"
+        asked = f"SELECT name, entry FROM runs WHERE {sql} ORDER BY name"
         found = self._base.execute(asked, values)
-        return [(run, json.loads(entry)) for run, entry in found]
+        return [(name, json.loads(entry)) for name, entry in found]
 
-    def facts(self, runs: Iterable[str]) -> dict[str, list[Fact]]:
-        """All that is known of these runs."""
-        asked = "SELECT key, number, text, unit FROM facts WHERE run = ?"
+    def facts(self, names: Iterable[str], key: str | None) -> dict[str, list[Fact]]:
+        """What is known of these runs: all, or under one key."""
+        if key is not None:
+            found: dict[str, list[Fact]] = {name: [] for name in names}
+            asked = (
+                "SELECT name, key, number, text, unit FROM facts JOIN runs USING (run) "
+                "WHERE key = ? ORDER BY run, place"
+            )
+            for name, *fact in self._base.execute(asked, (key,)):
+                found.get(name, []).append(Fact._make(fact))
+            return found
+        asked = f"SELECT key, number, text, unit FROM facts WHERE run = {_RUN}"
         return {
-            run: list(map(Fact._make, self._base.execute(asked, (run,))))
-            for run in runs
+            name: list(map(Fact._make, self._base.execute(asked, (name,))))
+            for name in names
         }
 
 
@@ -121,8 +148,9 @@ def _opened(file: Path | None) -> sqlite3.Connection:
             break
         try:
             base = sqlite3.connect(file, timeout=PATIENCE)
+            base.execute("PRAGMA cache_size = -65536")
             if base.execute("PRAGMA user_version").fetchone()[0] == VERSION:
-                base.execute("SELECT run FROM runs LIMIT 1").fetchone()
+                base.execute("SELECT name FROM runs LIMIT 1").fetchone()
                 return base
             if not base.execute("SELECT name FROM sqlite_master").fetchone():
                 base.executescript(_TABLES)

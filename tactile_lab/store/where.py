@@ -36,7 +36,7 @@ def condition(text: str, keys: Collection[str], units: Units) -> Condition:
 
     Args:
         text: as a person typed it.
-        keys: that any run has.
+        keys: that may be asked for; empty for any.
         units: of a key's numbers; empty where it holds texts alone.
 
     Raises:
@@ -93,7 +93,7 @@ class _Reader:
                 raise self._wrong("a bracket is not closed")
             return found
         key = self._next("a key")
-        if key not in self._keys:
+        if self._keys and key not in self._keys:
             told = choices(key, sorted(self._keys), "Keys")
             raise SceneError(f'--where: no run has "{key}"; {told}')
         if self._at == len(self._tokens) or self._tokens[self._at][0] != "sign":

@@ -117,6 +117,8 @@ def levels(tmp_path):
         ("(spikes = 2 or spikes = 9) and protocol != pulses", [2.0, 9.5]),
         ("critical_force < 95 mN", [2.0]),
         ("rest_V_C1 and starred = no", [2.0, 9.5]),
+        ("tag = cal or peak_rate > 3 Hz", []),
+        ("not tag", [2.0, 9.5]),
     ],
 )
 def test_runs_are_found_by_what_they_are(levels, where, taus):
@@ -130,6 +132,7 @@ def test_runs_are_found_by_what_they_are(levels, where, taus):
     [
         ("protocol.levl > 1 N", 'did you mean "protocol.level"'),
         ("protocol.level > 1 V", "N is needed"),
+        ("peak_rate > 1 V", "Hz is needed"),
         ("protocol.level >", "a value is missing"),
         ("> 3", "a key is missing"),
         ("(spikes = 2", "a bracket is not closed"),
@@ -160,6 +163,8 @@ def test_the_list_the_table_and_the_keys(levels):
     assert [row["tau (s)"] for row in rows] == ["2.0", "9.5"]
     assert rows[0]["protocol.levels (N)"] == "0.1 0.3"
     assert any(x.split() == ["critical_force", "99.5", "mN"] for x in said("--keys"))
+    assert len(said("--sort", "tag")) == 3
+    assert said("--sort", "tau", "--where", "note ~ 50%")[1].split()[-2] == "9.5"
     wrong = CliRunner().invoke(cli, ["runs", str(levels), "--sort", "taw"])
     assert wrong.exit_code == 2 and 'did you mean "tau"' in wrong.output
 
@@ -181,6 +186,12 @@ def test_running_and_cut_short_are_told_apart(tmp_path):
 def test_a_folder_without_runs_gets_no_index(tmp_path):
     assert catalogue(tmp_path) == []
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_there_are_no_runs_none_is_found(tmp_path):
+    assert catalogue(tmp_path, where="protocol.levels > 1 N and tag = cal") == []
+    with pytest.raises(SceneError, match="a value is missing"):
+        catalogue(tmp_path, where="tag =")
 
 
 def test_a_folder_that_is_none_is_refused(tmp_path):
