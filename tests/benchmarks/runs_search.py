@@ -38,6 +38,7 @@ def make(root: Path, runs: int) -> None:
             **{f"key_{k}": f"{k} s" for k in range(12)},
         }
         info = {
+            "schema": 1,
             "status": "complete",
             "started": f"20{10 + i // 1000}-03-{1 + i % 28:02d}T09:00:00+00:00",
             "protocol": "pulses",
@@ -100,7 +101,12 @@ def main() -> None:
 
         def command(*words: str) -> None:
             subprocess.run(
-                [sys.executable, "-m", "tactile_lab.cli", *words],
+                [
+                    sys.executable,
+                    "-c",
+                    "from tactile_lab.cli import main; main()",
+                    *words,
+                ],
                 check=True,
                 stdout=subprocess.DEVNULL,
             )
