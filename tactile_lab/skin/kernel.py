@@ -99,12 +99,7 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
         role: Any,
         stuck_rate: float,
         places: FloatArray,
-        depth: float,
-        area: float,
-        time: FloatArray,
-        rows: FloatArray,
-        owner: Any,
-        courses: FloatArray,
+        pressing: Any,
         framed: FloatArray,
         force_error: float,
         until: float,
@@ -130,9 +125,8 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
                 size += count[i]
                 continue
             t, F = force_on(
-                places[i, 0], places[i, 1], depth, area, rows, owner, courses, time,
-                framed[i], SAMPLED * force_error,
-            )  # fmt: skip
+                places[i, 0], places[i, 1], pressing, framed[i], SAMPLED * force_error
+            )
             largest[i] = F.max()
             pieces[i] = thinned(t, F, (1.0 - SAMPLED) * force_error)
             t, F = t[: pieces[i]], F[: pieces[i]]

@@ -168,12 +168,11 @@ def solved(
     role: NDArray[np.uint8],
 ) -> Any:  # fmt: skip
     """Numbers of spikes and pieces, forces, errors, spikes of circuits at places, m."""
-    array, saturates = skin.array, skin.circuit.saturation
+    saturates = skin.circuit.saturation
     run = kernel.run_saturating if saturates else kernel.run
     return run(
-        many, skin.circuit.t1 == "direct", role, array.stuck_rate, places, array.depth,
-        array.side**2, loads.time, loads.rows, loads.owner, loads.courses, framed,
-        skin.force_error, skin.duration, skin.tolerance,
+        many, skin.circuit.t1 == "direct", role, skin.array.stuck_rate, places,
+        loads.pressing, framed, skin.force_error, skin.duration, skin.tolerance,
         MOST_COUPLED if saturates else MOST_SPIKES,
     )  # fmt: skip
 

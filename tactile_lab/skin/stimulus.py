@@ -25,7 +25,7 @@ Pressure = Annotated[float, Unit("Pa", above=0.0)]
 Speed = Annotated[float, Unit("m/s", least=0.0)]
 Frequency = Annotated[float, Unit("Hz", above=0.0)]
 Part = Annotated[float, Field(ge=0, le=1)]
-PER_CYCLE, PER_DEPTH = 8, 4
+PER_CYCLE, PER_DEPTH = 4, 2
 """Points in a cycle of vibration, and while a load moves by the depth of the taxels,
 within which no stress can change faster; `forces` finds more between them."""
 MOST_POINTS = 1e6
