@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stdout, suppress
-from dataclasses import dataclass
+from contextlib import redirect_stdout
 from datetime import datetime
 from io import StringIO
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactile_lab.commands.attended import INTERRUPTED, Signals
+from tactile_lab.commands.day_steps import STEPS, Step, levels
 from tactile_lab.commands.one_run import finished, prepared, tell_of
 from tactile_lab.commands.options import noted, notes_option
 from tactile_lab.commands.terminal import fail, refusing, say, somebody, warn
@@ -24,121 +25,6 @@ if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
 
 STATE, BENCH, PAGE = "day-one.json", "bench.toml", "day-one.html"
-FIGURE, REPORT = "figure.png", "report.html"
-
-Results = Mapping[str, Any]
-
-
-def _wired(results: Results) -> str:
-    channels = (results["conclusion"] or {}).get("channels") or {}
-    wrong = [name for name, found in channels.items() if not found["ok"]]
-    if not channels:
-        return "no channel could be judged"
-    return f"not as wired: {', '.join(wrong)}" if wrong else ""
-
-
-def _calibrated(results: Results) -> str:
-    found = (results["conclusion"] or {}).get("slope_T_per_A")
-    return "" if found else "there is no calibration"
-
-
-def _forced(results: Results) -> str:
-    forces = (results["conclusion"] or {}).get("F_minus_F0_by_field_N") or [None]
-    return "a force could not be told from the field" if None in forces else ""
-
-
-def _onset(results: Results) -> str:
-    found = (results["conclusion"] or {}).get("critical_force_N")
-    return "" if found else "no critical force was found"
-
-
-def _fired(results: Results) -> str:
-    spikes = sum(trial["spikes"] for trial in results["trials"])
-    return "" if spikes else "the sensor was silent"
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of the first day.
-
-    Attributes:
-        name: of the scene that is run, or of the verb.
-        title: for a person.
-        before: what a person does first at a real bench; "" for nothing.
-        see: what to see.
-        otherwise: what to do if not.
-        wrong: what is wrong with a run's results, "" if nothing; None for a verb.
-        changes: of single keys of the scene.
-    """
-
-    name: str
-    title: str
-    see: str
-    otherwise: str
-    before: str = ""
-    wrong: Callable[[Results], str] | None = None
-    changes: tuple[str, ...] = ()
-
-
-STEPS = (
-    Step(
-        "doctor",
-        "Can this computer run an experiment?",
-        "no problems; notes matter only for instruments you do not have.",
-        "do what stands after `remedy`, then go on.",
-    ),
-    Step(
-        "devices",
-        "What is attached?",
-        "each of your instruments, with the row or driver that fits it.",
-        "check power and cable. An instrument without a row needs one "
-        "(docs/how-to/add-a-dialect.md); on the simulated bench nothing need be here.",
-    ),
-    Step(
-        "wiring_check",
-        "Is each channel what the bench file says?",
-        '"as wired" after each channel.',
-        "the report names what is swapped, inverted, open or attenuated: mend the "
-        "cable, or the channel in the bench file.",
-        wrong=_wired,
-    ),
-    Step(
-        "calibrate_field",
-        "What field does the coil give?",
-        "a slope near that of the bench file, a loop of a few mT, little drift.",
-        "a slope of the other sign: turn the probe, or exchange the coil's leads. A "
-        "wide loop: a core of hard steel. Drift: let coil and meter warm up.",
-        before="Take the NdFeB magnet away and put the probe on the core's axis.",
-        wrong=_calibrated,
-    ),
-    Step(
-        "force_check",
-        "Is the force what Eq. (2) says?",
-        "the forces asked for, within their uncertainty. With a balance under the "
-        "magnet note what it shows at each hold, and compare: tactile-lab run "
-        "force_check --set 'protocol.readings=[\"50 mN\", ...]'.",
-        "a tenth of the force: A2 as printed in Table 1. Otherwise check r, and that "
-        "the magnet is back in its place.",
-        before="Put the magnet back; without the sensor, or over a balance.",
-        wrong=_forced,
-    ),
-    Step(
-        "threshold_search",
-        "Where does the sensor begin to fire?",
-        "a critical force between two that were played.",
-        "no spike at all: trim V_GS (tactile-lab monitor) until V_C1 rests a few 10 mV "
-        "above the threshold. Spikes without force: V_GS is too high.",
-        before="Put the sensor in its place.",
-        wrong=_onset,
-    ),
-    Step(
-        "demo",
-        "Does it adapt?",
-        "spikes that grow with the force and slow down within a hold.",
-        "too small a force: take levels above the critical force that was found.",
-        wrong=_fired,
-    ),
-)
 
 
 @click.command("day-one")
@@ -188,15 +74,19 @@ def command(
             else:
                 if step.before and not day.simulated:
                     _ask(person, step.before)
-                say(f"  $ tactile-lab run {step.name} --bench {day.bench}")
+                changed = changes.get(step.name, ())
+                words = ["run", step.name, "--bench", day.bench]
+                words += ["--out", str(out / "runs")]
+                words += [word for change in changed for word in ("--set", change)]
+                say(f"  $ tactile-lab {shlex.join(words)}")
                 with refusing():
-                    scene = day.load(step, changes.get(step.name, ()))
+                    scene = day.load(step, changed)
                     run = prepared(scene, out / "runs", kept_notes)
                 done = finished(run[0], signals, run[1])
                 signals.opened = False
                 if not tell_of(done, run[1], no_report=False):
                     fail("stopped while it told of the run", INTERRUPTED)
-                wrong = day.ran(step, done)
+                wrong = day.ran(step, done, changed)
             say(f"  to see: {step.see}")
             if wrong:
                 say(f"  WRONG: {wrong}\n  what to do: {step.otherwise}")
@@ -269,7 +159,7 @@ class Day:
         """
         from tactile_lab.scene.load import load
 
-        return load(step.name, (*step.changes, *changes), self.bench)
+        return load(step.name, changes, self.bench)
 
     def words(self, step: Step) -> tuple[str, ...]:
         """What a verb is told beside its name."""
@@ -281,8 +171,8 @@ class Day:
         self.done[step.name] = {"at": _now(), "said": said, "printed": printed}
         self._keep()
 
-    def ran(self, step: Step, done: Executed) -> str:
-        """A scene was run: what is wrong with it, "" if nothing."""
+    def ran(self, step: Step, done: Executed, changed: tuple[str, ...]) -> str:
+        """A scene was run, so changed: what is wrong with it, "" if nothing."""
         self.code = done.exit_code
         if done.exit_code:
             return done.told
@@ -299,7 +189,8 @@ class Day:
         self.done[step.name] = {
             "at": _now(),
             "run": os.path.relpath(done.folder, self.out),
-            "said": [*results["statements"], *results["missing"]] or _levels(results),
+            "changes": changed,
+            "said": [*results["statements"], *results["missing"]] or levels(results),
         }
         self._keep()
         return ""
@@ -313,69 +204,29 @@ class Day:
         Raises:
             SceneError: it cannot be written.
         """
-        from html import escape
-        from urllib.parse import quote
-
         from tactile_lab.errors import SceneError
-        from tactile_lab.notebook import facts
+        from tactile_lab.report.day_one import DayStep, write_day
         from tactile_lab.scene.load import load_bench
-        from tactile_lab.store.folder import replacing
 
-        spec = load_bench(self.bench)
-        kind = "simulated bench" if spec.simulated else "instruments"
-        calibration = getattr(spec.magnet, "calibration", None)
-        head = [
-            ("Bench", f"{spec.name} ({kind}), {self.bench}"),
-            ("Calibration", "" if calibration is None else calibration.path),
-            *self._instruments(),
-            *((name.capitalize(), value) for name, value in notes.items()),
-            ("Written", _now()),
+        steps = [
+            DayStep(
+                title=step.title,
+                name=step.name,
+                when=found["at"],
+                said=found["said"],
+                printed=found.get("printed", ""),
+                changes=found.get("changes", ()),
+                run=found.get("run", ""),
+            )
+            for step in STEPS
+            for found in (self.done[step.name],)
         ]
-        parts = ["<h1>Day one</h1>", facts("The bench", head)]
-        for number, step in enumerate(STEPS, 1):
-            found = self.done[step.name]
-            parts.append(f"<h2>{number}. {escape(step.title)}</h2>")
-            run = found.get("run", "")
-            where = [("When", found["at"]), ("Step", step.name), ("Run", run)]
-            parts.append(facts("", where))
-            if printed := found.get("printed"):
-                parts.append(f"<pre>{escape(printed)}</pre>")
-            parts += [f"<p>{escape(line)}</p>" for line in found["said"]]
-            folder = quote(Path(run).as_posix())
-            if run and (self.out / run / FIGURE).exists():
-                parts.append(f'<p><img alt="{step.name}" src="{folder}/{FIGURE}"></p>')
-            if run and (self.out / run / REPORT).exists():
-                parts.append(f'<p><a href="{folder}/{REPORT}">report</a></p>')
-        look = (
-            "body{font-family:sans-serif;max-width:50em;margin:2em auto;padding:0 1em}"
-            "th{vertical-align:top;padding-right:1em}img{max-width:100%}"
-            "pre{overflow-x:auto;font-size:85%}"
-        )
         page = self.out / PAGE
         try:
-            with replacing(page) as new:
-                new.write_text(
-                    "<!doctype html><html><head><meta charset='utf-8'><title>Day one"
-                    f"</title><style>{look}</style></head><body>{''.join(parts)}</body></html>\n",
-                    encoding="utf-8",
-                )
+            write_day(page, load_bench(self.bench), self.bench, steps, notes)
         except OSError as reason:
             raise SceneError(f"{page} cannot be written: {reason}.") from reason
         return page
-
-    def _instruments(self) -> list[tuple[str, str]]:
-        """What answered in any of the runs, by its role."""
-        from tactile_lab.errors import RunFolderError
-        from tactile_lab.store.folder import read_info
-
-        found: dict[str, str] = {}
-        for run in (
-            self.out / one["run"] for one in self.done.values() if "run" in one
-        ):
-            with suppress(RunFolderError):
-                for role, told in read_info(run).get("instruments", {}).items():
-                    found[role.replace("_", " ").capitalize()] = told["identity"]
-        return list(found.items())
 
     def _calibrate(self, run: Path) -> None:
         """From now on the force rests on the calibration that `run` measured."""
@@ -418,20 +269,6 @@ def _verb(words: list[str]) -> tuple[str, str]:
         except click.ClickException as refused:
             return printed.getvalue(), refused.format_message()
     return printed.getvalue(), f"it ended with {code}" if code else ""
-
-
-def _levels(results: Results) -> list[str]:
-    """What each trial gave, of a run that says no more of it."""
-    from tactile_lab.quantity import show
-
-    told = []
-    for trial in results["trials"]:
-        text = f"{trial['label']}: {trial['spikes']} spikes"
-        peak, final = trial["peak_rate_Hz"], trial["final_rate_Hz"]
-        if peak is not None and final is not None:
-            text += f", from {show(peak, 'Hz', 3)} down to {show(final, 'Hz', 3)}"
-        told.append(f"{text} in the hold." if trial["spikes"] else f"{text}.")
-    return told
 
 
 def _absolute(bench: str) -> str:

@@ -42,11 +42,16 @@ def rendered(template: str, **names: Any) -> str:
 
 
 def picture(title: str, plot: Plot, svg: str) -> Picture:
+    """The figure of a plot on a page of that title; see `inlined`."""
+    return inlined(f"{title}: {plot.caption}", plot.caption, svg)
+
+
+def inlined(described: str, caption: str, svg: str) -> Picture:
     """The figure with the page's colours, without the heading the page has itself.
 
     Args:
-        title: of the page.
-        plot: what is drawn.
+        described: for who cannot see it.
+        caption: below it.
         svg: as matplotlib wrote it in the light palette.
     """
     names = {colour.light: colour.name for colour in palette.ALL}
@@ -62,9 +67,9 @@ def picture(title: str, plot: Plot, svg: str) -> Picture:
         inline,
         count=1,
     )
-    described = escape(f"{title}: {plot.caption}")
-    inline = inline.replace("<svg", f'<svg role="img" aria-label="{described}"', 1)
-    return Picture(Markup(inline), plot.caption)
+    label = escape(described)
+    inline = inline.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+    return Picture(Markup(inline), caption)
 
 
 def write_page_of_runs(

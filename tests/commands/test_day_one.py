@@ -83,8 +83,11 @@ def test_the_first_day_ends_with_bench_calibration_and_page(first_day, tmp_path)
     assert "asked devices" in page
     assert "KEPCO" in page
     assert "150 mN: " in page  # what the demo gave
+    assert "protocol.hold=0.5 s" in page  # what was changed
+    assert page.count("<figure>") == 5, "each run's figure is in the page"
     assert "file://" not in page
-    for link in re.findall(r'(?:href|src)="([^"]*)"', page):
+    assert " src=" not in page
+    for link in re.findall(r' href="([^#"]*)"', page):
         assert (tmp_path / "day" / link).exists(), link
 
     runs = sorted((tmp_path / "day" / "runs").iterdir())
