@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,9 @@ from tactile_lab.voltage_source import VoltageLimits
 NO_USB = "usb"
 """Address that stands for all of USB where it cannot be looked at."""
 
+BY_ID = Path("/dev/serial/by-id")
+"""Where Linux names serial ports by their adapters."""
+
 DIALOUT = (
     "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
 )
@@ -51,6 +54,8 @@ class Found:
             or did not answer.
         fits: driver and rows that fit; empty if none is known.
         problem: what stands in its way, with the remedy, or None.
+        stays: another name of the port, which stays when cables are pulled; None where
+            the system gives none.
     """
 
     address: str
@@ -59,6 +64,7 @@ class Found:
     identity: str | None = None
     fits: tuple[str, ...] = ()
     problem: str | None = None
+    stays: str | None = None
 
 
 def attached(*, ask: bool = True, ports: Iterable[str] = ()) -> list[dict[str, Any]]:
@@ -74,7 +80,10 @@ def attached(*, ask: bool = True, ports: Iterable[str] = ()) -> list[dict[str, A
         found = [_serial(address, "named by you", ask=True) for address in chosen]
     else:
         found = [
-            _serial(one.device, _title(one), ask=ask and one.vid is not None)
+            replace(
+                _serial(one.device, _title(one), ask=ask and one.vid is not None),
+                stays=lasting_name(one.device),
+            )
             for one in sorted(list_ports.comports())
         ]
         found += _usb()
@@ -119,6 +128,15 @@ def try_out(
         return device.settings()
     finally:
         device.close()
+
+
+def lasting_name(port: str, folder: Path = BY_ID) -> str | None:
+    """Name of a port by the serial number of its adapter, where the system has one."""
+    if not folder.is_dir():
+        return None
+    real = os.path.realpath(port)
+    names = (one for one in sorted(folder.iterdir()) if os.path.realpath(one) == real)
+    return next(map(str, names), None)
 
 
 def ask_name(address: str) -> tuple[str | None, str | None]:

@@ -6,7 +6,7 @@ library before an instrument is made, so a plan can ask what an instrument can.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from tactile_lab.bench import CoilCapability, ScopeCapability
 from tactile_lab.errors import SceneError
@@ -36,24 +36,32 @@ if TYPE_CHECKING:
     from tactile_lab.clock import Clock
     from tactile_lab.instruments.meter_dialect import ThermometerDialect
     from tactile_lab.instruments.scope_dialect import ScopeDialect
-    from tactile_lab.instruments.serial_dialect import CoilDialect
+    from tactile_lab.instruments.serial_dialect import CoilDialect, SerialDialect
     from tactile_lab.scene.bench_file import (
         CoilSpec,
         FieldMeterSpec,
+        PortSpec,
         ScopeSpec,
         ThermometerSpec,
         VoltageSourceSpec,
     )
     from tactile_lab.voltage_source import VoltageSourceCapability
 
+S = TypeVar("S", bound="SerialDialect")
+
 DEFAULT_SCOPE = "rigol-ds1000z"
 """Dialect of a USBTMC scope where the bench file names none."""
+
+
+def as_wired(row: S, table: PortSpec) -> S:
+    """A row with what a bench file knows better of this one instrument and its link."""
+    return row.of_one(serial=table.serial, timeout=table.timeout)
 
 
 def _source(table: CoilSpec, clock: Clock) -> CoilSource:
     from drivers.coil.source import CoilSource
 
-    row = coil_dialect(table.dialect)
+    row = as_wired(coil_dialect(table.dialect), table)
     return CoilSource(
         row,
         table.port,
@@ -145,9 +153,8 @@ def usbtmc_dialect(table: ScopeSpec) -> ScopeDialect:
 def _teslameter(table: FieldMeterSpec, clock: Clock) -> Teslameter:
     from drivers.teslameter import Teslameter
 
-    return Teslameter(
-        teslameter_dialect(table.dialect), table.port, clock, baud=table.baud
-    )
+    row = as_wired(teslameter_dialect(table.dialect), table)
+    return Teslameter(row, table.port, clock, baud=table.baud)
 
 
 def _thermometer(table: ThermometerSpec, clock: Clock) -> Thermometer:
@@ -158,13 +165,13 @@ def _thermometer(table: ThermometerSpec, clock: Clock) -> Thermometer:
 
 def thermometer_row(table: ThermometerSpec) -> ThermometerDialect:
     """How the thermometer of a bench file speaks of the input that it names."""
-    return thermometer_dialect(table.dialect).at(table.input)
+    return as_wired(thermometer_dialect(table.dialect).at(table.input), table)
 
 
 def _source_meter(table: VoltageSourceSpec, clock: Clock) -> SourceMeter:
     from drivers.voltage_source import SourceMeter
 
-    row = voltage_dialect(table.dialect)
+    row = as_wired(voltage_dialect(table.dialect), table)
     return SourceMeter(
         table.name, row, table.port, table.limits, clock, baud=table.baud
     )

@@ -77,18 +77,24 @@ def fields_of(kind: Any) -> dict[str, FieldInfo]:
 def described(kind: Any) -> dict[str, str]:
     """What the keys of a table are, by key, as its docstring's `Attributes` tells."""
     found: dict[str, str] = {}
-    lines = (inspect.getdoc(kind) or "").partition("Attributes:\n")[2].split("\n")
+    for one in reversed(inspect.getmro(kind)):
+        found |= _attributes(inspect.cleandoc(vars(one).get("__doc__") or ""))
+    return found
+
+
+def _attributes(text: str) -> dict[str, str]:
+    found: dict[str, str] = {}
     names: list[str] = []
-    for line in lines:
+    for line in text.partition("Attributes:\n")[2].split("\n"):
         if line and not line.startswith(" " * 4):
             break  # another part of the docstring
         if line.startswith(" " * 8):
             for name in names:
                 found[name] += f" {line.strip()}"
         elif line.strip():
-            keys, _, text = line.strip().partition(": ")
+            keys, _, words = line.strip().partition(": ")
             names = keys.split(", ")
-            found |= dict.fromkeys(names, text)
+            found |= dict.fromkeys(names, words)
     return found
 
 

@@ -63,6 +63,8 @@ class Guard:
     def lost(self) -> str | None:
         """Why the guard no longer guards, or None."""
         if self._lost is None and self._process is not None:
+            if _is_stopped(self._process.pid):
+                self._lost = "it was stopped by a signal"
             code = self._process.poll()
             if code is not None:
                 self._lost = f"it ended with code {code}; see {self._log}"
@@ -74,8 +76,10 @@ class Guard:
         Raises:
             InstrumentError: it does not start.
         """
-        if self._process is not None and self.lost is None:
-            return
+        if self._process is not None:
+            if self.lost is None:
+                return
+            self._process.kill()  # a stopped one would act on its own once it goes on
         self._lost = None
         flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
         self._process = subprocess.Popen(
@@ -149,6 +153,17 @@ class Guard:
                 self._lost = "it no longer listens"
         except OSError as reason:
             self._lost = str(reason)
+
+
+def _is_stopped(pid: int) -> bool:
+    """Whether a child of this process was stopped and would not act; POSIX only."""
+    if not hasattr(os, "waitid"):
+        return False
+    try:
+        how = os.WSTOPPED | os.WNOHANG | os.WNOWAIT
+        return os.waitid(os.P_PID, pid, how) is not None
+    except ChildProcessError:
+        return False
 
 
 def guard_settings(

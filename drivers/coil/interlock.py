@@ -157,9 +157,7 @@ class Interlock:
 
     def before_setting(self, time: float) -> str | None:
         """Why the current must stop at `time` s, or None."""
-        if self._guard is not None and self._guard.lost is not None:
-            return f"The guard process is gone ({self._guard.lost})."
-        return self.heat.complaint(time)
+        return self._unguarded() or self.heat.complaint(time)
 
     def after_reading(
         self, asked: float, time: float, measured: float, voltage: Callable[[], float]
@@ -169,6 +167,8 @@ class Interlock:
         It was measured between `asked` and `time` s. `voltage` is asked, in V, when the
         resistance is due to be looked at.
         """
+        if (unguarded := self._unguarded()) is not None:
+            return unguarded
         if self._list is not None:
             points, earliest, latest = self._list
             within = points.between(asked - latest - LAG, time - earliest)
@@ -186,6 +186,11 @@ class Interlock:
         if self.thermometer.warning is not None:
             self._warn(self.thermometer.warning)
         return why
+
+    def _unguarded(self) -> str | None:
+        if self._guard is None or self._guard.lost is None:
+            return None
+        return f"The guard process is gone ({self._guard.lost})."
 
 
 class HeatBudget:

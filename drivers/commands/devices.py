@@ -70,6 +70,8 @@ def command(
 
 def _print(one: dict[str, Any]) -> None:
     say(f"{one['address']}  {one['title']}")
+    if one["stays"]:
+        say(f"    stays     {one['stays']}")
     if one["identity"]:
         say(f"    answers   {one['identity']}")
     if one["fits"]:

@@ -109,6 +109,13 @@ class Conversation(Generic[D]):
                 f'"{self.dialect.id}" is for {self.dialect.title}. Name the right row '
                 "or port in the bench file."
             )
+        if (wanted := self.dialect.serial_number) not in name:
+            raise BadReplyError(
+                f"At {self.link.port} {name!r} answers, not the {self.dialect.role} "
+                f'with serial = "{wanted}" of the bench file: another of its kind. '
+                "Ports change their names when cables are pulled; correct port or "
+                "serial (`tactile-lab devices` says who is where)."
+            )
 
     def query(self, line: str, *, blank: bool = False) -> str:
         """The answer to `line`, asked again once if it was lost or garbled.
@@ -203,11 +210,10 @@ class Conversation(Generic[D]):
         """
         before = len(trouble)
         for line in lines:
-            try:
-                self.command(line)
-            except InstrumentError as reason:
-                trouble.append(f"{line}: {reason}")
-                self._blindly(line, trouble)
+            if self._is_lost_by(line, trouble):
+                self.link.close()
+                if self.reconnected(trouble):
+                    self._is_lost_by(line, trouble)
         return len(trouble) == before
 
     def _send_settings(self) -> None:
@@ -264,16 +270,22 @@ class Conversation(Generic[D]):
                 "Connect the same instrument again."
             )
 
-    def _blindly(self, line: str, trouble: list[str]) -> None:
-        """Send without waiting for anything; reopen a lost port once."""
+    def _is_lost_by(self, line: str, trouble: list[str]) -> bool:
+        """Send a line, blindly where it is not confirmed; whether the link is lost."""
+        lost = False
         try:
+            self.command(line)
+            return False
+        except InstrumentError as reason:
+            trouble.append(f"{line}: {reason}")
+            lost = isinstance(reason, LinkLostError)
+        try:  # a half-closed socket still takes lines, though it answers none
             self.link.send_blindly(line)
         except LinkLostError:
-            self.link.close()
-            if self.reconnected(trouble):
-                self.insist((line,), trouble)
+            return True
         except InstrumentError as reason:
             trouble.append(f"{line}, sent blindly: {reason}")
+        return lost
 
     def parsed(self, answer: str, pattern: str | None = None) -> float | None:
         """The number in `answer`, or None."""

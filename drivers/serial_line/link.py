@@ -313,8 +313,12 @@ class SerialLink:
                 got = f"only {line!r}" if line else "nothing"
                 raise NoReplyError(
                     f"The {self._what} at {self.port} answered {got} to {asked!r} "
-                    f"within {self.wire.timeout:g} s. Check power, cable, baud rate "
-                    "and terminator."
+                    f"within {self.wire.timeout:g} s. Check power, cable, "
+                    + (
+                        "terminator, and that no other program is connected there."
+                        if self.port.startswith("socket:")
+                        else "baud rate and terminator."
+                    )
                 )
             text = line.translate(None, self.wire.strip.encode("ascii")).rstrip(b"\r\n")
             if not text and not blank:
@@ -347,8 +351,7 @@ class SerialLink:
             self._doubtful = True
             raise LinkLostError(
                 f"The link to the {self._what} at {self.port} was lost ({reason}). "
-                "Check cable and power; the state of its output is unknown until it "
-                "answers again."
+                "Check cable and power."
             ) from reason
 
     def _tell(self, direction: str, data: bytes) -> None:

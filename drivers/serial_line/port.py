@@ -114,5 +114,15 @@ def _told(port: str, what: str, reason: Exception) -> InstrumentError:
         )
     return NotFoundError(
         f"{start} Check that it is plugged in and that the bench file names its "
-        "port; `tactile-lab devices` lists what is there."
+        f"port{_there(port)}; `tactile-lab devices` lists what is there."
     )
+
+
+def _there(port: str) -> str:
+    """USB serial ports there are, for a message: a name changes when cables are."""
+    if "://" in port:
+        return ""
+    from serial.tools import list_ports
+
+    names = [one.device for one in list_ports.comports() if one.vid is not None]
+    return f" (there now: {', '.join(sorted(names))})" if names else ""

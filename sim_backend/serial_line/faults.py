@@ -33,7 +33,7 @@ Kind = Literal[
     "unplug",
 ]
 
-Form = Literal["usb", "windows", "closed", "reset"]
+Form = Literal["usb", "windows", "closed", "reset", "half"]
 
 Call = Literal["write", "read", "waiting", "reset"]
 
@@ -57,7 +57,7 @@ class SerialFault:
         amount: see `kind`; for `unplug`, s after which the port may be opened again
             (0: never).
         form: of an unplug: `usb` adapter gone, the same on `windows`, socket `closed`
-            or `reset`.
+            or `reset`, or closed by `half`: it takes lines and answers none.
         call: of pyserial's, at which an unplug strikes; `line` is the last one sent.
     """
 

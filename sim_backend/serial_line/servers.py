@@ -177,6 +177,7 @@ class TcpServer(SerialServer):
         super().__init__(far_end, paced=paced)
         self._listener = socket.create_server(("127.0.0.1", port))
         self._client: socket.socket | None = None
+        self._half_closed = False
 
     @property
     def url(self) -> str:
@@ -201,7 +202,7 @@ class TcpServer(SerialServer):
         return data
 
     def _send(self, data: bytes) -> None:
-        if self._client is not None:
+        if self._client is not None and not self._half_closed:
             try:
                 self._client.sendall(data)
             except ConnectionError:
@@ -211,12 +212,17 @@ class TcpServer(SerialServer):
         if fault.kind == "stuck":
             self._ending.wait(fault.amount or 5.0)
             return
+        if self._client is not None and fault.form == "half":
+            self._client.shutdown(socket.SHUT_WR)
+            self._half_closed = True
+            return
         if self._client is not None and fault.form == "reset":
             linger = struct.pack("ii", 1, 0)
             self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
         self._hang_up()
 
     def _hang_up(self) -> None:
+        self._half_closed = False
         if self._client is not None:
             self._client.close()
             self._client = None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -179,6 +179,7 @@ class SerialDialect(Dialect):
         error: query of the error queue; None where there is none.
         error_ok: pattern of its answer when there is no error.
         number: pattern whose group 1 is a numeric answer.
+        serial_number: what its name must hold besides, where several are alike.
     """
 
     serial: SerialSettings = SerialSettings()
@@ -189,11 +190,19 @@ class SerialDialect(Dialect):
     release: Lines = ()
     error: str | None = None
     error_ok: Pattern = r"^[+-]?0\b"
+    serial_number: str = ""
     number: Pattern = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[A-Za-z]*$"
 
     def verified(self, line: str) -> tuple[str, ...]:
         """`line` with the error query behind it."""
         return (line,) if self.error is None else (line, self.error)
+
+    def of_one(self, *, serial: str | None, timeout: float | None) -> Self:
+        """The same for one instrument: its serial number, its link's timeout, s."""
+        known: dict[str, object] = {} if serial is None else {"serial_number": serial}
+        if timeout is not None:
+            known["serial"] = self.serial.model_copy(update={"timeout": timeout})
+        return self.model_copy(update=known)
 
 
 class SourceDialect(SerialDialect):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 
 from tactile_lab.analysis.noise import MAINS
+from tactile_lab.instruments.dialects import load_dialect
 from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.computing import Computing
@@ -26,6 +28,9 @@ SLOW = frozenset({"V_C1", "I_DS", "coil_current", "field"})
 SAMPLES_PER_NODE_A = 50
 """Samples per time constant of node A from which V_C1 is seen whole."""
 
+LOOSE = r"(?i)/dev/(tty(USB|ACM)|cu\.usb)|COM\d"
+"""Ports whose names are given in the order of plugging in."""
+
 FINE = 0.01
 """Largest part of the expected field that one code of its channel should be."""
 
@@ -40,6 +45,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *_scope(scene, needed),
         *_field(scene, needed, drive),
         *_magnet(scene),
+        *_exchanged(scene, needed),
     )
 
 
@@ -51,6 +57,37 @@ def _ways(scene: Scene, drive: Timeline) -> Iterator[str]:
                 f"{100 * used.part:.2g} % of its range, {show(used.error, 'N', 2)}; "
                 f"{100 * scene.force_accuracy:.2g} % are wanted. Ask for a slower "
                 "force, or allow more by [coil] accuracy."
+            )
+
+
+def _exchanged(scene: Scene, needed: Needs) -> Iterator[str]:
+    """Instruments that would take each other's place if their ports' names changed."""
+    bench = scene.bench
+    if bench.simulated:
+        return
+    opened = {
+        "coil": needed.coil,
+        "field_meter": needed.field_meter,
+        "thermometer": needed.thermometer,
+        **dict.fromkeys((f"voltage_source.{name}" for name in needed.voltages), True),
+    }
+    alike: dict[str, list[str]] = {}
+    for name, spec in bench.wired_by_port.items():
+        if spec.driver == "serial":
+            alike.setdefault(load_dialect(spec.dialect).match, []).append(name)
+    for names in alike.values():
+        found = [(name, bench.wired_by_port[name]) for name in names]
+        bare = any(
+            opened.get(name) and not spec.serial and re.match(LOOSE, spec.port)
+            for name, spec in found
+        )
+        if len(names) > 1 and bare:
+            tables = " and ".join(f"[{name}]" for name in names)
+            yield (
+                f"{tables} are instruments of one kind, at ports whose names change "
+                "when cables are pulled: exchanged, nothing would tell them apart. "
+                'Write serial = "..." into each, as `tactile-lab devices` shows it, or '
+                "name them by /dev/serial/by-id."
             )
 
 

@@ -48,6 +48,32 @@ Located = AfterValidator(_located)
 
 Port = Annotated[str, Field(min_length=1)]
 Baud = Annotated[int, Field(ge=50, le=4_000_000)]
+Timeout = Annotated[float, Unit("s", above=0.0, most=0.8)]
+"""The guard kills a program that is silent for 1 s: no answer is waited for so long."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PortSpec(SceneTable):
+    """What the tables of all instruments behind a serial port have.
+
+    Attributes:
+        driver: "serial", or path of a Python file with one.
+        dialect: id of one that ships, or path of a TOML file with one.
+        port: serial port or pyserial URL.
+        serial: serial number, where instruments are alike: its answer to *IDN? must
+            hold it.
+        baud: symbols a second; the row's own unless given.
+        timeout: longest wait for an answer, s, where the link is slow; the same.
+        options: keys of the driver's own.
+    """
+
+    driver: str = "serial"
+    dialect: Annotated[str, Located]
+    port: Port
+    serial: Annotated[str, Field(min_length=1)] | None = None
+    baud: Baud | None = None
+    timeout: Timeout | None = None
+    options: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,15 +91,11 @@ class GeneratorWiring(SceneTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoilSpec(SceneTable):
+class CoilSpec(PortSpec):
     """``[coil]`` of a bench: the current source.
 
     Attributes:
         driver: "serial", or path of a Python file with a `CoilDriver`.
-        dialect: id of one that ships, or path of a TOML file with one.
-        port: serial port or pyserial URL.
-        baud: symbols a second; the row's own unless given.
-        options: keys of the driver's own.
         limits: each narrows what model and coil allow.
         generator: how the scope's generator is wired to it; None: it is not.
     """
@@ -81,8 +103,6 @@ class CoilSpec(SceneTable):
     driver: Annotated[CoilDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "kepco-bop"
     port: Port = "sim://coil"
-    baud: Baud | None = None
-    options: dict[str, Any] = field(default_factory=dict)
     limits: CoilLimits = field(default_factory=CoilLimits)
     generator: GeneratorWiring | None = None
 
@@ -150,57 +170,43 @@ class ScopeSpec(SceneTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FieldMeterSpec(SceneTable):
+class FieldMeterSpec(PortSpec):
     """``[field_meter]``: the teslameter.
 
     Attributes:
         driver: "serial"; "manual": a person is asked what it shows; or path of a
             Python file with a `FieldMeterDriver`.
-        dialect: id of one that ships, or path of a TOML file with one.
-        port: serial port or pyserial URL.
-        baud: symbols a second; the row's own unless given.
-        options: keys of the driver's own.
     """
 
     driver: Annotated[MeterDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "lakeshore-425"
     port: Port = "sim://field_meter"
-    baud: Baud | None = None
     options: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThermometerSpec(SceneTable):
+class ThermometerSpec(PortSpec):
     """``[thermometer]``: the thermometer at the sensor.
 
     Attributes:
         driver: "serial", or path of a Python file with a `ThermometerDriver`.
-        dialect: id of one that ships, or path of a TOML file with one.
-        port: serial port or pyserial URL.
         input: of the thermometer, where the sensor's is; the row's first unless given.
-        baud: symbols a second; the row's own unless given.
-        options: keys of the driver's own.
     """
 
     driver: Annotated[ThermometerDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "lakeshore-218"
     port: Port = "sim://thermometer"
     input: str | None = None
-    baud: Baud | None = None
     options: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
-class VoltageSourceSpec(SceneTable):
+class VoltageSourceSpec(PortSpec):
     """``[voltage_source.V_GS]``: a source meter that holds that voltage.
 
     Attributes:
         name: of the voltage.
         driver: "serial", or path of a Python file with a `VoltageSourceDriver`.
-        dialect: id of one that ships, or path of a TOML file with one.
-        port: serial port or pyserial URL.
-        baud: symbols a second; the row's own unless given.
-        options: keys of the driver's own.
         limits: what may be asked of it.
     """
 
@@ -208,8 +214,6 @@ class VoltageSourceSpec(SceneTable):
     driver: Annotated[VoltageDriverName, Located] = "serial"
     dialect: Annotated[str, Located] = "keithley-2400-voltage"
     port: Port = "sim://voltage_source"
-    baud: Baud | None = None
-    options: dict[str, Any] = field(default_factory=dict)
     limits: VoltageLimits
 
 
@@ -264,7 +268,7 @@ class BenchSpec(SceneTable):
 
     def __post_init__(self) -> None:
         ports: dict[tuple[str, str], str] = {}
-        for name, spec in self._wired_by_port.items():
+        for name, spec in self.wired_by_port.items():
             inside = spec.port.startswith("sim:")
             if spec.driver == "serial" and inside and not self.simulated:
                 raise ValueError(
@@ -291,9 +295,7 @@ class BenchSpec(SceneTable):
         return {n: replace(given[n], name=n) for n in SOURCED if n in given}
 
     @property
-    def _wired_by_port(
-        self,
-    ) -> dict[str, CoilSpec | FieldMeterSpec | ThermometerSpec | VoltageSourceSpec]:
+    def wired_by_port(self) -> dict[str, PortSpec]:
         """Instruments that may stand behind a serial port, by their tables' names."""
         every = {
             "coil": self.coil,

@@ -4,8 +4,10 @@ import math
 import pytest
 
 from drivers.coil.source import CoilSource
+from drivers.registered import SERIAL_SOURCE
 from drivers.teslameter import Teslameter
 from sim_backend.coil.source import SimCoilSource
+from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import plug_in, unplug
 from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
@@ -15,8 +17,11 @@ from tactile_lab.errors import (
     InterlockError,
     LimitError,
     NoReplyError,
+    SceneError,
 )
 from tactile_lab.instruments.dialects import coil_dialect, teslameter_dialect
+from tactile_lab.scene.bench_file import CoilSpec
+from tactile_lab.scene.load import load
 
 KEPCO = coil_dialect("kepco-bop")
 
@@ -282,3 +287,24 @@ def test_a_look_tells_what_a_person_did_and_touches_nothing(serial_bench, on):
     coil.close()
     assert source.changes == before and not source.remote
     assert source.output_on is on
+
+
+@pytest.mark.parametrize(("timeout", "opens"), [(None, False), (0.5, True)])
+def test_a_slow_link_is_waited_for_as_the_bench_file_says(resistor, timeout, opens):
+    clock = SimulatedClock()
+    row = coil_dialect("kepco-bop")
+    source = SimCoilSource(resistor, row.id, clock)
+    end = plug_in(source, row.serial, clock, "coil")
+    end.faults.add(SerialFault(kind="late", amount=0.3, times=None))
+    coil = SERIAL_SOURCE.make(CoilSpec(port=end.url, timeout=timeout), clock)
+    with clock.taking_part("test"):
+        if opens:
+            coil.open()
+            assert coil.safe_off().verified
+        else:
+            with pytest.raises(InstrumentError):
+                coil.open()
+        coil.close()
+    unplug(end)
+    with pytest.raises(SceneError, match="at most"):
+        load("demo", {"bench.coil.timeout": "1 s"})

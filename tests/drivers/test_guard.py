@@ -288,6 +288,19 @@ def test_a_dead_guard_stops_the_current(served, guarded):
     assert not source.output_on
 
 
+def test_a_stopped_guard_stops_a_current_that_only_stands(served, guarded):
+    source, _ = served
+    coil, guard = guarded
+    coil.set_current(0.01)
+    os.kill(guard.pid, signal.SIGSTOP)
+    until = time.monotonic() + PATIENCE
+    with pytest.raises(InterlockError, match="was stopped by a signal"):
+        while time.monotonic() < until:
+            coil.read_current()
+            time.sleep(0.01)
+    assert not source.output_on
+
+
 def test_a_port_that_cannot_be_made_safe_is_handed_over(served, guarded, tmp_path):
     source, server = served
     coil, _ = guarded
