@@ -19,6 +19,7 @@ from tactile_lab.commands.terminal import (
 from tactile_lab.neuro.formats import SPIKES
 
 if TYPE_CHECKING:
+    from tactile_lab.skin.adaptation import SkinAdaptation
     from tactile_lab.skin.press import Pressed
     from tactile_lab.skin.skin import Skin
 
@@ -100,6 +101,7 @@ def command(
         return
     with refusing():
         from tactile_lab.neuro.formats import format_of, write
+        from tactile_lab.skin.adaptation import adaptation_of
         from tactile_lab.skin.events import Events
         from tactile_lab.skin.page import write_page
         from tactile_lab.skin.press import highest, press
@@ -119,7 +121,8 @@ def command(
             done = press(asked, folder, cores=cores, tell=line.update)
         events = Events.read(folder)
         with working("writing the report"):
-            page = write_page(asked, events, done, folder)
+            adaptation = adaptation_of(asked, events)
+            page = write_page(asked, events, done, adaptation, folder)
         for file in exports:
             with working(f"writing {file}"):
                 write(events, file)
@@ -131,12 +134,13 @@ def command(
                 "events": done.events,
                 "taxels": done.taxels,
                 "error_s": done.error,
+                "adaptation": None if adaptation is None else adaptation.to_dict(),
                 "run_time_s": done.seconds,
                 "warnings": list(done.warnings),
             }
         )
         return
-    _print(asked, done, page)
+    _print(asked, done, adaptation, page)
 
 
 def _show(skin: Path, out: Path, *others: object) -> None:
@@ -209,7 +213,9 @@ def _print_plan(skin: Skin, force: float) -> None:
     say("Taxels whose force cannot bring them to threshold are left out as it runs.")
 
 
-def _print(skin: Skin, done: Pressed, page: Path) -> None:
+def _print(
+    skin: Skin, done: Pressed, adaptation: SkinAdaptation | None, page: Path
+) -> None:
     from tactile_lab.quantity import show
 
     say(f"{skin.title}: {skin.array.size:,} taxels, {show(skin.duration, 's')}")
@@ -217,5 +223,7 @@ def _print(skin: Skin, done: Pressed, page: Path) -> None:
     told = ", ".join(f"{n:,} {what}" for what, n in done.taxels.items() if n)
     say(f"taxels      {told}")
     say(f"error       at most about {show(done.error, 's', 2)} in spike times")
+    fall = "the load never rests" if adaptation is None else adaptation.told
+    say(f"adaptation  {fall}")
     say(f"run time    {show(done.seconds, 's', 3)}")
     say(f"report      {page}")

@@ -103,7 +103,7 @@ def draw(
             else:
                 axes.tick_params(axis="x", labelbottom=False, length=0)
                 axes.spines["bottom"].set_visible(False)
-        _heading(figure, title, subtitle, simulated)
+        heading(figure, title, subtitle, simulated)
         for axes in drawn:
             _stagger(
                 [
@@ -339,7 +339,7 @@ def _math(text: str) -> str:
     return re.sub(r"\b([A-Z])_([A-Z0-9]+)\b", r"$\1_{\2}$", text)
 
 
-def _heading(figure: Figure, title: str, subtitle: str, simulated: bool | None) -> None:
+def heading(figure: Figure, title: str, subtitle: str, simulated: bool | None) -> None:
     """Title, a quiet second line, and the mark that tells simulated from measured."""
     width, height = figure.get_size_inches()
     left, top = 0.12 / width, 1 - 0.12 / height

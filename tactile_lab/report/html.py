@@ -16,6 +16,7 @@ from tactile_lab.conclusion import Table
 from tactile_lab.plot import Plot
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT
+from tactile_lab.report.taxel_map import TaxelMaps
 from tactile_lab.store.folder import replacing
 
 
@@ -41,7 +42,7 @@ def rendered(template: str, **names: Any) -> str:
     return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
 
 
-def picture(title: str, plot: Plot, svg: str) -> Picture:
+def picture(title: str, plot: Plot | TaxelMaps, svg: str) -> Picture:
     """The figure of a plot on a page of that title; see `inlined`."""
     return inlined(f"{title}: {plot.caption}", plot.caption, svg)
 

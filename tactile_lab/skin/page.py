@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import show
 from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.html import picture, rendered
+from tactile_lab.report.taxel_map import TaxelMap, TaxelMaps, draw_maps
+from tactile_lab.skin.adaptation import SkinAdaptation
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.press import Pressed
 from tactile_lab.skin.receptive import receptive_plot
@@ -35,18 +38,27 @@ BINS = 200
 """Of the rate of all taxels."""
 
 
-def write_page(skin: Skin, events: Events, done: Pressed, folder: Path) -> Path:
-    """Write `report.html` and its figure beside the events.
+def write_page(
+    skin: Skin,
+    events: Events,
+    done: Pressed,
+    adaptation: SkinAdaptation | None,
+    folder: Path,
+) -> Path:
+    """Write `report.html` and its figures beside the events.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    plots = [raster(events)]
-    if skin.stimuli and events.time.shape[0]:
-        plots.append(receptive_plot(skin, events))
     size = skin.array.size
     subtitle = f"{size:,} taxels · {show(skin.duration, 's')}"
-    film = _film(skin, events)
+    shown = maps(skin, events, adaptation)
+    drawn: list[tuple[Plot | TaxelMaps, Figure]] = [
+        (shown, draw_maps(shown, skin.title, subtitle))
+    ]
+    for plot in (raster(events), receptive_plot(skin, events)):
+        if plot is not None:
+            drawn.append((plot, draw(plot, skin.title, subtitle, simulated=True)))
     text = rendered(
         "skin.html",
         title=skin.title,
@@ -59,17 +71,10 @@ def write_page(skin: Skin, events: Events, done: Pressed, folder: Path) -> Path:
             "Computed in": show(done.seconds, "s", 2),
         },
         warnings=done.warnings,
-        film=film,
+        film=film(skin, events),
         pictures=[
-            picture(
-                skin.title,
-                plot,
-                save(
-                    draw(plot, skin.title, subtitle, simulated=True),
-                    folder / plot.name,
-                )[1],
-            )
-            for plot in plots
+            picture(skin.title, plot, save(figure, folder / plot.name)[1])
+            for plot, figure in drawn
         ],
         settings=settings(skin),
         none="none",
@@ -96,6 +101,48 @@ def settings(skin: Skin) -> dict[str, str]:
         "Dead": ", ".join(map(str, array.dead)),
         "Stuck": ", ".join(map(str, array.stuck)),
     }
+
+
+def maps(skin: Skin, events: Events, adaptation: SkinAdaptation | None) -> TaxelMaps:
+    """The mean rate of each taxel, and how far it falls while the load rests."""
+    array = skin.array
+    dead, stuck = array.named(array.dead), array.named(array.stuck)
+    rate = np.where(stuck, np.nan, events.count / events.duration)
+    shown = [TaxelMap(label="Mean rate", unit="Hz", values=rate)]
+    caption = (
+        "Taxels where they lie, seen from above: spikes of each over the whole "
+        f"{show(events.duration, 's')}"
+    )
+    if adaptation is None:
+        caption += ". No map of adaptation: the load never rests."
+    else:
+        shown.append(
+            TaxelMap(
+                label="Fall of the rate",
+                unit="%",
+                values=np.maximum(adaptation.fall, 0.0),
+                most=1.0,
+                grey=("too few spikes", adaptation.rare),
+                dotted=("fell silent", adaptation.silent),
+            )
+        )
+        error = np.nanmax(100 * adaptation.error[adaptation.known], initial=0.0)
+        caption += (
+            f"; and adaptation: {adaptation.told}. The fall is from the highest 1/ISI "
+            "within that time to the last one, as a part of the former; spike times "
+            f"let it err by at most {max(error, 0.01):.1g} points of 100. Two whole "
+            "intervals are needed. Who fell silent, twice the last interval before the "
+            "end, fell further than its last interval says."
+        )
+    return TaxelMaps(
+        name="maps",
+        caption=caption,
+        places=events.places,
+        side=array.side,
+        maps=tuple(shown),
+        crossed=("dead", dead),
+        framed=("stuck", stuck),
+    )
 
 
 def raster(events: Events) -> Plot:
@@ -146,7 +193,8 @@ def raster(events: Events) -> Plot:
     )
 
 
-def _film(skin: Skin, events: Events) -> dict[str, Any]:
+def film(skin: Skin, events: Events) -> dict[str, Any]:
+    """What the page plays: spikes per taxel and frame, for its script."""
     array, size = skin.array, events.places.shape[0]
     frames = max(1, min(FRAMES, CELLS // size))
     counts = np.zeros((frames, size), np.int64)

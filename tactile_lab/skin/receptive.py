@@ -6,7 +6,7 @@ import numpy as np
 
 from tactile_lab.model.batch import records
 from tactile_lab.model.circuit import FloatArray
-from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.plot import Mark, Panel, Plot, Series
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.press import solved
@@ -48,17 +48,22 @@ def receptive_field(
     return moved, count.astype(float), force
 
 
-def receptive_plot(skin: Skin, events: Events) -> Plot:
-    """Of the taxel that fires most of those that are not stuck."""
+def receptive_plot(skin: Skin, events: Events) -> Plot | None:
+    """Of the taxel that fires most of those that are not stuck; None if none fires."""
     counts = np.where(skin.array.named(skin.array.stuck), -1, events.count)
     taxel = int(counts.argmax())
+    if not skin.stimuli or counts[taxel] < 1:
+        return None
     fields = [receptive_field(skin, taxel, axis) for axis in (0, 1)]
-    marks = (("x", "rate"), ("y", "V_C2"))
+    looks: tuple[tuple[str, str, Mark], ...] = (
+        ("along x", "rate", "line"),
+        ("along y", "V_C2", "dashed"),
+    )
 
     def lines(column: int) -> tuple[Series, ...]:
         return tuple(
-            Series(x=field[0], y=field[column], name=f"along {name}", colour=colour)
-            for field, (name, colour) in zip(fields, marks, strict=True)
+            Series(x=field[0], y=field[column], name=name, colour=colour, mark=mark)
+            for field, (name, colour, mark) in zip(fields, looks, strict=True)
         )
 
     return Plot(

@@ -2,13 +2,14 @@
 
 import base64
 import json
-import re
 
 import numpy as np
 import pytest
 
+from tactile_lab.report.taxel_map import GREY, draw_maps
+from tactile_lab.skin.adaptation import adaptation_of
 from tactile_lab.skin.events import Events
-from tactile_lab.skin.page import FADING, write_page
+from tactile_lab.skin.page import FADING, film, maps, write_page
 from tactile_lab.skin.press import press
 from tactile_lab.skin.skin import load_skin
 
@@ -19,40 +20,70 @@ BALL = {
 }
 
 
-def paged(folder, skin):
-    """The page's text, and the events it tells of."""
+def pressed(folder, skin):
+    """The skin, and its events."""
     skin = load_skin(skin)
-    done = press(skin, folder)
-    return write_page(skin, Events.read(folder), done, folder).read_text("utf-8")
+    press(skin, folder)
+    return skin, Events.read(folder)
 
 
-def film_of(page):
+def film_of(skin, events):
     """What the script of a page is given, its counts as an array."""
-    told = re.search(r'id="film">(.*?)</script>', page, re.S)[1]
-    film = json.loads(told)
-    raw = base64.b64decode(film["counts"])
-    kind = {1: np.uint8, 2: "<u2"}[film["bytes"]]
-    return film, np.frombuffer(raw, kind).reshape(film["frames"], -1)
+    told = json.loads(film(skin, events)["data"])
+    raw = base64.b64decode(told["counts"])
+    kind = {1: np.uint8, 2: "<u2"}[told["bytes"]]
+    return told, np.frombuffer(raw, kind).reshape(told["frames"], -1)
 
 
 def test_the_film_counts_every_spike_and_leaves_stuck_taxels_out_of_its_scale(tmp_path):
-    film, counts = film_of(paged(tmp_path, BALL))
-    events = Events.read(tmp_path)
+    skin, events = pressed(tmp_path, BALL)
+    told, counts = film_of(skin, events)
     assert np.array_equal(counts.sum(axis=0), events.count)
-    assert film["dead"] == [2] and film["stuck"] == [7]
+    assert told["dead"] == [2] and told["stuck"] == [7]
     whole = np.arange(12) != 7
-    assert film["most_of_all"] == events.count[whole].max() < events.count[7]
+    assert told["most_of_all"] == events.count[whole].max() < events.count[7]
     faded, most = np.zeros(12), 0.0
     for frame in counts:
         faded = FADING * faded + frame
         most = max(most, faded[whole].max())
-    assert film["most"] == pytest.approx(most)
-    assert counts[:, whole].sum(axis=1).argmax() == film["fullest"]
+    assert told["most"] == pytest.approx(most)
+    assert counts[:, whole].sum(axis=1).argmax() == told["fullest"]
 
 
 def test_more_spikes_in_a_frame_than_a_byte_holds_are_counted(tmp_path):
     stuck = {"grid": [1, 2], "dead": [0], "stuck": [1], "stuck_rate": "10 kHz"}
-    film, counts = film_of(paged(tmp_path, {**BALL, "duration": "6 s", "array": stuck}))
-    assert film["bytes"] == 2
+    skin = {**BALL, "duration": "6 s", "array": stuck}
+    told, counts = film_of(*pressed(tmp_path, skin))
+    assert told["bytes"] == 2
     assert counts.sum() == 60_000 and counts.max() > 255
-    assert film["most"] == film["most_of_all"] == 1
+    assert told["most"] == told["most_of_all"] == 1
+
+
+def test_who_fired_too_rarely_has_no_fall_in_the_map_but_is_marked(tmp_path):
+    array = {"grid": [9, 9], "pitch": "1 mm", "dead": [2], "stuck": [7]}
+    skin, events = pressed(tmp_path, {**BALL, "duration": "0.6 s", "array": array})
+    found = adaptation_of(skin, events)
+    shown = maps(skin, events, found)
+    rate, fall = shown.maps
+    rare = fall.grey[1]
+    assert rare.any() and np.isnan(fall.values[rare]).all()
+    assert (rate.values[rare] > 0).all() and np.isnan(rate.values[7])
+    assert shown.framed[1][7] and shown.crossed[1][2]
+    assert rate.full == np.nanmax(rate.values) and fall.full == 1
+    figure = draw_maps(shown, "A ball", "12 taxels")
+    (squares,) = figure.axes[2].collections
+    assert {tuple(c) for c in squares.get_facecolors()[rare]} == {GREY}
+    assert "No map of adaptation" in maps(skin, events, None).caption
+
+
+def test_a_skin_where_nothing_fires_has_its_page(tmp_path):
+    light = {**BALL["stimulus"][0], "force": "1 mN"}
+    array = {"grid": [1, 3], "dead": [2], "stuck": [0]}
+    skin = load_skin({**BALL, "stimulus": [light], "array": array})
+    done = press(skin, tmp_path)
+    events = Events.read(tmp_path)
+    page = write_page(skin, events, done, adaptation_of(skin, events), tmp_path)
+    text = page.read_text("utf-8")
+    assert "no taxel has two whole intervals" in text
+    assert "Receptive field" not in text
+    assert (tmp_path / "maps.png").stat().st_size > 0
