@@ -129,14 +129,14 @@ def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) ->
     window, run = lab.window, lab.session.run
     source = LiveSource(None, 1.0)
     force = Waveform.through([(0.0, 0.0), (4.0, 0.0)])
-    holds = [Stretch(0, 1, "80 mN"), Stretch(1, 3, "", pause=True), Stretch(3, 4, "b")]
+    holds = [Stretch(k, k + 1, "", pause=k == 1) for k in range(4)]
     expected = replace(
         lab.session.plan.expectation, preview=Preview(force, holds=holds)
     )
     monkeypatch.setattr(run, "source", source)
     monkeypatch.setattr(run, "expectation", expected)
     window.screen_.follow_run(source)
-    assert window.review.results.mark.text() == "preliminary · 0 of 2 steps"
+    assert window.review.results.mark.text() == "preliminary · 0 of 3 steps"
 
 
 def test_the_question_on_closing_tells_what_the_coil_does_now(lab) -> None:
