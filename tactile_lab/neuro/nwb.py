@@ -40,7 +40,9 @@ def write(events: Events, file: Path) -> None:
     session.add_unit_column("taxel", "number of the taxel, from 0")
     session.add_unit_column("x", "place of its centre, m")
     session.add_unit_column("y", "place of its centre, m")
-    session.add_unit_column("largest_force", "on it, N")
+    session.add_unit_column(
+        "largest_force", "on it, N; if left out, what the force stays below"
+    )
     for taxel, times in enumerate(events.trains()):
         x, y = events.places[taxel].tolist()
         session.add_unit(

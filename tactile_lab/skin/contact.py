@@ -87,8 +87,45 @@ def stress(load: FloatArray, strength: float, x: float, y: float, z: float) -> f
         u = dx * load[SHAPE_1] + dy * load[SHAPE_2]
         return strength * under_strip(u - load[SHAPE_3], u - load[SHAPE_4], z)
     if kind == WAVE:
-        k = math.hypot(load[SHAPE_1], load[SHAPE_2])
         wave = math.cos(load[SHAPE_1] * dx + load[SHAPE_2] * dy + load[SHAPE_3])
-        deep = (1.0 + k * z) * math.exp(-k * z)
-        return float(strength * load[SHAPE_4] * deep * wave)
+        return under_wave(load, strength, z) * wave
+    return strength
+
+
+@inner
+def under_wave(load: FloatArray, strength: float, z: float) -> float:
+    """Amplitude of the stress under a wave of pressure, Pa."""
+    k = math.hypot(load[SHAPE_1], load[SHAPE_2])
+    return float(strength * load[SHAPE_4] * (1.0 + k * z) * math.exp(-k * z))
+
+
+@inner
+def most_stress(
+    load: FloatArray, strength: float, x: float, y: float, z: float,
+    way_x: float, way_y: float, length: float,
+) -> float:  # fmt: skip
+    """Pa that `stress` never exceeds while its centre moves by `length`, m.
+
+    Pressure adds up over the contact with a weight that falls with the distance, so
+    that none is worse than all of it at the nearest place; under a ball and under a
+    strip, whose pressure falls outwards, stress itself does.
+    """
+    kind = int(load[KIND])
+    dx, dy = x - load[X], y - load[Y]
+    along = dx * way_x + dy * way_y
+    passed = min(max(along, min(length, 0.0)), max(length, 0.0))
+    dx, dy = dx - passed * way_x, dy - passed * way_y
+    if kind == SPHERE:
+        return under_sphere(strength, load[SHAPE_1], math.hypot(dx, dy), z)
+    if kind == PUNCH:
+        return under_point(strength, max(math.hypot(dx, dy) - load[SHAPE_1], 0.0), z)
+    if kind == STRIP:
+        middle = 0.5 * (load[SHAPE_3] + load[SHAPE_4])
+        half = 0.5 * (load[SHAPE_4] - load[SHAPE_3])
+        off = x * load[SHAPE_1] + y * load[SHAPE_2] - middle
+        most = length * (way_x * load[SHAPE_1] + way_y * load[SHAPE_2])
+        off -= min(max(off, min(most, 0.0)), max(most, 0.0))
+        return strength * under_strip(off + half, off - half, z)
+    if kind == WAVE:
+        return abs(under_wave(load, strength, z))
     return strength

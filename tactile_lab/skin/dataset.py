@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.circuit import FloatArray
+from tactile_lab.skin.bound import spans
 from tactile_lab.skin.events import recording
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.press import solve_block
@@ -223,9 +224,9 @@ def make(
 
 def _spikes(seed: int, task: str, number: int) -> tuple[FloatArray, NDArray[np.int32]]:
     skin = touch(seed, task, number)
-    n = skin.array.size
-    role = np.zeros(n, np.uint8)
-    count, _, _, _, times = solve_block(skin, Loads(skin), slice(0, n), role)
+    n, loads = skin.array.size, Loads(skin)
+    role, (span, _) = np.zeros(n, np.uint8), spans(skin, loads)
+    count, _, _, _, times = solve_block(skin, loads, slice(0, n), role, span)
     taxel = np.repeat(np.arange(n, dtype=np.int32), count)
     order = np.lexsort((taxel, times))
     return times[order], taxel[order]

@@ -131,7 +131,8 @@ class Events:
         places: of the taxels, m, shape (taxels, 2).
         count: spikes of each taxel, shape (taxels,).
         role: what became of each, as `kernel` numbers it, shape (taxels,).
-        largest_force: on each, N, shape (taxels,).
+        largest_force: on each, N, shape (taxels,); of one left out without computing
+            its force, what that stays below.
         about: of the file.
     """
 

@@ -382,10 +382,9 @@ class Loads:
         found[(others > 1) | bool(self.skin.frames)] = -1
         return found
 
-    def framed(self, taxels: slice) -> FloatArray:
+    def framed(self, taxels: NDArray[np.intp]) -> FloatArray:
         """Forces from frames on these taxels, shape (taxels, m), N; 0 without."""
-        count = len(range(*taxels.indices(self.skin.array.size)))
-        total = np.zeros((count, self.time.size))
+        total = np.zeros((taxels.size, self.time.size))
         for one in self.skin.frames:
             total += one.at(self.time, taxels)
         return total
@@ -398,7 +397,7 @@ class Loads:
         """Times, s, and the force on one taxel at them, N; linear in between."""
         found: tuple[FloatArray, FloatArray] = one_force(
             *self.skin.array.places[taxel], self.pressing,
-            self.framed(slice(taxel, taxel + 1))[0], self.skin.force_error,
+            self.framed(np.array([taxel]))[0], self.skin.force_error,
         )  # fmt: skip
         return found
 

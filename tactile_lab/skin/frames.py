@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.errors import SceneError
@@ -71,9 +73,8 @@ class Frames(SceneTable):
                 f"{self.file} has forces for {shape[1]} taxels; the array has "
                 f"{array.size}."
             )
-        rows = max(1, CHECKED // shape[1])
-        for first in range(0, shape[0], rows):
-            bad = np.argwhere(~np.isfinite(self.forces[first : first + rows]))
+        for first, piece in self._pieces():
+            bad = np.argwhere(~np.isfinite(piece))
             if bad.size:
                 frame, taxel = int(bad[0, 0]) + first, int(bad[0, 1])
                 raise SceneError(
@@ -81,12 +82,28 @@ class Frames(SceneTable):
                     f"{self.forces[frame, taxel]}; give finite forces."
                 )
 
+    @cached_property
+    def range(self) -> tuple[FloatArray, FloatArray]:
+        """The least and the largest force on each taxel, N; read a piece at a time."""
+        low, high = np.inf, -np.inf
+        for _, piece in self._pieces():
+            low = np.minimum(low, piece.min(axis=0))
+            high = np.maximum(high, piece.max(axis=0))
+        return np.asarray(low) * self.scale, np.asarray(high) * self.scale
+
+    def _pieces(self) -> Iterator[tuple[int, FloatArray]]:
+        """The number of its first frame, and a piece of the file."""
+        frames, taxels = self.forces.shape
+        rows = max(1, CHECKED // taxels)
+        for first in range(0, frames, rows):
+            yield first, self.forces[first : first + rows]
+
     @property
     def times(self) -> FloatArray:
         """When each frame is, s."""
         return self.start + np.arange(self.forces.shape[0]) / self.rate
 
-    def at(self, time: FloatArray, taxels: slice) -> FloatArray:
+    def at(self, time: FloatArray, taxels: NDArray[np.intp]) -> FloatArray:
         """The force on these taxels, shape (taxels, time), N."""
         frames = np.asarray(self.forces[:, taxels], dtype=np.float64) * self.scale
         place = np.clip((time - self.start) * self.rate, 0, frames.shape[0] - 1)

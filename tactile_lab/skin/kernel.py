@@ -28,7 +28,8 @@ from tactile_lab.skin.forces import SAMPLED, SOURCES, force_on, thinned
 
 FIRED, SILENT, UNTOUCHED, DEAD, STUCK, REFUSED = range(6)
 """What became of a taxel: it fired; it was solved and did not; it was not solved, for
-its force cannot bring it to threshold; it is broken; the solver refused it."""
+its force cannot bring it to threshold; it is broken; it fires at its own rate; the
+solver refused it."""
 NEAR = 1e-6
 """A taxel is solved whose V_C1 may come so near to where it would fire, V."""
 CHUNK = 1 << 12
@@ -47,16 +48,13 @@ def highest_V_P(time: FloatArray, force: FloatArray, k_F: float, tau: float) -> 
 
 
 @inner
-def surely_silent(
-    time: FloatArray, force: FloatArray, k_F: float, par: FloatArray
-) -> bool:
+def surely_silent(V: float, par: FloatArray) -> bool:
     """Whether V_C1 cannot come down to where V_C2 would reach V_fire.
 
-    V_C1 starts at its equilibrium, and is never below the lowest equilibrium so far.
-    A T1 that saturates can pull it down by its leakage I_T1s alone, and brings C2 no
-    more than I_T1s (1 + 1/beta_R) beyond Eq. (17).
+    V_C1 starts at its equilibrium, and is never below the lowest equilibrium so far:
+    that of V, the highest V_P. A T1 that saturates can pull it down by its leakage
+    I_T1s alone, and brings C2 no more than I_T1s (1 + 1/beta_R) beyond Eq. (17).
     """
-    V = highest_V_P(time, force, k_F, par[TAU])
     lowest = equilibrium(B_at(V, par), par) - NEAR
     if par[SATURATES] == 0.0:
         return bool(lowest > par[Y_CRITICAL])
@@ -101,6 +99,7 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
         places: FloatArray,
         pressing: Any,
         framed: FloatArray,
+        span: FloatArray,
         force_error: float,
         until: float,
         tolerance: float,
@@ -124,15 +123,18 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
                 spikes = appended(spikes, size, train_i, count[i])
                 size += count[i]
                 continue
+            k_F = numbers_of(many[i], direct, par)
+            par[SATURATES] = 1.0 if saturates else 0.0
+            if surely_silent(abs(k_F) * span[i], par):
+                role[i], largest[i] = UNTOUCHED, np.nan
+                continue
             t, F = force_on(
                 places[i, 0], places[i, 1], pressing, framed[i], SAMPLED * force_error
             )
             largest[i] = F.max()
             pieces[i] = thinned(t, F, (1.0 - SAMPLED) * force_error)
             t, F = t[: pieces[i]], F[: pieces[i]]
-            k_F = numbers_of(many[i], direct, par)
-            par[SATURATES] = 1.0 if saturates else 0.0
-            if surely_silent(t, F, k_F, par):
+            if surely_silent(highest_V_P(t, F, k_F, par[TAU]), par):
                 role[i] = UNTOUCHED
                 continue
             if saturates:

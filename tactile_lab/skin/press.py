@@ -27,6 +27,7 @@ from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.model.specimen import parts
 from tactile_lab.quantity import show
 from tactile_lab.skin import kernel
+from tactile_lab.skin.bound import least_critical, spans
 from tactile_lab.skin.events import FILE, EventWriter
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.single import simulate_taxel
@@ -88,7 +89,10 @@ def press(
     role = np.zeros(size, np.uint8)
     role[skin.array.named(skin.array.dead)] = kernel.DEAD
     role[skin.array.named(skin.array.stuck)] = kernel.STUCK
-    count, largest = np.zeros(size, np.int64), np.zeros(size)
+    count = np.zeros(size, np.int64)
+    span, largest = spans(skin, loads)
+    silent = (span < least_critical(skin)) & (role == kernel.FIRED)
+    role[silent] = kernel.UNTOUCHED
     worst, pieces = 0.0, 0
     blocks = deque(slice(k, min(k + BLOCK, size)) for k in range(0, size, BLOCK))
     waiting: deque[tuple[slice, Future[Any]]] = deque()
@@ -100,12 +104,12 @@ def press(
         while blocks or waiting:
             while blocks and len(waiting) < AHEAD * cores:
                 part = blocks.popleft()
-                waiting.append(
-                    (part, pool.submit(solve_block, skin, loads, part, role[part]))
-                )
+                asked = (skin, loads, part, role[part], span[part])
+                waiting.append((part, pool.submit(solve_block, *asked)))
             part, future = waiting.popleft()
             try:
-                count[part], found, largest[part], error, times = future.result()
+                count[part], found, force, error, times = future.result()
+                largest[part] = np.where(np.isnan(force), largest[part], force)
             except BaseException:
                 for _, other in waiting:
                     other.cancel()
@@ -140,10 +144,29 @@ def press(
     return Pressed(int(count.sum()), told, worst, seconds, warnings(skin, most))
 
 
-def solve_block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) -> Any:
-    """Numbers of spikes and pieces, forces, errors, spikes; fills `role` in."""
+def solve_block(
+    skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8], span: FloatArray
+) -> Any:
+    """Solve those of a block that are not left out yet; fills `role` in.
+
+    Args:
+        skin: what to compute.
+        loads: on it.
+        part: numbers of the taxels.
+        role: of each.
+        span: what the range of the force on each stays below, N; infinite if unknown.
+
+    Returns:
+        Numbers of spikes and pieces, largest forces, N, NaN for those left out, errors,
+        s, each of shape (block,); and all spikes, s.
+    """
     array, circuit = skin.array, skin.circuit
-    taxels = np.arange(part.start, part.stop)
+    asked = np.flatnonzero(role != kernel.UNTOUCHED)
+    count, pieces = np.zeros(role.size, np.int64), np.zeros(role.size, np.int64)
+    force, error = np.full(role.size, np.nan), np.zeros(role.size)
+    if not asked.size:
+        return count, pieces, force, error, np.empty(0)
+    taxels = part.start + asked
     first = skin.first_specimen
     many = (
         records(circuit, parts(circuit, first + taxels))
@@ -153,26 +176,30 @@ def solve_block(skin: Skin, loads: Loads, part: slice, role: NDArray[np.uint8]) 
     for taxel in taxels[~certain(circuit, many, None)]:
         with _saying(f"Taxel {taxel}"):
             skin.circuit_of(int(taxel))
-    found = solved(skin, loads, many, array.places[part], loads.framed(part), role)
-    refused = taxels[role == kernel.REFUSED]
+    became = role[asked]
+    framed = loads.framed(taxels)
+    count[asked], pieces[asked], force[asked], error[asked], times = solved(
+        skin, loads, many, array.places[taxels], framed, became, span[asked]
+    )
+    role[asked] = became
+    refused = asked[became == kernel.REFUSED]
     if refused.size:
-        taxel = int(refused[0])
-        force = show(float(found[2][taxel - part.start]), "N")
-        with _saying(f"Taxel {taxel}, pressed with up to {force}"):
+        taxel, most = part.start + int(refused[0]), show(float(force[refused[0]]), "N")
+        with _saying(f"Taxel {taxel}, pressed with up to {most}"):
             simulate_taxel(skin, taxel)
-    return found
+    return count, pieces, force, error, times
 
 
 def solved(
     skin: Skin, loads: Loads, many: Records, places: FloatArray, framed: FloatArray,
-    role: NDArray[np.uint8],
+    role: NDArray[np.uint8], span: FloatArray,
 ) -> Any:  # fmt: skip
     """Numbers of spikes and pieces, forces, errors, spikes of circuits at places, m."""
     saturates = skin.circuit.saturation
     run = kernel.run_saturating if saturates else kernel.run
     return run(
         many, skin.circuit.t1 == "direct", role, skin.array.stuck_rate, places,
-        loads.pressing, framed, skin.force_error, skin.duration, skin.tolerance,
+        loads.pressing, framed, span, skin.force_error, skin.duration, skin.tolerance,
         MOST_COUPLED if saturates else MOST_SPIKES,
     )  # fmt: skip
 

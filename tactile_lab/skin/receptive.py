@@ -44,7 +44,8 @@ def receptive_field(
     many = np.repeat(records(skin.circuit_of(taxel), {}), PLACES)
     framed = np.zeros((PLACES, loads.time.size))
     role = np.zeros(PLACES, np.uint8)
-    count, _, force, _, _ = solved(skin, loads, many, places, framed, role)
+    unknown = np.full(PLACES, np.inf)
+    count, _, force, _, _ = solved(skin, loads, many, places, framed, role, unknown)
     return moved, count.astype(float), force
 
 
