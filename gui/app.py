@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QSettings, QSize, QTimer
 from PySide6.QtWidgets import QApplication, QWidget
 
+from gui import bindings as _first  # noqa: F401
 from gui.look import fonts
 from gui.look.theme import Theme
-from gui.plots import on_demand as _before_pyqtgraph  # noqa: F401
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips
@@ -71,18 +71,20 @@ def main(
     settings = QSettings()
     wishes = Preferences(settings, lab)
     session = Session(out or wishes.folder)
-    session.link.open()  # on the other core, while the window is loaded and built
-    from gui.window import Window
-
     session.run.notes = lab.notes if lab else {}
     session.run.reports, session.run.publish = wishes.reports, wishes.lsl
+    wanted = bench or wishes.bench
+    if wanted == "none":
+        session.link.open()
+    else:
+        session.connect_bench(wanted)  # which answers while the window is built
+    from gui.window import Window
+
     window = Window(session, chosen, settings)
     fit(window, window.screen().availableSize())
     window.show()
     _close_on_signals(lambda: window.leave() if window.session.busy else window.close())
-    wanted = bench or wishes.bench
-    wanted_bench = None if wanted == "none" else wanted
-    QTimer.singleShot(0, lambda: begin(window, target or wishes.scene, wanted_bench))
+    QTimer.singleShot(0, lambda: begin(window, target or wishes.scene, None))
     app.exec()
     session.close()
     left = session.coil_view()
@@ -131,15 +133,19 @@ def begin(window: Window, target: str | None, bench: str | None) -> None:
     if is_run and path is not None:
         window.screen_.open_run(path)
     window.screen_.list_runs()
-    start(_load_reader, "load reader")
+    window.session.bench.ready.connect(_load_reader)
     window.page.setFocus()
     if bench is not None:  # in a turn of its own: the scene is painted meanwhile
         QTimer.singleShot(0, lambda: window.session.connect_bench(bench))
 
 
 def _load_reader() -> None:
-    """Load what reads runs now: at the end of a run it would hold up the lanes."""
-    importlib.import_module("gui.lanes.stored")
+    """Load what reads runs: at the end of a run it would hold up the lanes."""
+
+    def load() -> None:
+        importlib.import_module("gui.lanes.stored")
+
+    start(load, "load reader")
 
 
 def _close_on_signals(close: Callable[[], object]) -> None:

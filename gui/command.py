@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from tactile_lab.commands.terminal import refusing
+from tactile_lab.engine.process import load_ahead
 from tactile_lab.lab import lab
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
@@ -53,6 +54,8 @@ def command(
             "The window needs a display, and neither DISPLAY nor WAYLAND_DISPLAY names "
             "one. Start it on a desktop, or over ssh -X."
         )
+    if skin is None:
+        load_ahead()  # on the other core, while Qt is loaded
     try:
         from gui import app
     except ImportError as error:

@@ -255,6 +255,8 @@ class Window(QMainWindow):
         self.actions_.fold_asked.connect(self.fold)
         sides = (self.setup, self.review)
         self.header.unfold_asked.connect(lambda n: self.fold(sides[n], False))
+        for line in session.log.lines:  # the bench may have been asked already
+            self.centre.log.add(line)
         session.log.added.connect(self.centre.log.add)
         session.plan.arrived.connect(self.screen_.plan_arrived)
         session.source_changed.connect(self.screen_.follow_run)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -103,7 +104,7 @@ def look_at_bench(engine: Engine, request: Request) -> Checked:
 def _alone(
     engine: Engine, request: Request, ask: Callable[[Bench], Checked]
 ) -> Checked:
-    bench = _open(request.load(), realtime=engine.realtime)
+    bench = bench_of(request.load(), realtime=engine.realtime)
     if not engine.instruments.acquire(timeout=BUSY):
         raise RefusedError(
             "The instruments are still in use by what was begun last; wait until it "
@@ -162,8 +163,10 @@ def look(bench: Bench) -> Checked:
 def _answers(
     bench: Bench, ask: Callable[[Instrument], str]
 ) -> tuple[InstrumentAnswer, ...]:
-    """What each instrument of the bench answers when it is asked."""
-    found: list[InstrumentAnswer] = []
+    """What each instrument of the bench answers when it is asked.
+
+    All are asked at once where time is lived through: most of it is waiting.
+    """
     every = (
         ("coil", bench.coil),
         ("scope", bench.scope),
@@ -171,15 +174,19 @@ def _answers(
         ("thermometer", bench.thermometer),
         *bench.voltage_sources.items(),
     )
-    with bench.clock.taking_part("check"):
-        for role, instrument in every:
-            if instrument is None:
-                continue
-            try:
-                found.append(InstrumentAnswer(role, ask(instrument), ""))
-            except (TactileLabError, OSError) as error:
-                found.append(InstrumentAnswer(role, "", str(error)))
-    return tuple(found)
+    there = [(role, one) for role, one in every if one is not None]
+
+    def answer(role: str, instrument: Instrument) -> InstrumentAnswer:
+        try:
+            return InstrumentAnswer(role, ask(instrument), "")
+        except (TactileLabError, OSError) as error:
+            return InstrumentAnswer(role, "", str(error))
+
+    if bench.clock.simulated:
+        with bench.clock.taking_part("check"):
+            return tuple(answer(*one) for one in there)
+    with ThreadPoolExecutor(max(1, len(there))) as asking:
+        return tuple(asking.map(answer, *zip(*there, strict=True)))
 
 
 def read_field(engine: Engine, request: Request, task: int) -> FieldReading:
@@ -189,7 +196,7 @@ def read_field(engine: Engine, request: Request, task: int) -> FieldReading:
     held = engine.tasks.get(task)
     if held is not None and held.task is not None:
         return manual.read_field(held.task.bench)
-    return manual.read_field(_open(request.load(), realtime=True))
+    return manual.read_field(bench_of(request.load(), realtime=True))
 
 
 def record(engine: Engine, task: int, out: Path, notes: Mapping[str, str]) -> Path:
@@ -311,7 +318,8 @@ def _monitor(engine: Engine, task: int) -> Monitor:
     return monitor
 
 
-def _open(scene: Scene, *, realtime: bool) -> Bench:
+def bench_of(scene: Scene, *, realtime: bool) -> Bench:
+    """The bench of a scene; nothing of it is open."""
     from tactile_lab.engine.bench import open_bench
     from tactile_lab.planning.needs import needs
 

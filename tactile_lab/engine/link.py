@@ -26,12 +26,11 @@ from tactile_lab.bench import OffReport
 from tactile_lab.engine import commands
 from tactile_lab.engine.engine import Act, Engine, Reply, ServedTask, main
 from tactile_lab.engine.events import Ended, TaskEvent
+from tactile_lab.engine.process import EngineProcess
 from tactile_lab.engine.threads import start
 from tactile_lab.instruments.guard_log import left_by_guard
 
 if TYPE_CHECKING:
-    from multiprocessing.process import BaseProcess
-
     from tactile_lab.engine.task import Task
 
 T = TypeVar("T")
@@ -116,7 +115,7 @@ class Link:
         self._rest, self._used = rest, time.monotonic()
         self._separate, self._realtime, self._lost = separate, realtime, lost
         self._pipe: Connection | None = None
-        self._process: BaseProcess | threading.Thread | None = None
+        self._process: EngineProcess | threading.Thread | None = None
         self._tasks: dict[int, RemoteTask] = {}
         self._asked: dict[int, Callable[[Reply[Any]], None]] = {}
         self._inbox: SimpleQueue[tuple[Callable[[Any], None], Any]] = SimpleQueue()
@@ -210,7 +209,7 @@ class Link:
         self.close()
 
     def open(self) -> None:
-        """Start the engine, which else what is asked first does."""
+        """Start the engine, which else what is asked first does; returns at once."""
         with self._lock:
             self._number()
 
@@ -243,15 +242,9 @@ class Link:
             pass  # the reading thread sees the end of the pipe too, and tells
 
     def _open(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
+        self._pipe, theirs = multiprocessing.Pipe()
         if self._separate:
-            self._process = context.Process(
-                target=main, args=(theirs, self._realtime), daemon=True
-            )
-            # daemonic: a window that ends without `close` still sends it SIGTERM
-            self._process.start()
-            theirs.close()
+            self._process = EngineProcess(main, theirs, realtime=self._realtime)
         else:
             served = Engine(theirs, realtime=self._realtime)
             self._process = start(served.serve, "engine")

@@ -4,8 +4,10 @@
 
 The program itself is started, offscreen, on the built-in simulated bench; with another
 checkout beside it both in turn, so that their ratio holds on a busy machine, too. Times
-are from the start of Python. Processor times are of the window's process until it can
-be used, and of window and engine until READY. The first start of each is not counted.
+are from the start of Python: until the window can be used, until its bench is READY and
+until what the form asks for is planned. Processor times are of the window's process
+until it can be used, and of all processes in the end. The first start of each is not
+counted.
 """
 
 import argparse
@@ -19,10 +21,8 @@ from pathlib import Path
 import numpy as np
 
 WATCHED = """
-import os, sys, time
+import json, os, sys, time
 from pathlib import Path
-from PySide6.QtCore import QTimer
-import gui.app as app
 
 def lived():
     ticks = Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19]
@@ -31,35 +31,55 @@ def lived():
 
 def used(pid):
     times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return sum(map(int, times[11:13])) / os.sysconf("SC_CLK_TCK")
+    below = [int(one) for task in Path(f"/proc/{pid}/task").iterdir()
+             for one in (task / "children").read_text().split()]
+    own = sum(map(int, times[11:13])) / os.sysconf("SC_CLK_TCK")
+    return own + sum(map(used, below))
 
-begin, found = app.begin, {}
+def watch():
+    from PySide6.QtCore import QTimer
+    import gui.app as app
 
-def watched(window, *rest):
-    begin(window, *rest)
-    found.update(usable=lived(), window=used("self"))
-    timer = QTimer(window)
+    begin, found = app.begin, {}
 
-    def look():
-        session = window.session
-        if session.state.value == "ready" and session.plan.expectation is not None:
-            timer.stop()
-            found.update(ready=lived(), both=used("self") + used(session.link.pid))
-            import json
-            print(json.dumps(found), flush=True)
-            window.close()
+    def watched(window, *rest):
+        begin(window, *rest)
+        found.update(usable=lived(), window=time.process_time())
+        timer, session = QTimer(window), window.session
 
-    timer.timeout.connect(look)
-    timer.start(5)
+        def look():
+            if session.state.value == "ready" and "ready" not in found:
+                found["ready"] = lived()
+            if session.plan.expectation is not None and "planned" not in found:
+                found["planned"] = lived()
+            if {"ready", "planned"} <= found.keys():
+                timer.stop()
+                print(json.dumps({**found, "all": used(os.getpid())}), flush=True)
+                window.close()
+
+        timer.timeout.connect(look)
+        timer.start(5)
+
+    app.begin = watched
 
 if __name__ == "__main__":
-    app.begin = watched
-    app.main("demo", out=Path(sys.argv[1]), bench="sim")
+    import gui.command as verb
+
+    lab = verb.lab
+
+    def known():  # asked for once the window's own modules are there
+        watch()
+        return lab()
+
+    verb.lab = known
+    sys.argv = ["tactile-lab", "gui", "demo", "--bench", "sim", "--out", sys.argv[1]]
+    from tactile_lab.cli import main
+    main()
 """
-PARTS = ("usable", "window", "ready", "both")
+PARTS = ("usable", "window", "ready", "planned", "all")
 HEAD = (
-    "| checkout | starts | usable, s | its processor | READY, s | processor, both |\n"
-    "|---|---|---|---|---|---|"
+    "| checkout | starts | usable, s | its processor | READY, s | planned, s "
+    "| processor, all |\n|---|---|---|---|---|---|---|"
 )
 
 

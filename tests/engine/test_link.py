@@ -1,7 +1,6 @@
 """A plain script at the pipe: no window, no Qt."""
 
 import gc
-import os
 import subprocess
 import sys
 import threading
@@ -11,6 +10,7 @@ from multiprocessing import Pipe
 from pathlib import Path
 
 import pytest
+from engine_answers import answered, pid_of
 
 from tactile_lab.acquisition.events import RunState, SpikesSeen
 from tactile_lab.engine import engine as module
@@ -119,27 +119,13 @@ def test_a_question_is_answered_even_where_it_breaks(tmp_path):
         assert gone.value is None and "gone.toml" in gone.problem
 
 
-def pid_of(engine: Engine) -> int:
-    return os.getpid()
-
-
-def answered(link: Link) -> Reply[int]:
-    """What the engine says when asked for its process."""
-    told: list[Reply[int]] = []
-    link.ask(told.append, pid_of)
-    while not told:
-        link.poll()
-        time.sleep(0.001)
-    return told[0]
-
-
 def test_an_engine_of_which_nothing_is_asked_ends_and_the_next_question_starts_one():
     lost: list[str] = []
     with Link(lost=lost.append, rest=0.0) as link:
-        first = answered(link)
+        first = answered(link, pid_of)
         while link.pid is not None:
             link.poll()
-        second = answered(link)
+        second = answered(link, pid_of)
         end = time.monotonic() + 60
         while Path(f"/proc/{first.value}").exists() and time.monotonic() < end:
             time.sleep(0.001)

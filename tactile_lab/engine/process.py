@@ -1,0 +1,82 @@
+"""The process an engine works in.
+
+On Linux it is forked from one that has loaded what every engine needs (`ahead`): it is
+there at once, and what was loaded is in memory once. Elsewhere each loads for itself.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from multiprocessing.connection import Connection
+
+FORKS = sys.platform == "linux"
+AHEAD = "tactile_lab.engine.ahead"
+
+if FORKS:
+    from multiprocessing import forkserver
+    from multiprocessing.context import ForkServerProcess as Process
+else:
+    from multiprocessing.context import SpawnProcess as Process
+
+Serve = Callable[[Connection, bool], None]
+
+
+def load_ahead() -> None:
+    """Begin to load what engines need, in a process beside this; returns at once."""
+    if FORKS:
+        forkserver.set_forkserver_preload([AHEAD])
+        forkserver.ensure_running()
+
+
+class EngineProcess:
+    """Serves one end of a pipe; starts without holding up who asks for it.
+
+    Args:
+        serve: what it does: with its end of the pipe, and `realtime`.
+        pipe: its end; closed here once it has it, or could not be started.
+        realtime: pace a simulated bench by the wall clock.
+    """
+
+    def __init__(self, serve: Serve, pipe: Connection, *, realtime: bool) -> None:
+        self._pipe = pipe
+        self._process = Process(
+            target=_main, args=(dict(os.environ), serve, pipe, realtime), daemon=True
+        )  # daemonic: a window that ends without `close` still sends it SIGTERM
+        self._starting = threading.Thread(target=self._start, name="start", daemon=True)
+        self._starting.start()
+
+    @property
+    def pid(self) -> int | None:
+        """Its process id; None before it has one."""
+        return self._process.pid
+
+    def is_alive(self) -> bool:
+        """Whether it works, or is about to."""
+        return self._starting.is_alive() or self._process.is_alive()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end, at most `timeout` s."""
+        self._starting.join(timeout)
+        if self._process.pid is not None:
+            self._process.join(timeout)
+
+    def _start(self) -> None:
+        load_ahead()
+        try:
+            self._process.start()
+        except (OSError, EOFError):
+            pass  # whoever reads the other end sees that it is closed
+        finally:
+            self._pipe.close()
+
+
+def _main(
+    environment: Mapping[str, str], serve: Serve, pipe: Connection, realtime: bool
+) -> None:
+    """Serve in the environment of who asked, which the one forked from may not have."""
+    os.environ.clear()
+    os.environ.update(environment)
+    serve(pipe, realtime)

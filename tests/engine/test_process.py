@@ -1,0 +1,99 @@
+"""How soon an engine is there, and answers who is on a bench."""
+
+import os
+import signal
+import sys
+import threading
+from typing import cast
+
+import pytest
+from engine_answers import answered, pid_of
+
+from tactile_lab.bench import Bench, FieldMeter, Scope
+from tactile_lab.clock import RealClock
+from tactile_lab.engine import process
+from tactile_lab.engine.engine import Engine
+from tactile_lab.engine.jobs import check
+from tactile_lab.engine.link import Link
+
+forks = pytest.mark.skipif(not process.FORKS, reason="engines are forked on Linux only")
+
+
+def parent_of(engine: Engine) -> int:
+    return os.getppid()
+
+
+def word(engine: Engine) -> str | None:
+    return os.environ.get("A_WORD")
+
+
+def compiler(engine: Engine) -> tuple[bool, bool]:
+    return "sim_backend.bench" in sys.modules, "numba.np.arraymath" in sys.modules
+
+
+@forks
+def test_an_engine_has_what_it_needs_and_the_next_shares_it():
+    with Link() as one, Link() as other:
+        assert answered(one, compiler).value == (True, False)
+        parents = {answered(link, parent_of).value for link in (one, other)}
+        assert len(parents) == 1 and os.getpid() not in parents
+        assert answered(one, pid_of).value != answered(other, pid_of).value
+
+
+@forks
+def test_an_engine_is_asked_in_the_environment_of_who_asks(monkeypatch):
+    """What engines are forked from may be older than a variable."""
+    with Link() as link:
+        assert answered(link, word).value is None
+    monkeypatch.setenv("A_WORD", "said later")
+    with Link() as link:
+        assert answered(link, word).value == "said later"
+
+
+@forks
+def test_what_engines_are_forked_from_may_be_killed():
+    with Link() as link:
+        parent = answered(link, parent_of).value
+        assert parent is not None
+        os.kill(parent, signal.SIGKILL)
+        assert answered(link, pid_of).value == link.pid
+        with Link() as other:
+            assert answered(other, parent_of).value not in (parent, os.getpid())
+
+
+def test_an_engine_that_cannot_be_started_is_lost(monkeypatch):
+    def refuse(self: object) -> None:
+        raise OSError("no more processes")
+
+    monkeypatch.setattr(process.Process, "start", refuse)
+    lost: list[str] = []
+    with Link(lost=lost.append) as link:
+        reply = answered(link, pid_of)
+    assert reply.lost and reply.value is None
+    assert lost == ["The pipe to it ended"]
+
+
+class Met:
+    """An instrument that answers once another is asked, too."""
+
+    def __init__(self, both: threading.Barrier) -> None:
+        self._both = both
+
+    def open(self) -> None:
+        self._both.wait(60)
+
+    def close(self) -> None:
+        pass
+
+    identity = "met"
+
+
+def test_the_instruments_of_a_bench_are_asked_at_once():
+    """They were asked one after the other: READY came 0.7 s later."""
+    both = threading.Barrier(2)
+    bench = Bench(
+        name="two", simulated=False, clock=RealClock(),
+        scope=cast("Scope", Met(both)), field_meter=cast("FieldMeter", Met(both)),
+    )  # fmt: skip
+    found = check(bench)
+    assert found.sound and [one.identity for one in found.found] == ["met", "met"]

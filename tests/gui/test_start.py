@@ -1,0 +1,54 @@
+"""The window as the program starts it."""
+
+import json
+import os
+import subprocess
+import sys
+
+STARTED = """
+import json, linecache, sys
+from pathlib import Path
+
+told = {}
+
+def watched(window, *rest):
+    session = window.session
+    told["asked before it is shown"] = session.state is WindowState.CONNECTING
+    begin(window, *rest)
+    timer = QTimer(window)
+
+    def look():
+        if session.state is WindowState.READY and session.plan.expectation:
+            timer.stop()
+            told["log"] = [line.text for line in window.centre.log.model.lines]
+            told["sources read"] = [f for f in linecache.cache if "numpy" in f]
+            window.close()
+
+    timer.timeout.connect(look)
+    timer.start(5)
+
+if __name__ == "__main__":  # the engine loads this file, too
+    from PySide6.QtCore import QTimer
+    import gui.app as app
+    from gui.state import WindowState
+
+    begin, app.begin = app.begin, watched
+    told["code"] = app.main("demo", out=Path(sys.argv[1]), bench="sim")
+    print(json.dumps(told))
+"""
+
+
+def test_the_bench_is_asked_while_the_window_is_built(tmp_path):
+    """And no module's source is kept in memory, as PySide6 does where it is let."""
+    script = tmp_path / "started.py"
+    script.write_text(STARTED)
+    alone = {"QT_QPA_PLATFORM": "offscreen", "XDG_CONFIG_HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, script, tmp_path / "runs"],
+        env=os.environ | alone, capture_output=True, text=True, timeout=240,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["asked before it is shown"]
+    assert told["log"][0].startswith("Asking the instruments of")
+    assert told["sources read"] == [] and told["code"] == 0
