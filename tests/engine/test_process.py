@@ -9,7 +9,7 @@ from typing import cast
 import pytest
 from engine_answers import answered, pid_of
 
-from tactile_lab.bench import Bench, FieldMeter, Scope
+from tactile_lab.bench import Bench, Meter, Scope
 from tactile_lab.clock import RealClock
 from tactile_lab.engine import process
 from tactile_lab.engine.engine import Engine
@@ -93,7 +93,7 @@ def test_the_instruments_of_a_bench_are_asked_at_once():
     both = threading.Barrier(2)
     bench = Bench(
         name="two", simulated=False, clock=RealClock(),
-        scope=cast("Scope", Met(both)), field_meter=cast("FieldMeter", Met(both)),
+        scope=cast("Scope", Met(both)), field_meter=cast("Meter", Met(both)),
     )  # fmt: skip
     found = check(bench)
     assert found.sound and [one.identity for one in found.found] == ["met", "met"]
