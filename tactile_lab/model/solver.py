@@ -19,7 +19,7 @@ from tactile_lab.model.solution import Solution
 from tactile_lab.model.state import State
 from tactile_lab.waveform import Waveform
 
-MOST_SPIKES = 1e8
+MOST_SPIKES = 1e7
 """Most spikes in one slice: beyond, refuse instead of hanging."""
 MOST_COUPLED = 1e5
 """The same where T1 saturates and a spike takes a hundred times as long."""
@@ -67,7 +67,8 @@ def solve(
             need.dense_V_C2, most,
         )  # fmt: skip
     if status != kernel.DONE:
-        raise _refusal(status, circuit, force, float(S[spiking.COUNT]), most)
+        length = until - state.time
+        raise _refusal(status, circuit, force, length, float(S[spiking.COUNT]), most)
     count = int(S[spiking.COUNT]) if keep_spikes else 0
     return Solution(
         circuit, need, force, state, until, spikes[:count], par,
@@ -92,7 +93,12 @@ def _memory(state: State) -> FloatArray:
 
 
 def _refusal(
-    status: int, circuit: Circuit, force: Waveform, count: float, most: float
+    status: int,
+    circuit: Circuit,
+    force: Waveform,
+    length: float,
+    count: float,
+    most: float,
 ) -> TactileLabError:
     if status == kernel.STRONG:
         largest = float(np.abs(force.value).max())
@@ -102,8 +108,8 @@ def _refusal(
         )
     if status == kernel.FAST and count >= most:
         return SolverError(
-            f"More than {most:g} spikes in one simulation; make it shorter or check "
-            "the integrator's current (t1, I_T1s, C2)."
+            f"More than {most:g} spikes in one simulation of {length:g} s; make it "
+            "shorter, or check the integrator's current (t1, I_T1s, R3, C2) and V_th."
         )
     if status == kernel.FAST:
         return SolverError(

@@ -146,6 +146,14 @@ def test_doctor_looks_where_the_bench_file_says(tactile_lab, tmp_path):
     assert "/opt/own/ps3000a.so" in pico["text"]
 
 
+@pytest.mark.parametrize("verb", ["plan", "simulate"])
+def test_spikes_beyond_number_are_refused(tactile_lab, verb):
+    """Up to 1e8 were computed: 18 s and 2 GB for a scene of 18 s."""
+    answer = tactile_lab(verb, "demo", "--set", "sensor.V_th=3.213e-6 V")
+    assert answer.code == 2
+    assert "More than 1e+07 spikes in one simulation of 18" in answer.err
+
+
 @pytest.mark.parametrize(
     ("scene", "change", "told"),
     [
