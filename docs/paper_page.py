@@ -9,11 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tactile_lab.analysis.adrian import ADRIAN
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.rate_force import eq15_rate
 from tactile_lab.analysis.transfer import Transfer
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.quantity import plus_minus
 
 
 def page(
@@ -52,6 +54,7 @@ def page(
     table_1 = Circuit()
     fires = fig5b["trials"][0]["latency_s"]
     lasted = long["silent_from_s"] - fires
+    highest = table_1.V_GS + table_1.k_F * 0.3
     warm = 330e-3 / table_1.m / math.log(10)
     rows = (
         ("paper", "its number", "ours", "difference", "why"),
@@ -66,6 +69,11 @@ def page(
             percent(swing.swing.value, 0.33),
             f"Table 1 rounds V_T: 5.646 × {warm * 1e3:.1f} mV × ln 10 = 330, V_T at "
             f"{warm / 8.617333e-5 - 273.15:.0f} °C",
+        ),
+        (
+            "Fig. 1c", "threshold voltage 2.75 V, exponential below",
+            f"V_GS + V_P at most {highest:.2f} V (300 mN)", "-",
+            "Eqs. (1) and (8) know no threshold; no run here comes near it",
         ),
         (
             "Fig. 1c, inset", "no numbers; mean and standard error of 3 devices",
@@ -93,7 +101,7 @@ def page(
         (
             "Fig. 4e", "silent within 10 s, the force not given",
             f"150 mN: silent from {short['silent_from_s']:.3g} s", "-",
-            "force not given",
+            'the force is not given; "a small stimulus"',
         ),
         (
             "Fig. 5b", '"approximately 50 s"; of 5c "approximately 50 mN"',
@@ -156,8 +164,8 @@ T_1's emitter.*
   fall in the last 20 s.
 - **A2.** Table 1 prints 2.25e-3 m²; a 15 mm x 15 mm core has 2.25e-4 m². With the
   printed value Eq. (2) gives {printed.newtons_per_ampere * 1e3:.0f} mN/A at 6 mm and
-  11 mT/A, with the core's {core.newtons_per_ampere * 1e3:.0f} mN/A: the 150 mN of
-  Fig. 4e then take {0.15 / core.newtons_per_ampere:.1f} A instead of
+  11 mT/A, with the core's {core.newtons_per_ampere * 1e3:.0f} mN/A: the 150 mN
+  that we take for Fig. 4e then need {0.15 / core.newtons_per_ampere:.1f} A instead of
   {0.15 / printed.newtons_per_ampere:.2f} A, beyond the coil's 2 A. The simulated bench
   uses the printed one, so that its forces are the paper's; `plan` and every report say
   so. `tactile-lab run force_check` compares with a force you read.
@@ -212,7 +220,8 @@ is adaptation within the first intervals. By Eq. (15) fitted
 to the intervals the rate rises by {low} at the least force that gave a rate and by
 {high} at the largest. Bisection
 (`tactile-lab run threshold_search`) puts the critical force at {critical:.2f} mN
-(±{search["critical_force_half_width_N"] * 1e3:.2f} mN) for a 0.25 s ramp and a 1 s
+(±{search["critical_force_half_width_N"] * 1e3:.2f} mN, silent below and firing above)
+for a 0.25 s ramp and a 1 s
 hold; the quasi-static value of the equations is 92.60 mN without the follower's bias.
 
 The model beside this run, which knows the bench's follower, lags and input bias,
@@ -261,8 +270,8 @@ in the model alone:
 |---|---|---|
 {operating_points(trimmed)}
 
-Eq. (15) with V_P(t) lies within {fig5b["conclusion"]["rms_Hz"] * 1e3:.2g} mHz of the
-rates. The fit alpha exp(beta t) + gamma gives alpha =
+Eq. (15) with V_P(t) misses the rates by {fig5b["conclusion"]["rms_Hz"] * 1e3:.2g} mHz
+rms. The fit alpha exp(beta t) + gamma gives alpha =
 {fit["alpha_Hz"]["value"]:.3g} Hz, beta = {fit["beta_per_s"]["value"]:.3g} /s, gamma =
 {fit["gamma_Hz"]["value"]:.3g} Hz, R² = {fit["r_squared"]:.3f}. It is a description:
 the dots leave it at both ends, and at the end the rate falls to silence instead of to
@@ -272,8 +281,7 @@ gamma. The intervals printed with it assume the law and are therefore too narrow
 
 {picture("fig5b-adrian", "Beside a muscle")}
 
-Their time constants, 1.31 s (500 g) and 1.02 s (250 g), are ten times shorter than the
-{fit["time_constant_s"]["value"]:.3g} s of our fit, and their rates forty times higher.
+{beside_ours(fit)}
 
 ## Fig. 5d right: successive presentations
 
@@ -351,11 +359,25 @@ def constant(fit: dict[str, Any] | None) -> str:
     return f"a time constant of {interval(fit['time_constant_s'], 's')}"
 
 
+def beside_ours(fit: dict[str, Any]) -> str:
+    """How much faster the muscle of Fig. 5d fired and adapted than our fit."""
+    slow = fit["time_constant_s"]["value"]
+    first = fit["alpha_Hz"]["value"] + fit["gamma_Hz"]["value"]
+    parts = [
+        f"{muscle.stimulus}: {muscle.rate(0.0):.0f} Hz at first, "
+        f"{muscle.rate(0.0) / first:.2g} times our {first:.3g} Hz, with a time "
+        f"constant of {-1 / muscle.beta:.2f} s, {-slow * muscle.beta:.2g} times "
+        f"shorter than our {slow:.3g} s"
+        for muscle in ADRIAN
+    ]
+    return f"By the fits, {'; '.join(parts)}."
+
+
 def currents(results: dict[str, Any]) -> str:
     """What each force did to I_DS."""
     parts = [
-        f"{c['level_N'] * 1e3:+g} mN change I_DS by {c['change_A'] * 1e9:+.1f} ± "
-        f"{c['change_uncertainty_A_95'] * 1e9:.1f} nA"
+        f"{c['level_N'] * 1e3:+g} mN change I_DS by "
+        f"{plus_minus(c['change_A'], c['change_uncertainty_A_95'], 'A')}"
         for c in results["conclusion"]["I_DS_changes"]
     ]
     return "; ".join(parts).replace("-", "−") + "."
