@@ -63,12 +63,23 @@ def fire(t: float, error: float, S: FloatArray) -> None:
 
 @inner
 def later(
-    error: float, e: float, Q_error: float, missed: float, swing: float, V: float
+    error: float,
+    e: float,
+    Q_error: float,
+    missed: float,
+    swing: float,
+    V: float,
+    again: bool,
 ) -> float:
     """What an error of V_C2 = V becomes in a time d with e = expm1(-d/tau_L), V.
 
-    See `run_piece` for what Q is wrong by.
+    See `run_piece` for what Q is wrong by. What goes to and fro weighs in a spike's
+    time by exp(-age/tau_L), a sawtooth over a train. The mean of the sawtooth sums up
+    one swing over the whole piece, which its first interval is given; to each interval
+    `again`, after a spike of the piece, only the tooth is left: from -1/2 to 1/2 of -e.
     """
+    if again:
+        swing *= -0.5 * e
     added = min(-missed * e, swing) + EPS * abs(V)
     return float(error * (1.0 + e) - Q_error * e + added)
 
@@ -103,7 +114,7 @@ def run_piece(
     tau = par[TAU_L]
     to_x = 2.0 / length
     V_f, V_r = par[V_FIRE], par[V_RESET]
-    known = False
+    known = again = False
     Q = P_now = 0.0
     for k in range(fires.size // 2):
         a, b = fires[2 * k], fires[2 * k + 1]
@@ -181,7 +192,7 @@ def run_piece(
                 if too_low:
                     known = False
                     e = math.expm1(-left / tau)
-                    error = later(S[ERROR], e, Q_error, missed, swing, V_f)
+                    error = later(S[ERROR], e, Q_error, missed, swing, V_f, again)
                     if margin < error:
                         S[DOUBT] = 1.0
                     break
@@ -195,7 +206,7 @@ def run_piece(
                 Q, P_now = both_at(q, P, degree, v * to_x - 1.0)
             known = True
             slope = (Q - V_f) / tau
-            error = later(S[ERROR], e, Q_error, missed, swing, V_f)
+            error = later(S[ERROR], e, Q_error, missed, swing, V_f, again)
             time_error = error / max(slope, 1e-300)
             time_error += EPS * d
             if b - v < 2.0 * time_error and b < length:
@@ -207,6 +218,7 @@ def run_piece(
             if y < par[Y_SATURATED]:
                 S[SATURATED] = 1.0
             S[ERROR] = time_error * (Q - V_r) / tau
+            again = True
             S[REF], S[REF_LOW], S[VOLTAGE] = v, carry, V_r
             if par[T_EPS] > 0.0:
                 S[RESUME] = v + carry + par[T_EPS]
@@ -232,6 +244,6 @@ def run_piece(
         S[VOLTAGE] = V + (V - P_now) * e + (P_end - P_now)
         if S[REF] == 0.0:
             swing, missed = over * swing, over * missed
-        S[ERROR] = later(S[ERROR], e, Q_error, missed, swing, V)
+        S[ERROR] = later(S[ERROR], e, Q_error, missed, swing, V, again)
     S[REF] = S[REF_LOW] = 0.0
     return spikes

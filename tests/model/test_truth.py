@@ -21,6 +21,13 @@ def test_random_scenes_have_errors_below_the_estimate(seed):
     assert comparison.honest, comparison
 
 
+@pytest.mark.parametrize("seed", [209, 230])
+def test_errors_that_cancel_over_a_train_are_not_summed_up(seed):
+    # 80 and 40 spikes; the estimate was 105 and 109 times the true error
+    row = compare(random_case(seed), samples=2)
+    assert row.spike_time < row.spike_time_estimate < 60 * row.spike_time, row
+
+
 def test_a_campaign_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(honesty, "KINDS", {"cascade": random_case})
     first = honesty.campaign(2, tmp_path, print)
