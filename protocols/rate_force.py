@@ -72,7 +72,7 @@ class RateForce(Recovering, Levels):
             run,
             "Highest rate in the hold of each step from rest against its force, as in "
             "Fig. 4d, and the spikes in it. Line: Eq. (15) with the current at the "
-            "end of the ramp; it knows no adaptation. Grey band: the critical force "
+            f"end of the ramp; it knows {_unknown(run)}. Grey band: the critical force "
             "lies within.",
             *expected,
         )
@@ -133,6 +133,13 @@ def _slope(run: Measurement) -> Conclusion:
     return Conclusion((said,), values)
 
 
+def _unknown(run: Measurement) -> str:
+    """What Eq. (15) leaves out of the rate of a step."""
+    if run.circuit is not None and run.circuit.saturation:
+        return "neither adaptation nor that T1 saturates"
+    return "no adaptation"
+
+
 def _level(trial: MeasuredTrial) -> float:
     return trial.level or 0.0
 
@@ -152,6 +159,7 @@ def _beside_eq15(run: Measurement) -> Conclusion:
         return Conclusion()
     said = (
         f"The highest rates are {min(ratios):.2f} to {max(ratios):.2f} of what Eq. "
-        "(15) gives for the current at the end of the ramp, which knows no adaptation."
+        "(15) gives for the current at the end of the ramp, which knows "
+        f"{_unknown(run)}."
     )
     return Conclusion((said,), {"peak_rate_over_eq15": ratios})

@@ -116,6 +116,15 @@ def test_rate_force_brackets_the_critical_force_and_compares_with_eq_15(rate_for
     assert all(0.7 < ratio < 1.02 for ratio in values["peak_rate_over_eq15"])
 
 
+@pytest.mark.parametrize("saturates", [False, True])
+def test_eq_15_beside_a_t1_that_saturates_is_said_not_to_know_it(rate_force, saturates):
+    run = replace(rate_force, circuit=Circuit(saturation=saturates), belief=None)
+    found = find(run)
+    (plot,) = found.answers
+    for said in (plot.caption, " ".join(found.conclusion.sentences)):
+        assert ("knows neither adaptation nor that T1 saturates" in said) is saturates
+
+
 def test_a_figure_closes_up_over_recoveries(rate_force):
     shown = overview(find(rate_force).run)
     force, voltage, *_ = shown.panels
