@@ -19,7 +19,7 @@ from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Pause, printed, show
+from tactile_lab.quantity import Duration, Pause, plus_minus, printed, show
 from tactile_lab.stimulus.demagnetise import demagnetising
 from tactile_lab.stimulus.force import PushCurrent
 from tactile_lab.trial import Protocol, Trial, Trials
@@ -113,9 +113,8 @@ class CalibrateField(Protocol):
             return Conclusion((f"No calibration: {reason}.",))
         slope, loop = found.slope, show(found.half_width, "T", 3)
         sentences = (
-            f"B2 rises by {show(slope.value, 'T', 6)}/A "
-            f"(±{show(slope.half, 'T', 2)}/A, 95 %), from "
-            f"{show(found.offset.value, 'T', 3)} at 0 A.",
+            f"B2 rises by {plus_minus(slope.value, slope.half, 'T')}/A, from "
+            f"{plus_minus(found.offset.value, found.offset.half, 'T')} at 0 A (95 %).",
             f"The loop is {loop} or {show(found.half_width_current, 'A', 3)} to either "
             f"side; one field value is known to ±{show(found.uncertainty, 'T', 3)} "
             "(95 %).",
