@@ -248,7 +248,9 @@ class Actions(QObject):
         from gui.dialogs.studies import show_studies
 
         out = self.panels.session.out
-        show_studies(self.window, self.panels.theme, (out.parent / "studies", out))
+        roots = (out.parent / "studies", out)
+        opened = self.screen.open_point
+        show_studies(self.window, self.panels.theme, roots, opened)
 
     def show_help(self, topic: str = "", page: int = 0) -> None:
         """Show the help: 0 panels, at a topic; 1 shortcuts; 2 about the program."""

@@ -30,10 +30,12 @@ SPIKES_IN_BIN, MOST_BINS = 5, 200
 Mark = Literal[
     "line", "dashed", "dotted", "steps", "filled",
     "points", "dots", "open", "up", "down", "joined", "ticks", "range", "band", "text",
+    "cells", "crosses",
 ]  # fmt: skip
 """Lines, one of them in steps and one filled down to 0; discs, small ones, open ones,
 triangles, discs joined by a line; ticks along the top at `x`; the range from `low` to
-`high` as the trace itself, or as a pale band alone; `texts` beside the points."""
+`high` as the trace itself, or as a pale band alone; `texts` beside the points; cells of
+a map, coloured by `z`; crosses."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,6 +50,10 @@ class Series:
         x_error, y_error: half-widths of the 95 % interval, shape (n,), SI.
         low, high: shape (n,), SI: shaded between, such as extremes or a tolerance.
         texts: n of them, beside the points.
+        z: shape (n,), SI: what colours the cell about each point.
+        z_unit: SI; "" without one.
+        of: what each point stands for, such as the number of a study's point; -1 for
+            nothing. The window tells which one was clicked.
     """
 
     x: ArrayLike
@@ -60,11 +66,14 @@ class Series:
     low: ArrayLike | None = None
     high: ArrayLike | None = None
     texts: tuple[str, ...] = ()
+    z: ArrayLike | None = None
+    z_unit: str = ""
+    of: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         size, others = (
             np.size(self.x),
-            (self.x_error, self.y_error, self.low, self.high),
+            (self.x_error, self.y_error, self.low, self.high, self.z),
         )
         y = () if self.mark in ("ticks", "range", "band") else (self.y,)
         for values in (*y, *(v for v in others if v is not None)):
@@ -233,6 +242,34 @@ def y_scale(panel: Panel) -> tuple[float, str]:
     return scale(panel.label, panel.unit, panel.prefix, values)
 
 
+def z_scale(series: Series) -> tuple[float, str]:
+    """(Factor, text) of what colours cells, as of an axis."""
+    return scale(
+        series.name, series.z_unit, None, [() if series.z is None else series.z]
+    )
+
+
+def grid(series: Series) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cells as a grid: edges along x and y, SI, and z of shape (along y, along x).
+
+    An edge lies in the middle between two values; z is NaN where there is no cell.
+    """
+    x, column = np.unique(series.x, return_inverse=True)
+    y, row = np.unique(series.y, return_inverse=True)
+    z = np.full((y.size, x.size), np.nan)
+    z[row, column] = np.nan if series.z is None else series.z
+    return _edges(x), _edges(y), z
+
+
+def _edges(values: FloatArray) -> FloatArray:
+    if values.size < 2:
+        wide = np.abs(values) / 2 + (values == 0)
+        return np.concatenate([values - wide, values + wide])
+    middles = (values[1:] + values[:-1]) / 2
+    first, last = 2 * values[0] - middles[0], 2 * values[-1] - middles[-1]
+    return np.concatenate([[first], middles, [last]])
+
+
 def scale(
     label: str, unit: str, prefix: str | None, values: list[ArrayLike]
 ) -> tuple[float, str]:
@@ -272,6 +309,7 @@ def _same(value: Any, default: Any) -> bool:
 def _series(data: Mapping[str, Any]) -> Series:
     if data.get("mark", "line") not in get_args(Mark):
         raise ValueError(f"no such mark: {data['mark']!r}")
-    arrays = ("x", "y", "x_error", "y_error", "low", "high")
+    arrays = ("x", "y", "x_error", "y_error", "low", "high", "z")
     numbers = {k: np.array(data[k], dtype=np.float64) for k in arrays if k in data}
-    return Series(**{**data, **numbers, "texts": tuple(data.get("texts", ()))})
+    rows = {key: tuple(data.get(key, ())) for key in ("texts", "of")}
+    return Series(**{**data, **numbers, **rows})

@@ -1,20 +1,20 @@
-"""Studies beside the runs: what each says, and its figures as points come."""
+"""Studies beside the runs: what each says, its figures as points come, each point."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QTimer, QUrl
+from PySide6.QtCore import QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QHideEvent
 from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
-from gui.parts import STRETCH, Combo, column, label, push, row, say, scrolling
+from gui.parts import Combo, column, label, push, row, say, scrolling
 from gui.plots.small_plot import SmallPlot
-from tactile_lab.errors import RunFolderError
-from tactile_lab.plot import Plot
-from tactile_lab.studies.live import is_running, look_at, studies_in
+from tactile_lab.errors import RunFolderError, TactileLabError
+from tactile_lab.studies.live import SeenStudy, is_running, look_at, studies_in
 from tactile_lab.studies.page import REPORT
 
 AGAIN = 1000
@@ -25,6 +25,9 @@ NONE = (
 )
 
 
+HINT = "Click a point or a cell: its run opens, or its scene where none was kept."
+
+
 class StudiesCard(Overlay):
     """A choice of studies; below it what the chosen one says, and its figures.
 
@@ -32,7 +35,11 @@ class StudiesCard(Overlay):
         choice: of studies.
         text: what the chosen one says.
         figures: of it.
+        hint: what a click does, or why it did not.
     """
+
+    opened = Signal(Path)
+    """A point was clicked: the folder of its run, or the file of its scene."""
 
     def __init__(self, window: QWidget, theme: Theme) -> None:
         super().__init__(window, 760)
@@ -40,11 +47,13 @@ class StudiesCard(Overlay):
         self._roots: tuple[Path, ...] = ()
         self._folders: list[Path] = []
         self._stamp: tuple[object, ...] = ()
+        self._seen: SeenStudy | None = None
         self.figures: list[SmallPlot] = []
         self.choice = Combo()
         self.choice.setAccessibleName("Study")
         self.state = label("", "pill")
         self.text = label("", "", wrap=True)
+        self.hint = label(HINT, "muted", wrap=True)
         self.page = push("Open the report")
         self.page.clicked.connect(self._open_page)
         self.close_button = push("Close", "primary")
@@ -55,7 +64,7 @@ class StudiesCard(Overlay):
         self._area = scrolling(inner)
         self._area.setMinimumHeight(430)
         head = row(label("Studies", "big"), (self.choice, 1), self.state, spacing=12)
-        foot = row(STRETCH, self.page, self.close_button)
+        foot = row((self.hint, 1), self.page, self.close_button, spacing=12)
         column(self.card, head, self._area, foot, margin=22, spacing=14)
         self.choice.currentIndexChanged.connect(self._show)
         self._timer = QTimer(self)
@@ -100,7 +109,7 @@ class StudiesCard(Overlay):
         self.state.setVisible(folder is not None)
         if folder is None:
             say(self.text, NONE)
-            self._draw(())
+            self._draw(None)
             self.page.setEnabled(False)
             return
         try:
@@ -120,17 +129,39 @@ class StudiesCard(Overlay):
         self.page.setEnabled((folder / REPORT).is_file())
         self._stamp = stamp
         say(self.text, "\n".join((seen.title, *seen.sentences)))
-        self._draw(seen.plots)
+        self._draw(seen)
 
-    def _draw(self, plots: tuple[Plot, ...]) -> None:
+    def _draw(self, seen: SeenStudy | None) -> None:
+        plots = () if seen is None else seen.plots
+        self._seen = seen
+        say(self.hint, HINT if plots else "")
         while len(self.figures) < len(plots):
-            self.figures.append(SmallPlot(self._theme))
-            self._rows.insertWidget(len(self.figures), self.figures[-1])
+            figure = SmallPlot(self._theme)
+            figure.picked.connect(self._pick)
+            figure.tell = self._told
+            self.figures.append(figure)
+            self._rows.insertWidget(len(self.figures), figure)
         for figure, plot in zip(self.figures, plots, strict=False):
             figure.show_plot(plot)
             figure.setMaximumHeight(figure.minimumHeight())
         for number, figure in enumerate(self.figures):
             figure.setVisible(number < len(plots))
+
+    def _told(self, number: int) -> str:
+        point = None if self._seen is None else self._seen.points.get(number)
+        return "" if point is None else str(point)
+
+    def _pick(self, number: int) -> None:
+        """Open a point's run, or its scene where no run was kept."""
+        if self._seen is None or number not in self._seen.points:
+            return
+        try:
+            found = self._seen.run_of(number) or self._seen.scene_of(number)
+        except (TactileLabError, OSError) as error:
+            say(self.hint, str(error))
+            return
+        self.hide()
+        self.opened.emit(found)
 
     def _open_page(self) -> None:
         if self._chosen is not None:
@@ -138,8 +169,15 @@ class StudiesCard(Overlay):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(page)))
 
 
-def show_studies(window: QWidget, theme: Theme, roots: tuple[Path, ...]) -> None:
-    """Show the card over the window."""
-    found = window.findChild(StudiesCard)
-    card = found if isinstance(found, StudiesCard) else StudiesCard(window, theme)
+def show_studies(
+    window: QWidget,
+    theme: Theme,
+    roots: tuple[Path, ...],
+    opened: Callable[[Path], object],
+) -> None:
+    """Show the card over the window; `opened` is told what a click asks for."""
+    card = window.findChild(StudiesCard)
+    if not isinstance(card, StudiesCard):
+        card = StudiesCard(window, theme)
+        card.opened.connect(opened)
     card.show_studies(roots)

@@ -11,7 +11,7 @@ import numpy as np
 import pyqtgraph as pg
 import shiboken6
 from numpy.typing import ArrayLike
-from PySide6.QtCore import QSizeF, Qt
+from PySide6.QtCore import QPointF, QSizeF, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QWheelEvent
 from PySide6.QtWidgets import QMenu
 
@@ -19,8 +19,18 @@ from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.look.tokens import Tokens
 from gui.plots.axis import Line, RoundAxis, stroke
+from gui.plots.cells import cell_at, item, levels, shades
 from gui.plots.numbers import nice_range
-from tactile_lab.plot import FloatArray, Guide, Panel, Plot, Series, y_scale
+from tactile_lab.plot import (
+    FloatArray,
+    Guide,
+    Panel,
+    Plot,
+    Series,
+    grid,
+    y_scale,
+    z_scale,
+)
 
 PANEL, SMALL = 200, 130
 """Height of a panel, and of one that is low in the report, px."""
@@ -32,19 +42,23 @@ WIDEST = 1e4
 """Width of a heading where nothing limits it, px."""
 SIZE = 7.6
 """Size of a point, px."""
+REACH = 10.0
+"""Distance from a point within which a click is on it, px."""
 
 POINTS = {
     "points": "o",
     "dots": "o",
     "open": "o",
     "joined": "o",
+    "crosses": "x",
     "up": "t1",
     "down": "t",
 }
 STYLES = {"dashed": Qt.PenStyle.DashLine, "dotted": Qt.PenStyle.DotLine}
 GLYPHS = {
     "points": "●", "dots": "•", "open": "○", "joined": "●", "up": "▲", "down": "▼",
-    "dashed": "╌", "dotted": "┈", "filled": "▬", "range": "▬", "band": "▬",
+    "crosses": "✕", "dashed": "╌", "dotted": "┈",
+    "filled": "▬", "range": "▬", "band": "▬",
 }  # fmt: skip
 """What stands for a mark in the legend; a dash where none does."""
 
@@ -54,11 +68,17 @@ class Box(pg.ViewBox):  # type: ignore[misc]
 
     Attributes:
         whole: (x range, y range) in which all is in view.
+        at: what is drawn at a place of the view, as `Series.of` has it; -1 for nothing.
+        picked: told what was clicked.
+        tell: says what it is, for a person; "" for nothing.
     """
 
     def __init__(self) -> None:
         super().__init__(enableMenu=False)
         self.whole: list[list[float]] = [[0.0, 1.0], [0.0, 1.0]]
+        self.at: Callable[[QPointF], int] = lambda place: -1
+        self.picked: Callable[[int], None] = lambda number: None
+        self.tell: Callable[[int], str] = lambda number: ""
 
     @property
     def moved(self) -> bool:
@@ -69,10 +89,23 @@ class Box(pg.ViewBox):  # type: ignore[misc]
         """Back to where all is in view."""
         self.setRange(xRange=self.whole[0], yRange=self.whole[1], padding=0)
 
+    def hoverEvent(self, event: Any) -> None:
+        """Say what lies below, where a click would open it."""
+        number = -1
+        if not event.isExit():
+            number = self.at(self.mapSceneToView(event.scenePos()))
+        shape = Qt.CursorShape
+        self.setCursor(shape.PointingHandCursor if number >= 0 else shape.ArrowCursor)
+        self.setToolTip(self.tell(number) if number >= 0 else "")
+
     def mouseClickEvent(self, event: Any) -> None:
-        """A double click shows all, the right button a menu."""
+        """A click opens what lies below, a double one shows all, right is a menu."""
         if event.double():
             self.show_all()
+        elif event.button() is Qt.MouseButton.LeftButton:
+            number = self.at(self.mapSceneToView(event.scenePos()))
+            if number >= 0:
+                self.picked(number)
         elif event.button() is Qt.MouseButton.RightButton:
             view = self.getViewWidget()
             menu = QMenu(view)
@@ -94,7 +127,11 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     Attributes:
         plot: shown now, or None.
         panels: of it.
+        picked: a point was clicked; see `Series.of`.
+        tell: says what such a point is, for a person.
     """
+
+    picked = Signal(int)
 
     def __init__(
         self, theme: Theme, nothing: str = "", height: int | None = None
@@ -103,6 +140,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self._theme, self.nothing, self._fixed = theme, nothing, height
         self.plot: Plot | None = None
         self.panels: list[PanelItem] = []
+        self.tell: Callable[[int], str] = lambda number: ""
         self.setFixedHeight(height) if height else self.setMinimumHeight(PANEL)
         self.setCacheMode(pg.GraphicsView.CacheModeFlag.CacheNone)
         self.setAntialiasing(True)
@@ -153,6 +191,8 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             foot = (FOOT if plot.x_label else LOW) if last else 8
             ratio = self.devicePixelRatio()
             item = PanelItem(plot, plot.panels[row], tokens, ratio, foot)
+            item.box.picked = self.picked.emit
+            item.box.tell = lambda number: self.tell(number)
             self.addItem(item, row, 0)
             self.ci.layout.setRowStretchFactor(row, height)
             if self.panels and not plot.beside:
@@ -194,9 +234,11 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         x_by, x_text = plot.x_scale()
         y_by, y_text = y_scale(panel)
         self._x, self._y = _shown(x_by, plot.x_log), _shown(y_by, panel.log)
+        self._x_by, self._y_by = x_by, y_by
         self.setContentsMargins(0, 0, 0, 0)
         self.setSpacing(0)
         self.box = Box()
+        self.box.at = self._at
         left, bottom = RoundAxis("left", 26), RoundAxis("bottom", 60, whole=plot.whole)
         if panel.label:
             self.addItem(_Heading(self._heading(y_text)), 0, 0, 1, 2)
@@ -229,12 +271,31 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             at = (1, 0) if panel.corner == "upper" else (1, 1)
             words.anchor(itemPos=at, parentPos=at)
 
+    def _at(self, place: QPointF) -> int:
+        """What the nearest point stands for, or else the cell below; -1 for nothing."""
+        wide, high = self.box.viewPixelSize()
+        nearest, found = REACH, -1
+        for s in self._panel.series:
+            if not s.of or s.mark == "cells":
+                continue
+            x, y = self._x(s.x) - place.x(), self._y(s.y) - place.y()
+            far = np.nan_to_num(np.hypot(x / wide, y / high), nan=np.inf)
+            if far.min() < nearest:
+                nearest, found = float(far.min()), s.of[int(far.argmin())]
+        maps = (s for s in self._panel.series if s.of and s.mark == "cells")
+        for s in maps if found < 0 else ():
+            found = cell_at(s, place.x() / self._x_by, place.y() / self._y_by)
+        return found
+
     def _x_range(self) -> list[float]:
         plot = self._plot
         if plot.x_limits is not None:
             return [float(self._x(limit)) for limit in plot.x_limits]
         panels = (self._panel,) if plot.beside else plot.panels
-        across = [self._x(s.x) for p in panels for s in p.series]
+        drawn = [s for p in panels for s in p.series]
+        across = [self._x(grid(s)[0] if s.mark == "cells" else s.x) for s in drawn]
+        if any(s.mark == "cells" for s in drawn):  # no air about a map
+            return [float(np.min(across[0])), float(np.max(across[0]))]
         upright = (g for p in panels for g in p.guides if g.along == "y")
         return _range(
             [*across, *(self._x(e) for g in upright for e in _ends(g))], plot.whole
@@ -242,6 +303,10 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
 
     def _y_range(self) -> list[float]:
         panel = self._panel
+        for s in panel.series:
+            if s.mark == "cells":
+                edges = self._y(grid(s)[1])
+                return [float(edges[0]), float(edges[-1])]
         shown = [
             self._y(v)
             for s in panel.series
@@ -262,10 +327,19 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         """What is along y, then mark and name of each series."""
         parts = [_rich(text, self._tokens.muted)]
         for s in self._panel.series:
-            if s.name:
+            if s.mark == "cells":
+                parts.append(self._colours(s))
+            elif s.name:
                 mark = _rich(GLYPHS.get(s.mark, "—"), self._colour(s.colour))
                 parts.append(f"{mark}&nbsp;{_rich(s.name, self._tokens.text)}")
         return " &nbsp; ".join(parts)
+
+    def _colours(self, s: Series) -> str:
+        """What a map's colours mean."""
+        by, text = z_scale(s)
+        low, high = (f"{end * by:.4g}" for end in levels(s))
+        bar = "".join(_rich("■", shade) for shade in shades())
+        return f"{_rich(text, self._tokens.text)} &nbsp;{low} {bar} {high}"
 
     def _guide(self, guide: Guide) -> None:
         across = guide.along == "x"
@@ -303,6 +377,10 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             y = np.tile(ends, x.size)
             self._line(np.repeat(x, 2), y, colour, connect="pairs")
             return
+        if s.mark == "cells":
+            across, up, _ = grid(s)
+            self.box.addItem(item(s, self._x(across), self._y(up)))
+            return
         pale = QColor(colour)
         if s.low is not None and s.high is not None:
             pale.setAlphaF(1.0 if s.mark == "range" else 0.22)
@@ -315,7 +393,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             share = np.interp(place[0], self.box.whole[0], (0, 1))
             side = 0.5 + 0.5 * (float(share > 1 - NEAR) - float(share < NEAR))
             self._write(place, text, ink, (side, 1.0))
-        if s.mark == "text":
+        if s.mark == "text" or not np.any(np.isfinite(y)):
             return
         if s.mark == "filled":
             pale.setAlphaF(0.14)
@@ -341,7 +419,9 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
     ) -> None:
         style = STYLES.get(mark, Qt.PenStyle.SolidLine)
         how = {"pen": stroke(colour, self._ratio, style), **how}
-        self.box.addItem(pg.PlotDataItem(x, y, **how))
+        drawn = pg.PlotDataItem(x, y, **how)
+        drawn.scatter.setEnabled(False)  # clicks on its points are for the box
+        self.box.addItem(drawn)
 
     def _fill(
         self, x: FloatArray, low: FloatArray, high: FloatArray, colour: QColor

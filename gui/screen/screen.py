@@ -165,6 +165,14 @@ class Screen(QObject):
         if self.open_scene(name):
             self._panels.setup.start_when_planned()
 
+    def open_point(self, path: Path) -> None:
+        """Open a point of a study: its run, or its scene in the form and the lanes."""
+        if path.is_dir():
+            self.open_run(path)
+        else:
+            self.leave_run()
+            self.open_scene(str(path))
+
     def open_run(self, folder: Path) -> None:
         """Open a run from disk in the same lanes; read away from this thread."""
         self._records.open(folder)

@@ -18,7 +18,7 @@ from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_lab.plot import Guide, Panel, Plot, Series, y_scale
+from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
 from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
 from tactile_lab.store.folder import replacing
@@ -247,6 +247,9 @@ def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None
     if s.mark == "ticks":
         axes.vlines(x, 0.1, 0.9, transform=axes.get_xaxis_transform(), lw=0.7, **over)
         return
+    if s.mark == "cells":
+        _cells(axes, s, x_by, y_by)
+        return
     if s.low is not None and s.high is not None:
         _between(axes, s, x, _scaled(s.low, y_by), _scaled(s.high, y_by), over)
     errors = [
@@ -274,6 +277,17 @@ def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None
         )  # fmt: skip
 
 
+def _cells(axes: Axes, s: Series, x_by: float, y_by: float) -> None:
+    """A map, and beside it what its colours mean."""
+    x, y, z = grid(s)
+    by, text = z_scale(s)
+    mesh = axes.pcolormesh(x * x_by, y * y_by, z * by, cmap=CELLS, zorder=2)
+    mesh.set_rasterized(True)
+    bar = axes.figure.colorbar(mesh, ax=axes, label=_math(text))
+    bar.outline.set_visible(False)
+
+
+CELLS = "viridis"
 _DISCS = ("points", "dots", "open", "joined")
 
 
@@ -304,6 +318,7 @@ def _look(s: Series, count: int) -> Any:
         "points": {"marker": "o", "ls": "", "ms": size, "mew": 0},
         "open": {"marker": "o", "ls": "", "ms": size, "mew": 1.2, "mfc": PAPER.light},
         "up": {"marker": "^", "ls": "", "ms": 4, "mew": 0},
+        "crosses": {"marker": "x", "ls": "", "ms": 4, "mew": 1.2},
         "down": {"marker": "v", "ls": "", "ms": 4, "mew": 0},
         "joined": {"marker": "o", "ms": 0.8 * size, "mew": 0, "lw": 0.8},
     }
@@ -312,7 +327,7 @@ def _look(s: Series, count: int) -> Any:
 
 def _legend(axes: Axes, series: Iterable[Series]) -> None:
     """Named series in a line above the panel."""
-    named = [s for s in series if s.name]
+    named = [s for s in series if s.name and s.mark != "cells"]
     if not named:
         return
     handles = [

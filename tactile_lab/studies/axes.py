@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -80,6 +81,14 @@ class Axis:
         if self.numeric:
             return show(value, self.unit)
         return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+    def change(self, value: Any) -> str:
+        """``key=value`` of one of its values, exactly, as ``--set`` takes it."""
+        if isinstance(value, tuple):
+            return f"{self.key}={json.dumps(value)}"
+        if isinstance(value, bool):
+            return f"{self.key}={json.dumps(value)}"
+        return f"{self.key}={value} {self.unit}".rstrip()
 
 
 def axis(key: str, given: Mapping[str, Any], scene: Scene) -> Axis:

@@ -18,7 +18,7 @@ from tactile_lab.store.folder import lock
 from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
 from tactile_lab.studies.live import LOCK, Live
-from tactile_lab.studies.points import Points, Task
+from tactile_lab.studies.points import RUNS, Points, Task
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
 from tactile_lab.studies.workers import Alone, Finished, Workers, workers
@@ -72,8 +72,7 @@ class Forecast:
 
 def study_points(study: Study, out: Path) -> Points:
     """What computes the study's points in this process."""
-    kept = out / study.name / "runs" if study.on == "bench" else None
-    return Points(study, kept)
+    return Points(study, out / study.name / RUNS if study.keeps_runs else None)
 
 
 def forecast(study: Study, out: Path) -> Forecast:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,18 +12,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import RunFolderError
+from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import count
+from tactile_lab.scene.load import load
+from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock, write_json
+from tactile_lab.studies.addresses import addresses, seeds_of
 from tactile_lab.studies.answers import plots
-from tactile_lab.studies.dataset import gathered
+from tactile_lab.studies.dataset import Gathered, gathered
+from tactile_lab.studies.points import BY_POINT, RUNS
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
 
 LIVE, RESULTS, LOCK = "live.json", "results.json", ".lock"
 """Files in a study's folder: while it is computed, once it is finished, and the one
 that whoever carries it out holds."""
+SCENE = "scene.toml"
+"""The scene that varies, complete."""
 SHOWN = "shown"
 """Key of either file under which stands what the window shows."""
 EVERY = 1.0
@@ -47,6 +53,7 @@ class Live:
     ) -> None:
         self._study, self._shelf, self._named = study, shelf, named
         self._file = folder / LIVE
+        _write(folder / SCENE, study.scene)
         self._next = 0.0
 
     def tell(self, done: int, failed: int) -> None:
@@ -59,10 +66,10 @@ class Live:
         if began < self._next:
             return
         places = self._shelf.find(self._named)
-        drawn = plots(gathered(self._study, self._shelf, places))
+        found = gathered(self._study, self._shelf, places)
         said = f"{done:,} of {count(self._named.size, 'point')} are known"
         said += f", {failed:,} of these refused or failed." if failed else "."
-        write_json(self._file, {SHOWN: shown(self._study, [said], drawn)})
+        write_json(self._file, {SHOWN: shown(found, [said], plots(found))})
         took = time.monotonic() - began
         self._next = began + max(EVERY, SHARE * took)
 
@@ -72,14 +79,47 @@ class Live:
 
 
 def shown(
-    study: Study, sentences: Iterable[str], drawn: Iterable[Plot]
+    found: Gathered, sentences: Iterable[str], drawn: Iterable[Plot]
 ) -> dict[str, Any]:
     """What the window shows of a study, as JSON takes it."""
+    study, drawn = found.study, list(drawn)
+    of = {n for plot in drawn for p in plot.panels for s in p.series for n in s.of}
+    numbers = np.array(sorted(of), dtype=np.intp)
+    design = study.design
+    values, seeds = design.values(numbers), seeds_of(study, design.repeats(numbers))
+    named = addresses(study)[numbers] if study.keeps_runs else [b""] * numbers.size
+    points = {}
+    for i, number in enumerate(numbers.tolist()):
+        pairs = zip(design.axes, values[i], strict=True)
+        changes = [axis.change(value) for axis, value in pairs]
+        if study.on == "simulated":
+            changes.append(f"simulated.seed={seeds[i]}")
+        points[number] = [changes, found.reasons[number], bytes(named[i]).hex()]
     return {
         "title": study.title,
         "sentences": list(sentences),
         "plots": [plot.to_dict() for plot in drawn],
+        "points": points,
     }
+
+
+@dataclass(frozen=True)
+class SeenPoint:
+    """A point that the figures show.
+
+    Attributes:
+        changes: of the study's scene, as ``--set`` takes them.
+        reason: why it was refused or failed; "" otherwise.
+        address: by which its run is found; "" where none is kept.
+    """
+
+    changes: tuple[str, ...]
+    reason: str
+    address: str
+
+    def __str__(self) -> str:
+        told = ", ".join(self.changes).replace("=", " = ")
+        return f"{told}: {self.reason}" if self.reason else told
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +131,7 @@ class SeenStudy:
         title: for people.
         sentences: what it says, or how far it is.
         plots: its figures so far.
+        points: those that the figures show, by their number.
         running: whether somebody carries it out now.
     """
 
@@ -98,7 +139,39 @@ class SeenStudy:
     title: str
     sentences: tuple[str, ...]
     plots: tuple[Plot, ...]
+    points: Mapping[int, SeenPoint]
     running: bool
+
+    def scene_of(self, number: int) -> Path:
+        """A file with the scene of a point, complete, with its seed.
+
+        Raises:
+            SceneError: the scene refuses the point.
+            RecordingError: the folder cannot be written.
+        """
+        scene = load(self.folder / SCENE, self.points[number].changes)
+        file = self.folder / f"point-{number}.toml"
+        _write(file, scene)
+        return file
+
+    def run_of(self, number: int) -> Path | None:
+        """The folder of a point's run, whichever study beside made it; None without."""
+        address = self.points[number].address
+        for named in self.folder.parent.glob(f"*/{RUNS}/{BY_POINT}/{address or '-'}"):
+            run = named.parent.parent / named.read_text(encoding="utf-8")
+            if run.is_dir():
+                return run
+        return None
+
+
+def _write(file: Path, scene: Scene) -> None:
+    try:
+        file.write_text(scene.to_toml(), encoding="utf-8")
+    except OSError as reason:
+        raise RecordingError(
+            f"{file} cannot be written: {reason.strerror}. Make room, or make the "
+            "folder writable."
+        ) from reason
 
 
 def studies_in(*roots: Path) -> list[Path]:
@@ -122,7 +195,12 @@ def look_at(folder: Path) -> SeenStudy:
         if file.name == LIVE and not running:
             sentences += ("Nobody computes it now; start it again and it goes on.",)
         drawn = tuple(Plot.from_dict(plot) for plot in told["plots"])
-        return SeenStudy(folder, str(told["title"]), sentences, drawn, running)
+        points = {
+            int(number): SeenPoint(tuple(changes), str(reason), str(address))
+            for number, (changes, reason, address) in told.get("points", {}).items()
+        }
+        title = str(told["title"])
+        return SeenStudy(folder, title, sentences, drawn, points, running)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunFolderError(
             f"{folder} holds no study that can be read ({type(error).__name__}: "

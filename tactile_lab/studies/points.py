@@ -29,6 +29,9 @@ from tactile_lab.studies.shelf import Batch
 from tactile_lab.studies.study import Study
 from tactile_lab.trial import Protocol
 
+RUNS, BY_POINT = "runs", "by-point"
+"""Folders of a study: of the runs that are kept, and in it files by the addresses of
+points, each with the name of its run."""
 SCENES = 64
 """Scenes that differ in more than numbers of the sensor, kept with their force."""
 
@@ -54,11 +57,14 @@ class Points:
     Args:
         study: which.
         runs: where run folders are kept; None to keep none of a simulated bench.
+
+    Attributes:
+        runs: the same.
     """
 
     def __init__(self, study: Study, runs: Path | None = None) -> None:
         self._study = study
-        self._runs = runs
+        self.runs = runs
         self._axes = Axes(study.design.axes, study.scene)
         self._with = lru_cache(SCENES)(self._scene_and_force)
 
@@ -83,7 +89,9 @@ class Points:
         for row in left.tolist():
             values = by_point([column[row : row + 1] for column in task.columns])
             try:
-                one = self.compute(values[0] if values else (), int(task.repeats[row]))
+                address = bytes(task.addresses[row]).hex()
+                repeat = int(task.repeats[row])
+                one = self.compute(values[0] if values else (), repeat, address)
             except UnsafeError:
                 raise
             except Exception as error:  # whatever a user's protocol or function raises
@@ -96,7 +104,9 @@ class Points:
         columns = {name: placed(some, size) for name, some in parts.items()}
         return Batch(task.addresses, columns, reasons)
 
-    def compute(self, values: Sequence[Any], repeat: int) -> dict[str, Value]:
+    def compute(
+        self, values: Sequence[Any], repeat: int, address: str
+    ) -> dict[str, Value]:
         """What is kept of one point, by name.
 
         Raises:
@@ -104,7 +114,7 @@ class Points:
         """
         if self._study.on == "model":
             return self._modelled(values)
-        return self._run(self._scene(values), repeat)
+        return self._run(self._scene(values), repeat, address)
 
     # --- the model alone
 
@@ -212,7 +222,7 @@ class Points:
 
     # --- the whole bench
 
-    def _run(self, scene: Scene, repeat: int) -> dict[str, Value]:
+    def _run(self, scene: Scene, repeat: int, address: str) -> dict[str, Value]:
         from tactile_lab.engine.execution import Execution
         from tactile_lab.report.findings import find
         from tactile_lab.report.from_run import read
@@ -221,10 +231,14 @@ class Points:
         seed = int(seeds_of(self._study, np.array([repeat]))[0])
         scene = replace(scene, simulated=replace(scene.simulated, seed=seed))
         with ExitStack() as stack:
-            folder = self._runs or Path(
+            folder = self.runs or Path(
                 stack.enter_context(TemporaryDirectory(prefix="tactile-lab-"))
             )
             done = Execution(scene, folder, realtime=self._study.on == "bench").run()
+            if self.runs is not None:
+                named = self.runs / BY_POINT / address
+                named.parent.mkdir(exist_ok=True)
+                named.write_text(done.folder.name, encoding="utf-8")
             if not done.off.verified:
                 raise UnsafeError(done.off.text) from done.failure
             if done.failure is not None:

@@ -113,6 +113,7 @@ class StudyFile(SceneTable):
     repeat: Annotated[int, Field(ge=1)] = 1
     seed: Annotated[int, Field(ge=0)] = 1
     order: Order = "random"
+    runs: bool = False
     keep: tuple[str, ...] | dict[str, str] = ALWAYS
     set: dict[str, Any] = field(default_factory=dict)
     axis: tuple[AxisTable, ...] = ()
@@ -134,6 +135,7 @@ class Study:
         kept: what is kept of each.
         require: what makes a point good, by the name of what is kept.
         order: in which a bench plays the points.
+        keeps_runs: whether the run of each point is kept whole.
         source: the file's contents, kept with the results.
     """
 
@@ -145,6 +147,7 @@ class Study:
     kept: tuple[Kept, ...]
     require: Mapping[str, Limits]
     order: Order
+    keeps_runs: bool
     source: Mapping[str, Any]
 
     def __repr__(self) -> str:
@@ -201,6 +204,11 @@ def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
             f"{origin}: repeat = {table.repeat}, but the model gives the same each "
             'time; leave repeat out, or say on = "simulated".'
         )
+    if table.on == "model" and table.runs:
+        raise SceneError(
+            f"{origin}: runs = true, but the model makes no runs; leave it out, or say "
+            'on = "simulated".'
+        )
     drawn = any(one.spread is not None for one in axes)
     if not drawn and "draw" in data:
         raise SceneError(f"{origin}: [draw] draws no axis; give one normal or uniform.")
@@ -221,6 +229,7 @@ def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
         kept=keeping,
         require=_limits(table.require, keeping, origin),
         order=table.order,
+        keeps_runs=table.runs or table.on == "bench",
         source=data,
     )
     _check(study)
@@ -316,6 +325,7 @@ def short(scene: Scene, sweeps: tuple[str, ...], repeat: int) -> Study:
         kept=kept(ALWAYS, Path.cwd(), on),
         require={},
         order="random",
+        keeps_runs=on == "bench",
         source={"scene": scene.name, "sweep": list(sweeps), "repeat": repeat},
     )
     _check(study)

@@ -96,6 +96,7 @@ class Pool:
         start: gives an executor that sends them work; called again where all of its
             workers are gone.
         study: what they compute.
+        runs: where they keep runs; None to keep none.
         shelf: where the batches are put.
         count: how many they are.
         lost: what an executor raises where its workers are gone for good.
@@ -106,6 +107,7 @@ class Pool:
         self,
         start: Callable[[], Executor],
         study: Study,
+        runs: Path | None,
         shelf: Shelf,
         count: int,
         lost: tuple[type[BaseException], ...] = (),
@@ -115,7 +117,7 @@ class Pool:
         self.count = count
         self._start = start
         self._shelf, self._into = shelf, shelf.folder if local else None
-        self._study = pickle.dumps(_without_points(study))
+        self._study = pickle.dumps((_without_points(study), runs))
         self._lost: tuple[type[BaseException], ...] = (
             BrokenExecutor,
             CancelledError,
@@ -213,17 +215,24 @@ def workers(
             )
         yield Alone(points, shelf)
     elif scheduler is not None:
+        if study.keeps_runs:
+            raise SceneError(
+                "runs = true keeps each run on this machine; leave it out, or "
+                "--scheduler."
+            )
         with _client(scheduler) as client:
             from distributed.scheduler import KilledWorker
 
             threads = sum(client.nthreads().values())
             lost = (KilledWorker, OSError)
-            yield Pool(client.get_executor, study, shelf, threads, lost, local=False)
+            yield Pool(
+                client.get_executor, study, None, shelf, threads, lost, local=False
+            )
     elif count == 1:
         yield Alone(points, shelf)
     else:
         count = count or os.cpu_count() or 1
-        yield Pool(lambda: _processes(count), study, shelf, count)
+        yield Pool(lambda: _processes(count), study, points.runs, shelf, count)
 
 
 def _processes(count: int) -> Executor:
@@ -303,7 +312,7 @@ def _check_versions(client: Any, address: str) -> None:
 
 @lru_cache(maxsize=2)
 def _points(study: bytes) -> Points:
-    return Points(pickle.loads(study))
+    return Points(*pickle.loads(study))
 
 
 def _on_worker(study: bytes, task: Task, into: Path | None) -> Batch | Stored:

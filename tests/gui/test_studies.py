@@ -3,10 +3,13 @@
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtTest import QTest
 
 from gui.dialogs.studies import StudiesCard
 from gui.look.theme import Theme
 from tactile_lab.errors import RunFolderError
+from tactile_lab.scene.load import load
 from tactile_lab.studies.carry_out import Progress, carry_out
 from tactile_lab.studies.live import look_at, studies_in
 from tactile_lab.studies.page import write_page
@@ -41,12 +44,50 @@ def test_figures_come_with_the_points_and_stay(lab, tmp_path: Path) -> None:
     card.refresh()
     assert card.choice.currentText() == "onset" and card.state.text() == "At rest"
     assert "18 points of demo" in card.text.text()
-    assert len([one for one in card.figures if one.plot is not None]) == 2
+    names = [one.plot.name for one in card.figures if one.plot is not None]
+    assert names == ["map", "response_0", "response_1"]
     assert card.page.isEnabled()
     (out / "onset" / "results.json").write_text("{")
     card.refresh()
     assert "holds no study that can be read" in card.text.text()
     card.hide()
+    card.deleteLater()
+
+
+def test_a_click_on_a_cell_puts_its_scene_into_the_form(lab, tmp_path: Path) -> None:
+    resistors = {"key": "sensor.R1", "values": ["9 MOhm", "10 MOhm", "-1 MOhm"]}
+    asked = load_study({**ASKED, "axis": [ASKED["axis"][0], resistors]}, "onset")
+    write_page(carry_out(asked, tmp_path, count=1), tmp_path / "onset")
+    card = StudiesCard(lab.window, Theme("light"))
+    opened: list[Path] = []
+    card.opened.connect(opened.append)
+    card.show_studies((tmp_path,))
+    lab.app.processEvents()
+    figure = card.figures[0]
+
+    def click(V_GS: float, megohms: float, done) -> None:
+        """As soon as the figure has its place."""
+        box = figure.panels[0].box
+
+        def clicked() -> bool:
+            at = figure.mapFromScene(box.mapViewToScene(QPointF(V_GS, megohms)))
+            if card.isVisible():
+                QTest.mouseClick(figure.viewport(), Qt.MouseButton.LeftButton, pos=at)
+            return done()
+
+        lab.until(clicked)
+
+    assert figure.plot is not None and figure.plot.name == "map"
+    assert "V_GS = 1.4 V, sensor.R1 = 10000000.0 Ohm" in figure.tell(13)
+    click(1.38, -1.0, lambda: "R1 = -1e+06 Ohm must lie betw" in card.hint.text())
+    assert card.isVisible() and not opened
+    click(1.401, 10.1, lambda: opened)
+    assert not card.isVisible()
+    (file,) = opened
+    circuit = load(file).circuit
+    assert (circuit.V_GS, circuit.R1) == (1.4, 10e6)
+    lab.window.screen_.open_point(file)
+    assert lab.window.setup.subject.path == str(file)
     card.deleteLater()
 
 

@@ -22,9 +22,12 @@ from tactile_lab.errors import (
     RecordingError,
     SceneError,
 )
+from tactile_lab.scene.load import load
+from tactile_lab.store.run import Run
 from tactile_lab.studies.addresses import code_digests
 from tactile_lab.studies.carry_out import Progress, carry_out, forecast
 from tactile_lab.studies.dataset import Gathered
+from tactile_lab.studies.live import look_at
 from tactile_lab.studies.page import write_page
 from tactile_lab.studies.study import Study, load_study
 from tactile_lab.studies.workers import _check_versions
@@ -209,6 +212,27 @@ def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
     assert numbers["noise"][0] != numbers["noise"][1]
 
 
+def test_the_run_of_a_point_is_kept_and_found_again(tmp_path: Path) -> None:
+    axis = {"key": "sensor.V_GS", "values": ["1.4 V", "1.41 V"]}
+    asked = {**SHORT, "on": "simulated", "keep": ["spike_count"], "axis": [axis]}
+    plain = load_study({**asked, "seed": 2}, "plain")
+    kept = load_study({**asked, "runs": True}, "kept")
+    for one in (plain, kept):
+        found, _ = done(one, tmp_path, count=2)
+        write_page(found, tmp_path / one.name)
+    seen, none = look_at(tmp_path / "kept"), look_at(tmp_path / "plain")
+    for number, count in enumerate(found.numbers()["spike_count"]):
+        folder = seen.run_of(number)
+        assert folder is not None and none.run_of(number) is None
+        with Run.load(folder) as run:
+            assert len(run.spikes) == count
+            again = load(none.scene_of(number))
+            assert again.circuit == run.scene.circuit
+            assert again.simulated.seed == 2 * run.scene.simulated.seed
+    with pytest.raises(SceneError, match="runs = true"):
+        done(kept, tmp_path / "other", count=None, scheduler="tcp://127.0.0.1:9")
+
+
 TIMES = {"spike_times": {"most": 1}}
 ZIPPED = {"key": "sensor.R1", "normal": "1 %", "zip": "a"}
 VAST = {"key": "sensor.R1", "values": "1 MOhm : 2 MOhm : 1 mOhm"}
@@ -237,6 +261,7 @@ BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
         ({"require": {"spike_count": {"least": 3, "most": 2}}}, "lies above most"),
         ({"require": {"spike_count": {}}}, "asks for nothing"),
         ({"repeat": 2}, "the model gives the same"),
+        ({"runs": True}, "makes no runs"),
         ({"on": "bench"}, "needs real instruments"),
         ({"require": {"spikes": {"least": 1}}}, "nothing of that name is kept"),
         ({"draw": {"points": 4}}, "draws no axis"),
