@@ -44,6 +44,10 @@ STEPS: dict[str, tuple[float, str]] = {
     "streaming": (5, f"{BENCHMARKS}/sustained.py --out docs/streaming-figures.md"),
     "day": (240, f"{BENCHMARKS}/day_long.py --out docs/day-figures.md"),
     "live": (12, f"{BENCHMARKS}/live_lsl.py --out docs/live-figures.md"),
+    "live window": (
+        12,
+        f"{BENCHMARKS}/live_lsl.py --window --out docs/live-window-figures.md",
+    ),
     "serial": (5, f"{BENCHMARKS}/serial_bench.py --out docs/serial-figures.md"),
     "force": (5, f"{BENCHMARKS}/force_following.py --out docs/force-figures.md"),
     "scope": (5, f"{BENCHMARKS}/scope_stream.py --out docs/scope-figures.md"),

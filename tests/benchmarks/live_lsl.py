@@ -1,10 +1,11 @@
 """From a spike to who hears of it by LSL, and what a killed subscriber misses.
 
-    python tests/benchmarks/live_lsl.py [--seconds 600] [--out docs/live-figures.md]
+    python tests/benchmarks/live_lsl.py [--window] [--seconds 600] [--out FILE]
 
-The whole program in real time on the built-in bench, four channels at 1 MS/s stored,
-with two subscribers in processes of their own: one stays, the other is killed with
-SIGKILL every 30 s and started again. A delay is LSL's clock when a sample was heard,
+The whole program in real time on the built-in bench, four channels at 1 MS/s stored:
+`tactile-lab run`, or with --window a run of the window (`live_window.py`). Of two
+subscribers in processes of their own one stays, the other is killed with SIGKILL every
+30 s and started again. A delay is LSL's clock when a sample was heard,
 less the sample's time stamp: it holds the scope's polls, detection, LSL and the way to
 the other process. Takes --seconds and about a minute; the exit code is 1 where the
 run lost a sample or a spike, or a subscriber missed one while it was connected.
@@ -28,6 +29,18 @@ from provenance import provenance
 
 HOLD, REST = 1.0, 2.0
 KILL_EVERY = 30.0
+HERE = Path(__file__).parent
+SCENE = """
+[protocol]
+name = "pulses"
+levels = {levels}
+hold = "{hold} s"
+rest = "{rest} s"
+
+[record]
+sample_rate = "1 MS/s"
+signals = ["coil_current", "V_C1", "V_C2", "V_K", "spikes"]
+"""
 SUBSCRIBER = """
 import sys
 import pylsl
@@ -69,29 +82,27 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seconds", type=float, default=600.0)
     options.add_argument("--out", type=Path)
+    options.add_argument("--window", action="store_true")
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        table, sound = measured(chosen.seconds, Path(folder))
+        table, sound = measured(chosen.seconds, chosen.window, Path(folder))
     print(table)
     if chosen.out is not None:
         chosen.out.write_text(table, encoding="utf-8")
     return 0 if sound else 1
 
 
-def measured(seconds: float, folder: Path) -> tuple[str, bool]:
+def measured(seconds: float, window: bool, folder: Path) -> tuple[str, bool]:
     """The page, and whether nothing was lost; `folder` takes the run."""
     presses = round(seconds / (HOLD + REST + 0.5))
+    scene = folder / "live.toml"
     levels = json.dumps(["160 mN"] * presses)
-    verb = [sys.executable, "-m", "tactile_lab", "run", "demo", "--realtime", "--json"]
-    verb += ["--live", "lsl", "--no-report", "--out", str(folder / "runs")]
-    for change in (
-        f"protocol.levels={levels}",
-        f"protocol.hold={HOLD} s",
-        f"protocol.rest={REST} s",
-        "record.sample_rate=1 MS/s",
-        'record.signals=["coil_current", "V_C1", "V_C2", "V_K", "spikes"]',
-    ):
-        verb += ["--set", change]
+    scene.write_text(SCENE.format(levels=levels, hold=HOLD, rest=REST))
+    runs = str(folder / "runs")
+    verb = [sys.executable, "-m", "tactile_lab", "run", str(scene), "--realtime"]
+    verb += ["--json", "--live", "lsl", "--no-report", "--out", runs]
+    if window:
+        verb = [sys.executable, str(HERE / "live_window.py"), str(scene), runs]
     load = os.getloadavg()[0]
     with (folder / "said").open("w+") as said:
         run = subprocess.Popen(verb, stdout=subprocess.PIPE, stderr=said, text=True)
@@ -142,14 +153,16 @@ def measured(seconds: float, folder: Path) -> tuple[str, bool]:
         ("delay of the other, ms", quantiles(late)),
     ]
     sound = not (lost["samples"] or lost["spikes"] or missed or gaps)
+    ran = "a run of the window, painted offscreen," if window else "the whole program"
+    option, opened = (" --window", ", the window open") if window else ("", "")
     lines = [
-        "# Spikes told live, in figures",
+        f"# Spikes told live{opened}, in figures",
         "",
         f"{provenance()}, load {load:.1f} as it began. Made by "
-        f"`tests/benchmarks/live_lsl.py --seconds {seconds:g}`: the whole program in "
-        "real time on the built-in bench, four channels at 1 MS/s, simulated far ends "
-        "in the same process, `--live lsl`. A delay is from the sample of the spike, "
-        "by the run's first sample and the scope's clock, to the subscriber.",
+        f"`tests/benchmarks/live_lsl.py{option} --seconds {seconds:g}`: {ran} in real "
+        "time on the built-in bench, four channels at 1 MS/s, simulated far ends in "
+        "the same process as the drivers. A delay is from the sample of the spike, by "
+        "the run's first sample and the scope's clock, to the subscriber.",
         "",
         "| | |",
         "|---|---|",

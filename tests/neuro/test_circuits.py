@@ -95,6 +95,7 @@ def test_nestml_says_the_circuit_in_its_units(tmp_path):
     text = model.read_text()
     assert "R_L GOhm = 0.5 GOhm" in text and "C2 pF = 150.0 pF" in text
     assert "V_fire mV = 3213.0 mV" in text and "$" not in text
+    assert "timestep()" not in text  # which NESTML compiles in `update` alone
     assert np.array_equal(np.load(force)["force"], PUSH.value)
 
 
