@@ -73,3 +73,28 @@ def test_a_calibrated_field_is_held_to_a_tenth(run_scene, tmp_path):
     assert any("where the calibration has 10.97 mT" in text for text in told)
     told = warnings(run_scene(*SHORT, MEASURED, calibrated, bench=with_field(0.95)))
     assert not any("teslameter reads" in text for text in told)
+
+
+CHANGING = ('record.signals=["coil_current", "field"]', "record.sample_rate=20 kS/s")
+
+
+@pytest.mark.parametrize(
+    ("scene", "factor", "told"),
+    [("vibration", 1.0, 0), ("vibration", -1.0, 1), ("texture", 0.25, 1)],
+)
+def test_the_field_of_a_force_that_changes_is_compared_by_its_mean(
+    run_scene, scene, factor, told
+):
+    few = (
+        "protocol.presentations_each=1" if scene == "vibration" else "protocol.passes=1"
+    )
+    ran = run_scene(*CHANGING, few, scene=scene, bench=with_field(factor))
+    said = [text for text in warnings(ran) if "the teslameter reads" in text]
+    assert len(said) == told
+
+
+def test_the_shunt_of_a_force_that_changes_is_compared_by_its_mean(run_scene):
+    dead = 'simulated.open_probes=["coil_current"]'
+    few = "protocol.passes=1"
+    said = warnings(run_scene(*CHANGING, few, dead, scene="texture"))
+    assert any("the shunt shows" in text for text in said)
