@@ -157,6 +157,13 @@ def exports_option(help_: str) -> Decorator:
     )
 
 
+scheduler_option: Decorator = click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="A Dask scheduler whose workers compute instead.",
+)
+
+
 notes_option: Decorator = click.option(
     "--note",
     "notes",

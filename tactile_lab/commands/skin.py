@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactile_lab.commands.options import exports_option, json_option
+from tactile_lab.commands.options import exports_option, json_option, scheduler_option
 from tactile_lab.commands.terminal import (
     ProgressLine,
     print_json,
@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="Of the data set.",
 )
+@scheduler_option
 @json_option
 def command(
     skin: Path | None,
@@ -83,6 +84,7 @@ def command(
     dataset: Path | None,
     touches: int,
     seed: int,
+    scheduler: str | None,
     as_json: bool,
 ) -> None:
     """Press on the array of sensors that SKIN, a TOML file, describes.
@@ -90,14 +92,18 @@ def command(
     Writes the spikes of all taxels in order of time, and a page with a film of them.
     """
     if dataset is not None and skin is None:
-        if window or only_plan or exports:
-            raise click.UsageError("--dataset takes no --window, --plan or --export.")
+        if window or only_plan or exports or scheduler:
+            raise click.UsageError(
+                "--dataset takes no --window, --plan, --export or --scheduler."
+            )
         _make_dataset(dataset, touches, seed, cores, as_json)
         return
     if skin is None or dataset is not None:
         raise click.UsageError("Give SKIN, a TOML file, or --dataset FOLDER.")
+    if scheduler and cores:
+        raise click.UsageError("--scheduler takes no --cores: its workers compute.")
     if window:
-        _show(skin, out, only_plan, cores, exports, as_json)
+        _show(skin, out, only_plan, cores, exports, scheduler, as_json)
         return
     with refusing():
         from tactile_lab.neuro.formats import format_of, write
@@ -118,7 +124,9 @@ def command(
             return
         folder = out / asked.name
         with ProgressLine(asked.array.size, asked.name) as line:
-            done = press(asked, folder, cores=cores, tell=line.update)
+            done = press(
+                asked, folder, cores=cores, scheduler=scheduler, tell=line.update
+            )
         events = Events.read(folder)
         with working("writing the report"):
             adaptation = adaptation_of(asked, events)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactile_lab.commands.options import json_option
+from tactile_lab.commands.options import json_option, scheduler_option
 from tactile_lab.commands.terminal import (
     ProgressLine,
     fail,
@@ -32,11 +32,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="Processes on this machine; as many as cores unless given.",
 )
-@click.option(
-    "--scheduler",
-    metavar="tcp://HOST:PORT",
-    help="A Dask scheduler whose workers compute instead.",
-)
+@scheduler_option
 @click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),

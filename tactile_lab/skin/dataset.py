@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.circuit import FloatArray
+from tactile_lab.skin.blocks import solve_block
 from tactile_lab.skin.bound import spans
 from tactile_lab.skin.events import recording
 from tactile_lab.skin.forces import Loads
-from tactile_lab.skin.press import solve_block
 from tactile_lab.skin.skin import Skin, load_skin
 
 FILE = "touches.h5"
@@ -226,7 +226,7 @@ def _spikes(seed: int, task: str, number: int) -> tuple[FloatArray, NDArray[np.i
     skin = touch(seed, task, number)
     n, loads = skin.array.size, Loads(skin)
     role, (span, _) = np.zeros(n, np.uint8), spans(skin, loads)
-    count, _, _, _, times = solve_block(skin, loads, slice(0, n), role, span)
-    taxel = np.repeat(np.arange(n, dtype=np.int32), count)
-    order = np.lexsort((taxel, times))
-    return times[order], taxel[order]
+    found = solve_block(loads, slice(0, n), role, span)
+    taxel = np.repeat(np.arange(n, dtype=np.int32), found.spikes)
+    order = np.lexsort((taxel, found.times))
+    return found.times[order], taxel[order]

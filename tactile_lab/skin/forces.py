@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -354,6 +355,15 @@ class Loads:
         area = skin.array.side**2
         self._given = (skin.array.depth, area, rows, courses, self.time, slides)
         self._own = threading.local()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: without forces of files, which it may not have."""
+        bare = replace(self.skin, frames=(), source={}, array=replace(self.skin.array))
+        return {"skin": bare, "time": self.time, "_given": self._given}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """As another process has it."""
+        vars(self).update(state, _own=threading.local())
 
     @property
     def pressing(self) -> Pressing:

@@ -7,9 +7,9 @@ import numpy as np
 from tactile_lab.model.batch import records
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.plot import Mark, Panel, Plot, Series
+from tactile_lab.skin.blocks import solved
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
-from tactile_lab.skin.press import solved
 from tactile_lab.skin.skin import Skin
 
 PLACES = 81

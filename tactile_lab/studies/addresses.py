@@ -6,17 +6,15 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
-from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.engine.cluster import code_digests
 from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.planning.preview import DEFAULT_TOLERANCE
-from tactile_lab.plugins import registered
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.studies.axes import Axis, changed
@@ -29,14 +27,6 @@ NAME = np.dtype(f"V{ADDRESS}")
 """Addresses as numpy holds them."""
 AT_ONCE = 50_000
 """Points whose addresses are made at a time."""
-REGISTERED = (
-    "tactile_lab.drivers",
-    "tactile_lab.far_ends",
-    "tactile_lab.benches",
-    "tactile_lab.protocols",
-)
-"""Groups of entry points whose packages a point may depend on."""
-
 Columns = Sequence[Sequence[Any] | FloatArray]
 """Of each axis the values at some points, see `Design.columns`."""
 
@@ -181,25 +171,3 @@ def _digest(study: Study, axes: Axes, others: tuple[Any, ...]) -> bytes:
         [study.on, data, files, kept, DEFAULT_TOLERANCE, code_digests()], sort_keys=True
     )
     return hashlib.blake2b(whole.encode(), digest_size=ADDRESS).digest()
-
-
-@cache
-def code_digests() -> dict[str, str]:
-    """Of the source of each package that a point may depend on, by package."""
-    from importlib.util import find_spec
-
-    modules = {
-        entry.module for group in REGISTERED for entry in registered(group).values()
-    }
-    digests = {}
-    for package in sorted({name.partition(".")[0] for name in (__name__, *modules)}):
-        spec = find_spec(package)
-        if spec is None:
-            continue
-        found = hashlib.blake2b(digest_size=ADDRESS)
-        for place in spec.submodule_search_locations or ():
-            for path in sorted(Path(place).rglob("*.py")):
-                found.update(str(path.relative_to(place)).encode())
-                found.update(path.read_bytes())
-        digests[package] = found.hexdigest()
-    return digests

@@ -22,20 +22,16 @@ from multiprocessing import parent_process
 from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from threading import Thread
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
-from tactile_lab.studies.addresses import code_digests
+from tactile_lab.engine.cluster import cluster
+from tactile_lab.errors import LinkLostError, SceneError
 from tactile_lab.studies.points import Points, Task
 from tactile_lab.studies.shelf import Batch, Shelf, put
 from tactile_lab.studies.study import Study
 
 AHEAD = 2
 """Batches that wait at each worker, so that none stands idle."""
-ANSWER = 60.0
-"""For which a Dask worker is waited for to tell its version, s."""
-SCHEMES = ("tcp://", "inproc://", "tls://", "ucx://", "ws://", "wss://")
-"""With which an address of a scheduler may begin."""
 MOST_ENDED = 3
 """So often in a row workers may be ended from outside before a batch is finished."""
 
@@ -220,7 +216,7 @@ def workers(
                 "runs = true keeps each run on this machine; leave it out, or "
                 "--scheduler."
             )
-        with _client(scheduler) as client:
+        with cluster(scheduler) as client:
             from distributed.scheduler import KilledWorker
 
             threads = sum(client.nthreads().values())
@@ -245,69 +241,6 @@ def _end_with_parent() -> None:
     if parent is not None:
         sentinel = parent.sentinel
         Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
-
-
-@contextmanager
-def _client(address: str) -> Iterator[Any]:
-    try:
-        import distributed
-    except ImportError as reason:
-        raise NotFoundError(
-            "--scheduler needs Dask: pip install 'tactile-lab[cluster]'."
-        ) from reason
-    if not address.startswith(SCHEMES):
-        raise NotFoundError(
-            f"--scheduler {address}: write its address, such as tcp://HOST:8786."
-        )
-    try:
-        open_client: Any = distributed.Client  # untyped
-        client = open_client(address, timeout="5s", set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as reason:
-        raise NotFoundError(
-            f"The scheduler {address} does not answer: {reason}. Is `dask scheduler` "
-            "running there, and the address of the form tcp://HOST:8786?"
-        ) from reason
-    try:
-        _check_versions(client, address)
-        yield client
-    finally:
-        client.close()
-
-
-def _check_versions(client: Any, address: str) -> None:
-    """Refuse workers that would compute something else."""
-    if not client.nthreads():
-        raise NotFoundError(f"The scheduler {address} has no workers; start some.")
-    try:
-        asked = {
-            where: client.submit(code_digests, workers=[where], pure=False)
-            for where in client.nthreads()
-        }
-        theirs = {where: one.result(timeout=ANSWER) for where, one in asked.items()}
-    except OSError as reason:  # a timeout, too
-        raise LinkLostError(
-            f"The scheduler {address} or one of its workers went silent: {reason}. "
-            "Nothing is lost; start the study again."
-        ) from reason
-    except ImportError as reason:
-        raise SceneError(
-            f"Workers of {address} lack this program ({reason}); install the same "
-            "version on each."
-        ) from reason
-    ours = code_digests()
-    for where, found in theirs.items():
-        missing = [package for package in ours if package not in found]
-        other = [p for p, digest in found.items() if ours.get(p, digest) != digest]
-        if missing or other:
-            what = (
-                f"lacks {', '.join(missing)}"
-                if missing
-                else f"has another version of {', '.join(other)}"
-            )
-            raise SceneError(
-                f"The worker {where} of {address} {what}; install the same version of "
-                "this program on each."
-            )
 
 
 @lru_cache(maxsize=2)

@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from tactile_lab.model.batch import critical_forces, records
 from tactile_lab.model.specimen import parts
-from tactile_lab.skin import kernel, press
+from tactile_lab.skin import blocks, kernel
 from tactile_lab.skin.bound import least_critical, spans
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
+from tactile_lab.skin.press import press
 from tactile_lab.skin.single import force_of, simulate_taxel
 from tactile_lab.skin.skin import load_skin
 
@@ -119,9 +120,9 @@ def test_a_taxel_left_out_is_told_with_its_bound(preset, tmp_path, monkeypatch):
         drawn.extend(numbers)
         return parts(circuit, numbers)
 
-    monkeypatch.setattr(press, "parts", noted)
+    monkeypatch.setattr(blocks, "parts", noted)
     skin = skin_of("sphere", "0.3 N", preset, at=["4 mm", "2 mm"])
-    done = press.press(skin, tmp_path)
+    done = press(skin, tmp_path)
     events = Events.read(tmp_path)
     out = events.role == kernel.UNTOUCHED
     assert done.taxels["left out"] == out.sum() > 0

@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from tactile_lab.cli import cli as command_line
-from tactile_lab.errors import ParameterError, SolverError
+from tactile_lab.errors import NotFoundError, ParameterError, SolverError
 from tactile_lab.skin import kernel
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.forces import Loads
@@ -178,3 +178,38 @@ def test_from_the_command_line_to_a_page(tmp_path, monkeypatch):
     assert (tmp_path / "tap.npy").exists()
     wrong = run(command_line, ["skin", "none.toml"])
     assert wrong.exit_code != 0 and "does not exist" in wrong.output
+
+
+def test_a_dask_cluster_gives_the_same_to_the_last_bit(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    np.save(tmp_path / "f.npy", np.linspace(0, 0.1, 270).reshape(3, 90))
+    frames = {"kind": "frames", "file": "f.npy", "rate": "10 S/s"}
+    more = {**SLIDE, "stimulus": [*SLIDE["stimulus"], frames]}
+    skin = load_skin(more, folder=tmp_path)
+    press(skin, tmp_path / "here")
+    (tmp_path / "there").mkdir()
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        press(skin, tmp_path / "there", scheduler=cluster.scheduler_address)
+    here, there = (Events.read(tmp_path / name) for name in ("here", "there"))
+    assert here.time.size > 0
+    for name in ("time", "taxel", "count", "role", "largest_force"):
+        assert np.array_equal(getattr(here, name)[:], getattr(there, name)[:]), name
+
+
+def test_a_scheduler_that_cannot_be_used_is_named_and_nothing_is_left(tmp_path):
+    skin = load_skin(SLIDE)
+    for address, told in (
+        ("tcp://127.0.0.1:9", "does not answer"),
+        ("somewhere:8786", "such as tcp://HOST:8786"),
+    ):
+        with pytest.raises(NotFoundError, match=told):
+            press(skin, tmp_path / "s", scheduler=address)
+        assert not list((tmp_path / "s").iterdir())
+    (tmp_path / "s.toml").write_text(
+        'duration = "0.1 s"\n[array]\ngrid = [2, 2]\n[[stimulus]]\nkind = "sphere"\n'
+    )
+    words = ["skin", str(tmp_path / "s.toml"), "--scheduler", "tcp://127.0.0.1:9"]
+    refused = CliRunner().invoke(command_line, [*words, "--cores", "2"])
+    assert refused.exit_code == 2 and "no --cores" in refused.output

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 
 from tactile_lab import simulate, study
 from tactile_lab.cli import cli
+from tactile_lab.engine.cluster import _check_versions, code_digests
 from tactile_lab.errors import (
     LinkLostError,
     NotFoundError,
@@ -24,13 +25,11 @@ from tactile_lab.errors import (
 )
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
-from tactile_lab.studies.addresses import code_digests
 from tactile_lab.studies.carry_out import Progress, carry_out, forecast
 from tactile_lab.studies.dataset import Gathered
 from tactile_lab.studies.live import look_at
 from tactile_lab.studies.page import write_page
 from tactile_lab.studies.study import Study, load_study
-from tactile_lab.studies.workers import _check_versions
 
 SHORT = {
     "scene": "demo",
