@@ -455,7 +455,7 @@ def table(rows: list[dict[str, Any]], page: str = "") -> str:
             if len(seen) > 1 and np.ptp(errors) < SAME:
                 inside = "one number repeated | – | cannot tell"
             lines.append(
-                f"| {case} | {name} | {len(seen)} of {draws} | {inside} "
+                f"| {case} | {name} | {len(seen)} in {draws} | {inside} "
                 f"| {np.mean(errors):+.2f} | {Z95 * np.std(errors):.2f} "
                 f"| {refused[case]} of {runs[case]} "
                 f"| {np.median(seconds[case]):.1f} s | {ends(commits[case])} |"
@@ -476,7 +476,7 @@ is known from so many runs only within the bounds given (95 %, Clopper and Pears
 runs: numbers of one run share its errors). "Yes" and "no" are said where those bounds
 lie within 93 to 97 % or wholly outside; "yes" takes about a thousand runs.
 
-| run | number | numbers of runs | holds the truth | known to | 93 to 97 %? \
+| run | number | numbers in runs | holds the truth | known to | 93 to 97 %? \
 | mean error | spread | refused | CPU | commit |
 |---|---|---|---|---|---|---|---|---|---|---|
 {body}

@@ -28,7 +28,7 @@ def test_one_number_repeated_is_no_share_of_hits(values, share):
 def test_a_case_that_was_not_measured_here_stays_on_the_page():
     made = runpy.run_path(str(PAGE))
     line = (
-        "| wiring_check | V_GS | 26 of 26 | 100.0 % | 86.8 to 100.0 % | cannot tell "
+        "| wiring_check | V_GS | 26 in 26 | 100.0 % | 86.8 to 100.0 % | cannot tell "
         "| -0.03 | 0.21 | 0 of 26 | – | 0000000 |"
     )
     row = {
@@ -38,7 +38,7 @@ def test_a_case_that_was_not_measured_here_stays_on_the_page():
     page = made["table"]([row], f"| run |\n{line}\n| rate_force, three forces | old |")
     assert line in page
     assert "| old |" not in page
-    assert "| rate_force, three forces | V_GS | 1 of 1 |" in page
+    assert "| rate_force, three forces | V_GS | 1 in 1 |" in page
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_93_to_97_is_said_of_runs_that_can_tell_it(runs, outside, said):
     page = runpy.run_path(str(PAGE))["table"](rows)
     (row,) = [line for line in page.splitlines() if "F(0) by the field |" in line]
     cells = row.split(" | ")
-    assert cells[2] == f"{3 * runs} of {runs}"
+    assert cells[2] == f"{3 * runs} in {runs}"
     assert cells[5] == said
 
 
