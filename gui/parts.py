@@ -244,6 +244,8 @@ def with_gutter(area: QScrollArea, inside: QLayout) -> QScrollArea:
         inside.setContentsMargins(0, 0, 0 if most > least else SCROLL_BAR, 0)
 
     make_room(0, 0)
+    # what has grown is painted before the area knows: squeezed into what it had
+    inside.setSizeConstraint(QLayout.SizeConstraint.SetMinimumSize)
     area.verticalScrollBar().rangeChanged.connect(make_room)
     return area
 

@@ -79,7 +79,8 @@ QPushButton[role="danger"] { color: $red; border: 1px solid $red; font-weight: 6
 QPushButton[role="danger"]:disabled { color: $faint; border-color: $border; }
 QPushButton[role="danger"]:hover { background: $red_soft; }
 QPushButton[role="danger"]:focus { border: 2px solid $red; padding: 4px 11px; }
-QFileDialog QToolButton, QFileDialog QToolButton:focus { padding: 2px; }
+QFileDialog QToolButton, QFileDialog QToolButton:focus { padding: 2px;
+  background: #DCE3EC; } /* Qt's own pictures are dark in both themes */
 QToolButton[role="flat"] { background: transparent; border: 1px solid transparent;
   padding: 4px; }
 QToolButton[role="flat"]:hover { background: $sunken; border-color: $border; }

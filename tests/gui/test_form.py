@@ -2,14 +2,16 @@ import gc
 import inspect
 import weakref
 from functools import reduce
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
+from gui.parts import column, push, scrolling, with_gutter
 from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
 from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter
@@ -185,3 +187,17 @@ def test_an_edited_form_may_be_forgotten(app: QApplication) -> None:
     del form
     gc.collect()
     assert gone() is None
+
+
+def test_what_grows_in_an_area_that_scrolls_is_never_squeezed(app) -> None:
+    inner, rows = QWidget(), [push(f"row {number}") for number in range(20)]
+    area = with_gutter(scrolling(inner), column(inner, *rows))
+    area.resize(200, 150)
+    area.show()
+    app.processEvents()
+    for row in rows:
+        row.setMinimumHeight(60)
+    inner.layout().activate()  # as it is before a paint, and before the area knows
+    assert [row.height() for row in rows] == [60] * 20
+    tops = [row.y() for row in rows]
+    assert min(b - a for a, b in pairwise(tops)) >= 60, "none lies over another"
