@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -10,9 +10,57 @@ from gui.session.fit import FittedRate
 from tactile_lab.analysis.spike_train import within
 from tactile_lab.measurement import FloatArray, MeasuredTrial
 from tactile_lab.plot import Mark, Panel, Plot, Series
+from tactile_lab.quantity import count
 
 COLOURS = ("rate", "force", "V_C1", "V_C2", "V_K")
 """Of the steps whose rates lie over each other, the newest first."""
+
+COLUMNS: dict[str, tuple[str, str, Callable[[MeasuredTrial], float | None]]] = {
+    "force": ("N", "m", lambda step: step.level),
+    "start": ("s", "", lambda step: step.start),
+    "spikes": ("", "", lambda step: step.response.spikes),
+    "first spike": ("s", "m", lambda step: step.response.latency),
+    "peak rate": ("Hz", "", lambda step: step.response.peak_rate),
+    "final rate": ("Hz", "", lambda step: step.response.final_rate),
+    "fall": ("%", "", lambda step: _percent(step.response.fall)),
+}
+"""What a step can be drawn by: unit, its prefix, and the value of a step, SI."""
+
+
+def column_plot(trials: Sequence[MeasuredTrial], y: str, x: str) -> Plot | None:
+    """One column of the steps against another; None where no step has both.
+
+    Args:
+        trials: the steps so far.
+        y: what is drawn, of `COLUMNS`.
+        x: what it is drawn against.
+    """
+    (y_unit, y_prefix, up), (x_unit, x_prefix, along) = COLUMNS[y], COLUMNS[x]
+    both = [(along(step), up(step)) for step in trials]
+    told = [(a, b) for a, b in both if a is not None and b is not None]
+    if not told:
+        return None
+    at, value = np.array(told, dtype=float).T
+    name = f"{len(told)} of {count(len(both), 'step')}"
+    return Plot(
+        name="columns",
+        caption=f"{y.capitalize()} of each step against its {x}.",
+        x_label=x,
+        x_unit=x_unit,
+        x_prefix=x_prefix,
+        panels=(
+            Panel(
+                label=y,
+                unit=y_unit,
+                prefix=y_prefix,
+                series=(Series(x=at, y=value, name=name, mark="points"),),
+            ),
+        ),
+    )
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100 * share
 
 
 def rate_plot(

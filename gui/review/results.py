@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from gui.look.theme import Theme
 from gui.parts import (
     STRETCH,
+    Combo,
     column,
     empty,
     label,
@@ -35,7 +36,13 @@ from gui.parts import (
 )
 from gui.plots.small_plot import SmallPlot
 from gui.review.fit_view import FitCards, TwinBars
-from gui.review.live_plots import loop_plot, rate_plot, train_plot
+from gui.review.live_plots import (
+    COLUMNS,
+    column_plot,
+    loop_plot,
+    rate_plot,
+    train_plot,
+)
 from gui.review.wording import unbroken
 from gui.session.fit import Fit, FittedRate
 from gui.session.steps import cells
@@ -78,6 +85,15 @@ class ResultsView(QWidget):
         self._steps: Sequence[MeasuredTrial] = ()
         self._model: tuple[tuple[float, float], ...] = ()
         self._laws: tuple[FittedRate, ...] = ()
+        self.drawn, self.against = Combo(), Combo()
+        self.drawn.addItems(["rates", *COLUMNS])
+        self.against.addItems(list(COLUMNS))
+        for combo, name in ((self.drawn, "Drawn"), (self.against, "Drawn against")):
+            combo.setAccessibleName(f"{name}: a column of the steps")
+            combo.currentIndexChanged.connect(self._choose_columns)
+        self._axes = QWidget()
+        offered = (self.drawn, 1), label("against", "muted"), (self.against, 1)
+        column(self._axes).addLayout(row(*offered, spacing=8))
         self._show_rates()
         self.cards = FitCards()
         self.bars = TwinBars(theme)
@@ -99,7 +115,7 @@ class ResultsView(QWidget):
         head = row(self._title, STRETCH, self.mark)
         inner = QWidget()
         self._drawn = lines()
-        rates = (self.plot, 2), (self.trains, 2), (self.loop, 2)
+        rates = (self.plot, 2), self._axes, (self.trains, 2), (self.loop, 2)
         plots = (*rates, (self._drawn, 2), (self.table, 3))
         said = (self.statements, self.tables, STRETCH)
         parts = (self.cards, *plots, *said, self.bars, self._facts, self.report)
@@ -168,8 +184,23 @@ class ResultsView(QWidget):
             else "No steps yet. Rate, onset, slope and adaptation\n"
             "are told here, step by step, as a run goes on."
         )
-        self.plot.show_plot(rate_plot(self._steps, self._model))
+        y, x = self.drawn.currentText(), self.against.currentText()
+        self.plot.show_plot(
+            rate_plot(self._steps, self._model)
+            if (y, x) == ("rates", "force")
+            else column_plot(self._steps, y, x)
+        )
         self.trains.show_plot(train_plot(self._steps, self._laws))
+
+    def _choose_columns(self) -> None:
+        """Draw what was chosen; the rates of both kinds go with the force alone."""
+        if self.drawn.currentText() == "rates" and self.against.currentIndex():
+            if self.sender() is self.drawn:
+                self.against.setCurrentText("force")
+            else:
+                self.drawn.setCurrentText("peak rate")
+        self._show_rates()
+        self._arrange()
 
     @property
     def _levelled(self) -> bool:
@@ -182,15 +213,21 @@ class ResultsView(QWidget):
         self.plot.setVisible(rates and not self.answers)
         self.trains.setVisible(rates and self.trains.plot is not None)
         self.table.setVisible(rates and self._levelled)
+        self._axes.setVisible(not self.table.isHidden() and not self.answers)
         if not rates:
             self.cards.hide()
         self._title.setText(
             "Field against current"
             if self._loops and not self.answers
-            else "Rate against force"
+            else self._drawn_title
             if rates and not self.answers
             else "Results"
         )
+
+    @property
+    def _drawn_title(self) -> str:
+        y, x = self.drawn.currentText(), self.against.currentText()
+        return f"{'Rate' if y == 'rates' else y.capitalize()} against {x}"
 
     def show_facts(self, text: str, *, report: bool) -> None:
         """Show statements on the whole run, and whether there is a report."""

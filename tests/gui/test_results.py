@@ -1,0 +1,56 @@
+"""The results: any column of the steps against any other."""
+
+import numpy as np
+import pytest
+
+from gui.look.theme import Theme
+from gui.review.live_plots import COLUMNS, column_plot
+from gui.review.results import ResultsView
+from tactile_lab.measurement import MeasuredTrial
+
+SILENT, SLOW, FAST = (
+    MeasuredTrial(
+        label=f"{level * 1e3:.0f} mN", level=level, start=100 * level, duration=3.0,
+        spike_times=np.array(times), hold=(0.0, 2.0),
+    )
+    for level, times in ((0.04, []), (0.08, [0.3, 0.5, 0.8]), (0.16, [0.1, 0.15, 0.2]))
+)  # fmt: skip
+
+
+@pytest.fixture
+def results(app) -> ResultsView:
+    view = ResultsView(Theme("light"))
+    view.show_steps([SILENT, SLOW, FAST], total=3, running=False, whole=True)
+    return view
+
+
+def drawn(view: ResultsView) -> tuple[list[float], list[float], str]:
+    (series,) = view.plot.plot.panels[0].series
+    return list(series.x), list(series.y), series.name
+
+
+def test_a_column_is_drawn_against_another(results: ResultsView) -> None:
+    results.drawn.setCurrentText("first spike")
+    results.against.setCurrentText("peak rate")
+    x, y, name = drawn(results)
+    assert x == pytest.approx([5.0, 20.0]) and y == pytest.approx([0.3, 0.1])
+    assert name == "2 of 3 steps", "one has no spike"
+    assert results._title.text() == "First spike against peak rate"
+
+
+def test_the_rates_go_with_the_force_alone(results: ResultsView) -> None:
+    results.against.setCurrentText("start")
+    assert results.drawn.currentText() == "peak rate"
+    assert drawn(results)[0] == pytest.approx([8.0, 16.0])
+    results.drawn.setCurrentText("rates")
+    assert results.against.currentText() == "force"
+    assert [one.name for one in results.plot.plot.panels[0].series] == ["peak", "final"]
+
+
+@pytest.mark.parametrize("x", COLUMNS)
+@pytest.mark.parametrize("y", COLUMNS)
+def test_each_column_can_be_drawn_also_where_nothing_fired(y: str, x: str) -> None:
+    found = column_plot([SLOW, FAST], y, x)
+    assert found is not None and found.panels[0].series[0].x.size == 2
+    needs = {"force", "start", "spikes"}
+    assert (column_plot([SILENT], y, x) is None) is not ({x, y} <= needs)
