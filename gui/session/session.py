@@ -29,8 +29,8 @@ from tactile_lab.errors import TactileLabError
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
 
-REST = 120.0
-"""Time after which a desk of which nothing is asked ends, s; it takes 100 MB."""
+REST = 30.0
+"""Time after which a desk of which nothing is asked ends, s; it takes 60 MB."""
 
 
 class Session(QObject):

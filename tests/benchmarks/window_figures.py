@@ -1,29 +1,39 @@
 """What the window costs, as one page.
 
-    python tests/benchmarks/window_figures.py [--out docs/window-figures.md]
+    python tests/benchmarks/window_figures.py --out docs/window-figures.md
+        [--short] [--beside CHECKOUT] [--parts WORD ...]
 
-Runs `window_start.py`, `window_stop.py`, `window_memory.py`, `window_frames.py`,
-`window_record.py` and `window_endurance.py` one after the other, each in a process of
-its own; 25 minutes on two cores that do nothing else. Sections of the page that others
-made stay at its end.
+Runs its neighbours one after the other, each in a process of its own, and writes the
+page after each: a section that names the commit at hand is not made again, so that what
+was cut short is taken up where it was. `--short` takes a third of the time with fewer
+starts, runs and samples; the sections tell how many. `--beside` names another checkout
+whose start and whose lanes on scaled screens are measured in turn with these. `--parts`
+makes only sections whose title has one of the words. Other sections of the page stay.
 """
 
 import argparse
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from provenance import provenance
 
 HERE = Path(__file__).parent
+TITLE = "# The window in figures"
+START, SCALED = "Start", "Scaled screens"
 PARTS = (
-    ("Start", "window_start.py", ()),
-    ("STOP, by parts", "window_stop.py", ()),
-    ("Memory of all processes", "window_memory.py", ("50",)),
-    ("Frames and gaps", "window_frames.py", ("20",)),
-    ("A run of 1e9 samples", "window_record.py", ()),
-    ("A simulated hour, and instruments that misbehave", "window_endurance.py", ()),
-)
+    (START, "window_start.py", ("6",), ("3",)),
+    ("Frames and gaps", "window_frames.py", ("20",), ("6",)),
+    ("Memory of all processes", "window_memory.py", ("50",), ("16",)),
+    ("STOP, by parts", "window_stop.py", (), ()),
+    (SCALED, "window_scales.py", ("--rounds", "3"), ("--rounds", "1")),
+    ("A run of 1e9 samples", "window_record.py", ("1000",), ("100",)),
+    (
+        "A simulated hour, and instruments that misbehave", "window_endurance.py",
+        ("3600",), ("900",),
+    ),
+)  # fmt: skip
 GOALS = """\
 A frame is a poll and the painting it causes, every 33 ms, in the window's own thread.
 Asked for: median at most 16 ms or idle + 8 ms, p99 at most 33 ms or 1.3 times that of
@@ -34,36 +44,50 @@ verified off within 0.3 s on a source that answers in 5 ms, flat memory, and at 
 """
 
 
-def others(page: str) -> list[str]:
-    """Sections of a page that are not made here."""
-    parts = ("\n" + page).split("\n## ")[1:]
-    own = {title for title, *_ in PARTS}
-    return [f"## {one}" for one in parts if one.partition("\n")[0] not in own]
+def sections(page: str) -> dict[str, str]:
+    """The text of each section of a page, by its title."""
+    parts = (one.partition("\n") for one in ("\n" + page).split("\n## ")[1:])
+    return {title: text.strip() for title, _, text in parts}
+
+
+def beside(title: str, checkout: Path | None) -> list[str]:
+    """Words that have another checkout measured in turn, where a section can."""
+    if checkout is None:
+        return []
+    other = {START: checkout, SCALED: checkout / ".venv" / "bin" / "python"}
+    return ["--beside", str(other[title])] if title in other else []
 
 
 def main() -> None:
-    """Run all three and write the page."""
+    """Make what is missing, section by section."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--short", action="store_true")
+    parser.add_argument("--beside", type=Path)
+    parser.add_argument("--parts", nargs="+", default=[""])
     options = parser.parse_args()
-    page = ["# The window in figures", ""]
-    page += [
-        f"{provenance()}. Made by `tests/benchmarks/window_figures.py`.",
-        "",
-        GOALS,
-    ]
-    for title, script, words in PARTS:
+    here = provenance()
+    commit = here.partition(",")[0]
+    kept = {}
+    if options.out.exists():
+        kept = sections(options.out.read_text(encoding="utf-8"))
+    for title, script, whole, short in PARTS:
+        wanted = any(word.lower() in title.lower() for word in options.parts)
+        if not wanted or f"{commit}," in kept.get(title, ""):
+            continue
+        words = short if options.short else whole
+        others = beside(title, options.beside)
+        begun = time.monotonic()
         done = subprocess.run(
-            [sys.executable, str(HERE / script), *words],
+            [sys.executable, str(HERE / script), *words, *others],
             stdout=subprocess.PIPE, text=True, check=True,
         )  # fmt: skip
-        page += [f"## {title}", "", done.stdout.strip(), ""]
-    if options.out and options.out.exists():
-        page += others(options.out.read_text(encoding="utf-8"))
-    text = "\n".join(page)
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    print(text)
+        took = f"{(time.monotonic() - begun) / 60:.1f} min"
+        command = f"`python tests/benchmarks/{' '.join([script, *words])}`"
+        kept[title] = f"{here}. Made by {command} in {took}.\n\n{done.stdout.strip()}"
+        made = [f"## {title}\n\n{text}\n" for title, text in kept.items()]
+        options.out.write_text("\n".join([TITLE, "", GOALS, *made]), encoding="utf-8")
+        print(f"{title}: {took}", flush=True)
 
 
 if __name__ == "__main__":

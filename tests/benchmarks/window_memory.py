@@ -4,9 +4,10 @@
 
 The demo is run again and again, 18 s each, on the simulated clock unless told; 200 of
 them are an hour. Now and then a row tells the proportional set size (PSS) of the
-window, of the engine and the desk beside it, and of what else they started: what
-processes share is counted once. "Shared" is the part of the sum in such pages, as of
-libraries. The last row is of two minutes later, when the desk has gone to rest.
+window, of the engine and the desk beside it, and of what else they started, as what
+both are forked from: what processes share is counted once. "Shared" is the part of the
+sum in such pages, as of libraries. The last row is of half a minute later, when the
+desk has gone to rest.
 """
 
 from __future__ import annotations
