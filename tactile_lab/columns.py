@@ -69,7 +69,7 @@ def read_cells(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 def read_columns(
     path: Path, headers: Sequence[tuple[str, ...]]
-) -> tuple[tuple[str, ...], NDArray[np.float64], list[int]]:
+) -> tuple[tuple[str, ...], NDArray[np.float64], Sequence[int]]:
     """Numeric columns of a CSV file.
 
     Args:
@@ -85,6 +85,8 @@ def read_columns(
     """
     import numpy as np  # heavy, and most read texts alone
 
+    if (whole := _plain_columns(path, headers)) is not None:
+        return whole
     wanted = " or ".join(",".join(names) for names in headers)
     header: tuple[str, ...] | None = None
     rows: list[list[float]] = []
@@ -104,6 +106,30 @@ def read_columns(
     if header is None or not rows:
         raise SceneError(f"{path} holds no rows under the header {wanted}.")
     return header, np.array(rows, dtype=np.float64), lines
+
+
+def _plain_columns(
+    path: Path, headers: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], NDArray[np.float64], Sequence[int]] | None:
+    """The same of a file of numbers and nothing else, a hundred times as fast.
+
+    None where anything else is in it, which `read_columns` then finds or passes over.
+    """
+    import numpy as np
+
+    text = read_text(path)
+    first, _, rest = text.partition("\n")
+    header = tuple(cell.strip() for cell in first.split(","))
+    odd = "#" in text or '"' in text or "\n\n" in text or "\r" in text
+    if header not in headers or odd or not rest.strip():
+        return None
+    try:
+        rows = np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
+    except ValueError:
+        return None
+    if rows.shape[1] != len(header) or not np.isfinite(rows).all():
+        return None
+    return header, rows, range(2, 2 + len(rows))
 
 
 def _numbers(cells: list[str], header: tuple[str, ...], at: str) -> list[float]:

@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
 
+HELD = 1 << 16
+"""Bytes of a line that an instrument holds; what comes beyond is lost, as in one."""
+
+
 class LineInstrument(Protocol):
     """A far end without transport."""
 
@@ -116,7 +120,8 @@ class FarEnd:
             if byte in self.instrument.clearing:
                 self._partial.clear()
             elif byte not in b"\r\n":
-                self._partial.append(byte)
+                if len(self._partial) < HELD:
+                    self._partial.append(byte)
             elif self._partial:
                 line = bytes(self._partial)
                 self._partial.clear()

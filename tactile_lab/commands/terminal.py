@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 REFUSED = 2
+SHOWN = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
+del SHOWN[ord("\t")], SHOWN[ord("\n")]
 LINE_EVERY = 0.1
 """Part of the whole after which progress writes a line where it is piped."""
 PATIENCE = 10.0
@@ -41,8 +43,12 @@ STYLES = {
 
 
 def say(text: str = "", stream: TextIO | None = None) -> None:
-    """Write a line, or several, for a person; to stdout unless told otherwise."""
+    """Write a line, or several, for a person; to stdout unless told otherwise.
+
+    Characters that would act on a terminal, in a note of a run one was sent, are shown.
+    """
     stream = sys.stdout if stream is None else stream
+    text = text.translate(SHOWN)
     if not stream.isatty():
         click.echo(text, file=stream)
         return

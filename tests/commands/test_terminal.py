@@ -104,6 +104,11 @@ def test_other_errors_are_bugs_and_keep_their_trace():
         _ = 1 / 0
 
 
+def test_a_note_cannot_act_on_the_terminal(capsys):
+    say("by \x1b]0;x\x07Eve\x9b2J\tand\nme µ")
+    assert capsys.readouterr().out == "by \\x1b]0;x\\x07Eve\\x9b2J\tand\nme µ\n"
+
+
 def test_json_refuses_nan():
     with pytest.raises(ValueError, match="JSON"):
         print_json({"x": float("nan")})

@@ -234,3 +234,12 @@ def test_pacing_takes_the_time_of_the_wire():
         assert port.read_until(b"\n") == b'0,"No error"\r\n'
         assert time.monotonic() - begun >= (24 + 14) * 10 / 9600
     server.close()
+
+
+def test_a_line_without_end_takes_no_memory_and_the_next_is_heard():
+    clock = RealClock()
+    end = FarEnd(SimCoilSource(Wireless(), "kepco-bop", clock), FAST, clock, "coil")
+    for _ in range(30):
+        assert end.take(b"x" * 10_000) == []
+    assert len(end._partial) < 100_000
+    assert end.take(b"\n*IDN?\n")[-1].data.startswith(b"KEPCO")
