@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from sim_backend.serial_line.from_row import Answer, RowParser, invented, reader
-from sim_backend.serial_line.keithley import Elements, both_functions, identity
+from sim_backend.serial_line.keithley import Elements, Sensing, identity
 from sim_backend.serial_line.scpi import (
     Handler,
     ScpiError,
@@ -171,10 +171,9 @@ class Keithley2400(VoltagePanel):
             "SOURce:VOLTage:RANGe": numeric(self._choose, -210.0, 210.0),
             "SOURce:VOLTage[:LEVel]": numeric(self._level, -210.0, 210.0),
             "SOURce:VOLTage[:LEVel]?": lambda _: f"{self.setpoint:+.6E}",
-            "SENSe:FUNCtion": both_functions,
+            **Sensing().commands,
             "SENSe:FUNCtion:CONCurrent": concurrent,
             "SENSe:FUNCtion:CONCurrent?": lambda _: str(int(self._concurrent)),
-            "SENSe:CURRent:NPLCycles": numeric(accept, 0.01, 10),
             "SENSe:CURRent:PROTection": numeric(self.limit, 1e-9, 1.05),
             "SENSe:CURRent:PROTection?": lambda _: f"{self.compliance:+.6E}",
             "FORMat:ELEMents": self._elements.choose,
@@ -182,6 +181,7 @@ class Keithley2400(VoltagePanel):
             "OUTPut:SMODe": one_of(
                 keep("output"), "NORMal", "ZERO", "HIMPedance", "GUARd"
             ),
+            "OUTPut:SMODe?": lambda _: self._modes["output"],
             "OUTPut[:STATe]": lambda argument: self.switch(boolean(argument)),
             "OUTPut[:STATe]?": lambda _: str(int(self.output_on)),
             "READ?": lambda _: self._elements.answer(self.output_on, *self.measured()),

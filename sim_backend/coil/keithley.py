@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sim_backend.coil.panel import CoilPanel, SourceModel
-from sim_backend.serial_line.keithley import Elements, both_functions, identity
+from sim_backend.serial_line.keithley import Elements, Sensing, identity
 from sim_backend.serial_line.scpi import (
     Handler,
     ScpiError,
@@ -58,11 +58,10 @@ def _commands(source: CoilPanel, model: str) -> dict[str, Handler]:
         "SOURce:CURRent:MODE": one_of(keep("source"), "FIXed", "LIST", "SWEep"),
         "SOURce:CURRent:MODE?": lambda _: modes["source"],
         "SOURce:CURRent:RANGe": numeric(set_range, 0.0, amperes),
+        "SOURce:CURRent:RANGe?": lambda _: f"{top / 1.05:+.6E}",
         "SOURce:CURRent[:LEVel]": numeric(set_current, -amperes, amperes),
         "SOURce:CURRent[:LEVel]?": lambda _: f"{source.setpoint:+.6E}",
-        "SENSe:FUNCtion": both_functions,
-        "SENSe:CURRent:NPLCycles": numeric(accept, 0.01, 10),
-        "SENSe:VOLTage:RANGe": numeric(accept, 0.0, volts),
+        **Sensing().commands,
         "SENSe:VOLTage:PROTection": numeric(source.set_compliance, 0.0, volts),
         "SENSe:VOLTage:PROTection?": lambda _: f"{source.compliance:+.6E}",
         "FORMat:ELEMents": elements.choose,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim_backend.serial_line.scpi import ScpiError
+from sim_backend.serial_line.scpi import Handler, ScpiError, numeric
 
 
 class Elements:
@@ -29,10 +29,38 @@ class Elements:
         return ",".join(f"{value:+.6E}" for value in told)
 
 
-def both_functions(argument: str) -> None:
-    """``:SENSe:FUNCtion`` for voltage and current."""
-    if set(argument.replace(" ", "").split(",")) - {"'VOLT'", "'CURR'"}:
-        raise ScpiError(-224, "Illegal parameter value")
+class Sensing:
+    """What a 2400 measures and how finely, which neither coil nor gate notices."""
+
+    def __init__(self) -> None:
+        self.functions: tuple[str, ...] = ("CURR",)
+        self.cycles, self.range = 1.0, 2.1
+
+    @property
+    def commands(self) -> dict[str, Handler]:
+        """Headers and what they do."""
+        return {
+            "SENSe:FUNCtion": self._choose,
+            "SENSe:FUNCtion?": lambda _: ",".join(
+                f'"{name}:DC"' for name in self.functions
+            ),
+            "SENSe:CURRent:NPLCycles": numeric(self._integrate, 0.01, 10),
+            "SENSe:CURRent:NPLCycles?": lambda _: f"{self.cycles:.2f}",
+            "SENSe:VOLTage:RANGe": numeric(self._widen, 0.0, 210.0),
+            "SENSe:VOLTage:RANGe?": lambda _: f"{self.range:+.6E}",
+        }
+
+    def _choose(self, argument: str) -> None:
+        names = argument.replace(" ", "").replace("'", "").split(",")
+        if set(names) - {"VOLT", "CURR"}:
+            raise ScpiError(-224, "Illegal parameter value")
+        self.functions = tuple(sorted(names, reverse=True))
+
+    def _integrate(self, cycles: float) -> None:
+        self.cycles = cycles
+
+    def _widen(self, volts: float) -> None:
+        self.range = next(one for one in (0.21, 2.1, 21.0, 210.0) if volts <= one)
 
 
 def identity(model: str) -> str:

@@ -17,6 +17,7 @@ from tactile_lab.instruments.dialects import (
     parse_dialect,
     teslameter_dialect,
 )
+from tactile_lab.instruments.serial_dialect import SerialDialect
 
 COILS = dialect_ids("coil")
 
@@ -184,3 +185,12 @@ def test_a_mistake_is_told_with_file_key_and_what_is_allowed(old, new, told):
         parse_dialect(text_of().replace(old, new), "mine.toml")
     assert told in str(refused.value)
     assert "http" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", dialect_ids())
+def test_every_setting_of_a_row_is_read_back(name):
+    row = load_dialect(name)
+    if not isinstance(row, SerialDialect):
+        return
+    asked = {query.removesuffix("?") for query in row.confirm}
+    assert {line.split(" ")[0] for line in row.init} <= asked
