@@ -105,6 +105,7 @@ def try_out(
         SceneError: no such row, or the transcript cannot be written.
         InstrumentError: it does not answer as the row says.
         UnsafeError: a source's output could not be verified off.
+        LimitError: what a meter reads is beyond its range.
     """
     clock = RealClock()
     device: CoilSource | Teslameter | Thermometer | SourceMeter
@@ -125,7 +126,14 @@ def try_out(
         device.record(transcript)
     try:
         device.open()
-        return device.settings()
+        found = device.settings()
+        if isinstance(device, CoilSource):
+            device.rehearse()
+        elif isinstance(device, Teslameter):
+            found["field_T"] = f"{device.read().value:.6g}"
+        elif isinstance(device, Thermometer):
+            found["temperature_K"] = f"{device.read().value:.6g}"
+        return found
     finally:
         device.close()
 

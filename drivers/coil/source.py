@@ -153,9 +153,7 @@ class CoilSource(SerialInstrument[CoilWire]):
         self._interlock.refuse_when_tripped()
         if self._energised:
             return
-        self._wire.set_compliance(self._limits.compliance)
-        self._wire.set_zero()
-        self._took(0.0)
+        self._prepare()
         if self._guard is not None:
             self._guard.arm()
         self._energised = True
@@ -165,6 +163,16 @@ class CoilSource(SerialInstrument[CoilWire]):
         except BaseException:
             self.safe_off()
             raise
+
+    def rehearse(self) -> None:
+        """Say what a run says beyond `open`, with the output off: is a row understood?
+
+        Raises:
+            InstrumentError: a line is refused, or a question not answered.
+        """
+        self._prepare()
+        if self.dialect.measures_when_off:
+            self._wire.voltage()
 
     def set_current(self, current: float) -> float:
         """Step towards `current`, A, as far as slew allows; what was commanded, A.
@@ -381,6 +389,11 @@ class CoilSource(SerialInstrument[CoilWire]):
         wire.link.end_record()
         if self._guard is not None:
             self._guard.stop()
+
+    def _prepare(self) -> None:
+        self._wire.set_compliance(self._limits.compliance)
+        self._wire.set_zero()
+        self._took(0.0)
 
     def _took(self, current: float) -> None:
         self._setpoint = current

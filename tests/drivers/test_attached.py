@@ -1,12 +1,15 @@
 """What is attached, against served instruments."""
 
+import re
+from importlib import resources
+
 import pytest
 from replay import read_transcript
 
 from drivers.attached import ask_name, attached, fitting, lasting_name, try_out
 from drivers.diagnosis import diagnose, disk
 from sim_backend.serve import ServedBench
-from tactile_lab.errors import BadReplyError
+from tactile_lab.errors import BadReplyError, InstrumentError
 
 
 @pytest.fixture
@@ -94,3 +97,29 @@ def test_a_port_that_is_gone_tells_those_there_are(monkeypatch):
     monkeypatch.setattr(list_ports, "comports", lambda: [other])
     _, problem = ask_name("/dev/ttyUSB0")
     assert "(there now: /dev/ttyUSB1)" in problem
+
+
+@pytest.mark.parametrize(
+    ("role", "line"),
+    [
+        ("coil", 'set = "CURX {i:.5f}"'),
+        ("coil", 'limit = "VOLX {v:.3f}"'),
+        ("coil", 'measure_voltage = "MEAS:VOLX?"'),
+        ("teslameter", 'field = "RDGFIELX?"'),
+    ],
+)
+def test_a_row_with_a_wrong_line_is_found_out(served, tmp_path, role, line):
+    """It passed, and the first run with it failed."""
+    folder, name = {
+        "coil": ("coil", "kepco-bop"),
+        "teslameter": ("field_meter", "lakeshore-425"),
+    }[role]
+    shipped = resources.files("tactile_lab.instruments") / "rows" / folder
+    text = (shipped / f"{name}.toml").read_text(encoding="utf-8")
+    key = line.split(" ")[0]
+    file = tmp_path / "mine.toml"
+    file.write_text(re.sub(rf"^{key} = .*$", line, text, flags=re.MULTILINE))
+    assert line in file.read_text()
+    try_out(served[role], name)
+    with pytest.raises(InstrumentError):
+        try_out(served[role], str(file))

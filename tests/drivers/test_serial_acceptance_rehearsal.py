@@ -8,6 +8,7 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
+from sim_backend.coil.source import SimCoilSource
 from sim_backend.serve import ServedBench
 
 ROOT = Path(__file__).parents[2]
@@ -41,11 +42,26 @@ def begun(which: str, port: str, state: Path) -> subprocess.Popen[str]:
     )
 
 
+def _strict(bench: ServedBench) -> None:
+    """Have the Kepco in local whenever nobody has asked for remote control."""
+    source = bench._servers["coil"].far_end.instrument
+    assert isinstance(source, SimCoilSource)
+    act, source.local = source.line, True
+
+    def line(text: bytes) -> bytes | None:
+        answer = act(text)
+        source.local = source.local or b"SYST:REM 0" in text
+        return answer
+
+    source.line = line  # type: ignore[method-assign]
+
+
 def test_the_checklists_pass_on_served_instruments(tmp_path: Path) -> None:
     """All at once: they wait for their instruments, not for each other."""
     bench = ServedBench(
         coil="pty", teslameter="tcp:0", voltage_source="pty", thermometer="pty"
     )
+    _strict(bench)
     bench.start()
     ports = bench.addresses | {"coil_source": bench.addresses["coil"]}
     running = {}

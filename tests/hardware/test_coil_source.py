@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from drivers.coil.source import CoilSource
+from drivers.serial_line.conversation import Conversation
 from drivers.serial_line.link import SerialLink
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
@@ -61,12 +62,20 @@ def coil(monkeypatch: pytest.MonkeyPatch) -> Iterator[CoilSource]:
 
 
 @pytest.fixture
-def link() -> Iterator[SerialLink]:
+def bare() -> Iterator[SerialLink]:
+    """The wire alone: the source is as its front panel has it."""
     row = patient(coil_dialect(ROW))
     one = SerialLink(PORT, row.serial, RealClock(), what="coil source")
     one.open()
     yield one
     one.close()
+
+
+@pytest.fixture
+def link(bare: SerialLink) -> SerialLink:
+    """The same, remotely controlled: in local a source refuses all alike."""
+    Conversation(bare, patient(coil_dialect(ROW))).offer(coil_dialect(ROW).optional)
+    return bare
 
 
 def drive(coil: CoilSource, current: float, seconds: float) -> None:
@@ -105,14 +114,14 @@ def test_latency(link: SerialLink) -> None:
     fact("raw answer to the set-point query", repr(answer))
 
 
-def test_remote(link: SerialLink) -> None:
+def test_remote(bare: SerialLink) -> None:
     """What it says to the row's optional lines, and to a set-point before and after."""
     row = coil_dialect(ROW)
     for line in (row.set_line(0.0), *row.optional, row.set_line(0.0)):
         *first, last = row.verified(line)
         for part in first:
-            link.write(part)
-        fact(f"answer to {line}", link.query(last) if row.error else "not asked")
+            bare.write(part)
+        fact(f"answer to {line}", bare.query(last) if row.error else "not asked")
 
 
 OWNER = """
