@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import (
@@ -91,19 +90,23 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
         self.window_.blockSignals(False)
 
     def _show_run(self) -> None:
-        """Outline of the force, planned and measured, and the rate, each 0 to 1."""
+        """Outline of the force, planned and measured, and the rate, each up to 1."""
         source, count = self.source, max(50, int(self._box.width()))
         measured = source.trace("force", 0.0, source.length, count)
         planned, force = source.planned(0.0, source.length)
         extent = () if measured.empty else measured.extent or ()
-        peak = max([1e-12, float(np.abs(force).max(initial=0.0)), *map(abs, extent)])
-        self._plan.setData(planned, np.abs(force) / peak)
+        ends = [0.0, float(force.min(initial=0.0)), float(force.max(initial=0.0))]
+        peak = max(1e-12, *map(abs, [*ends, *extent]))
+        lowest = min([*ends, *extent]) / peak  # a pull is drawn below the push
+        self._plan.setData(planned, force / peak)
         self._force.setData(*paint.zigzag(measured.scaled(1 / peak)))
         rate = source.trace("rate", 0.0, source.length, RATES)
         top = 1.1 * max(float(rate.high.max(initial=0.0)), 1e-9)
         self._rate.setData(rate.time, rate.high / top)
         self._box.setRange(
-            xRange=(0.0, max(source.length, 1e-3)), yRange=(0.0, 1.05), padding=0
+            xRange=(0.0, max(source.length, 1e-3)),
+            yRange=(1.05 * lowest, 1.05),
+            padding=0,
         )
 
     def _tint(self) -> None:

@@ -21,10 +21,11 @@ from PySide6.QtWidgets import QApplication, QMenu
 from gui.lanes.arrangement import Arrangement
 from gui.lanes.box import LaneBox, heights_of
 from gui.lanes.card import LaneCard
-from gui.lanes.expected import Stretch
+from gui.lanes.expected import Preview, Stretch
 from gui.lanes.floor import AXIS
 from gui.lanes.lane import lanes_for
-from gui.lanes.source import LiveSource
+from gui.lanes.navigator import Navigator
+from gui.lanes.source import LiveSource, PlanSource
 from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
@@ -32,6 +33,7 @@ from gui.look.theme import Theme
 from gui.look.tokens import DARK, LIGHT
 from gui.parts import IconButton
 from tactile_lab.trace import Trace
+from tactile_lab.waveform import Waveform
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -480,3 +482,17 @@ def test_lanes_that_stay_keep_their_range_when_another_comes(app, stack):
     settle(app)
     assert stack.row("residual") is None
     assert shown(stack) == ["force", "V_C1", "V_K", "spikes", "rate"]
+
+
+@pytest.mark.parametrize("pull", [-0.05, 0.0])
+def test_the_whole_run_shows_a_pull_below_the_push(app, pull):
+    force = Waveform.through([(0.0, 0.0), (1.0, 0.05), (3.0, pull), (4.0, 0.0)])
+    whole = Navigator(TimeView(), Theme("light"))
+    whole.source = PlanSource(Preview(force, length=4.0))
+    whole.resize(600, 62)
+    whole.show()
+    app.processEvents()
+    low, high = whole._box.viewRange()[1]
+    assert high == pytest.approx(1.05)
+    assert low == pytest.approx(1.05 * pull / 0.05, abs=1e-6)
+    assert min(whole._plan.getData()[1]) == pytest.approx(pull / 0.05, abs=1e-6)

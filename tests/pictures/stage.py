@@ -86,7 +86,7 @@ class Stage:
         self.folder = folder
         begin(self.window, scene, bench)
 
-    def until(self, done: Callable[[], object], longest: float = 90.0) -> None:
+    def until(self, done: Callable[[], object], longest: float = 300.0) -> None:
         """Let the window live until `done()`.
 
         Raises:
