@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactile_lab.commands.attended import INTERRUPTED, Signals, run_attended
 from tactile_lab.commands.options import json_option, scheduler_option
 from tactile_lab.commands.terminal import (
     ProgressLine,
@@ -19,8 +21,13 @@ from tactile_lab.commands.terminal import (
 )
 
 if TYPE_CHECKING:
+    from tactile_lab.acquisition.ending import Executed
+    from tactile_lab.engine.execution import Execution
     from tactile_lab.studies.carry_out import Forecast, Progress
     from tactile_lab.studies.study import Study
+
+UNSAFE = 4
+"""Exit code where a coil's state could not be verified."""
 
 
 @click.command()
@@ -84,29 +91,49 @@ def carry_out_attended(
     Raises:
         TactileLabError: it cannot be carried out, or not to its end.
     """
+    from tactile_lab.errors import UnsafeError
     from tactile_lab.studies.carry_out import carry_out
+    from tactile_lab.studies.dataset import MADE_OF
     from tactile_lab.studies.live import SHOWN
     from tactile_lab.studies.page import REPORT, told_before, write_page
 
     folder = out / study.name
     if (told := told_before(study, folder)) is not None:
-        text, _ = told.pop("text"), told.pop(SHOWN)
+        text, *_ = (told.pop(key) for key in ("text", SHOWN, MADE_OF))
         if as_json:
             print_json({"study": str(folder), **told})
         else:
             say(f"Nothing to do: all points are known ({study.design.size:,}).")
             _say_all(text, folder, folder / REPORT)
         return
-    with ProgressLine(study.design.size, study.name) as line:
+    ended: list[Executed] = []
+    with ExitStack() as stack:
+        line = stack.enter_context(ProgressLine(study.design.size, study.name))
+        signals = stack.enter_context(Signals()) if study.on == "bench" else None
 
         def tell(progress: Progress) -> None:
             line.update(progress.done, _now(progress))
 
+        def play(execution: Execution) -> Executed:
+            if signals is None:
+                return execution.run()
+            ended.append(run_attended(execution, signals))
+            signals.opened = False
+            return ended[-1]
+
         try:
-            found = carry_out(study, out, count=workers, scheduler=scheduler, tell=tell)
+            found = carry_out(
+                study, out, count=workers, scheduler=scheduler, tell=tell, play=play
+            )
         except KeyboardInterrupt:
             line.close()
-            fail("interrupted; the same command goes on where it was.", 130)
+            coil = f" {ended[-1].off.text}" if ended else ""
+            code = ended[-1].exit_code if ended else INTERRUPTED
+            fail(f"interrupted; the same command goes on where it was.{coil}", code)
+            return
+        except UnsafeError as error:
+            line.close()
+            fail(str(error), UNSAFE)
             return
     with working("writing the report"):
         html, said = write_page(found, folder)

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,10 @@ from tactile_lab.studies.points import RUNS, Points, Task
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
 from tactile_lab.studies.workers import Alone, Finished, Workers, workers
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.ending import Executed
+    from tactile_lab.engine.execution import Execution
 
 LONG = 1.0
 """Seconds a batch should take: little to lose, enough to be worth sending."""
@@ -70,9 +75,12 @@ class Forecast:
     reason: str = ""
 
 
-def study_points(study: Study, out: Path) -> Points:
-    """What computes the study's points in this process."""
-    return Points(study, out / study.name / RUNS if study.keeps_runs else None)
+def study_points(
+    study: Study, out: Path, *play: Callable[[Execution], Executed]
+) -> Points:
+    """What computes the study's points in this process; `play` as of `Points`."""
+    runs = out / study.name / RUNS if study.keeps_runs else None
+    return Points(study, runs, *play)
 
 
 def forecast(study: Study, out: Path) -> Forecast:
@@ -104,6 +112,7 @@ def carry_out(
     count: int | None = None,
     scheduler: str | None = None,
     tell: Callable[[Progress], None] = lambda progress: None,
+    play: Callable[[Execution], Executed] | None = None,
 ) -> Gathered:
     """Compute all points that are missing, and write the data set.
 
@@ -116,15 +125,18 @@ def carry_out(
         count: processes; as many as cores unless given.
         scheduler: address of a Dask scheduler.
         tell: told of each finished batch.
+        play: carries out a run on real instruments, such as one that minds signals.
 
     Raises:
         RecordingError: the folder cannot be written, or another process carries
             the study out.
         UnsafeError: a coil's state could not be verified: nothing goes on.
+        KeyboardInterrupt: a run was stopped: nothing goes on.
         NotFoundError, SceneError: the scheduler cannot be used.
     """
+    points = study_points(study, out, *(() if play is None else (play,)))
     with _alone(out / study.name):
-        return _carried_out(study, out, count, scheduler, tell)
+        return _carried_out(study, points, out, count, scheduler, tell)
 
 
 @contextmanager
@@ -151,13 +163,13 @@ def _alone(folder: Path) -> Iterator[None]:
 
 def _carried_out(
     study: Study,
+    points: Points,
     out: Path,
     count: int | None,
     scheduler: str | None,
     tell: Callable[[Progress], None],
 ) -> Gathered:
-    points, shelf = study_points(study, out), Shelf(out / SHELF)
-    named = addresses(study)
+    shelf, named = Shelf(out / SHELF), addresses(study)
     missing = _missing(study, named, shelf)
     done, failed = study.design.size - missing.size, 0
     there = done
@@ -209,9 +221,22 @@ def _missing(study: Study, named: NDArray[np.void], shelf: Shelf) -> NDArray[np.
     _, first = np.unique(named, return_index=True)  # two points may be one
     first = np.sort(first)
     missing: NDArray[np.intp] = first[shelf.find(named[first]).file < 0]
-    if study.on == "bench" and study.order == "random":
-        np.random.default_rng(study.design.seed).shuffle(missing)
-    return missing
+    if study.on != "bench":
+        return missing
+    order = _order(study)  # of all, so that it is the same after an interruption
+    return order[np.isin(order, missing)]
+
+
+def _order(study: Study) -> NDArray[np.intp]:
+    """In which a bench plays the points; random ones are drawn from the seed."""
+    design = study.design
+    rng, points = np.random.default_rng(design.seed), np.arange(design.size)
+    if study.order == "random":
+        return rng.permutation(points)
+    if study.order == "blocked":
+        blocks = points.reshape(-1, design.repeat).T
+        return np.concatenate([rng.permutation(block) for block in blocks])
+    return points
 
 
 def _tasks(

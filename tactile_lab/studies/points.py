@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ from tactile_lab.studies.kept import CRITICAL_FORCE, OF_TRAINS, Kept
 from tactile_lab.studies.shelf import Batch
 from tactile_lab.studies.study import Study
 from tactile_lab.trial import Protocol
+
+if TYPE_CHECKING:
+    from tactile_lab.acquisition.ending import Executed
+    from tactile_lab.engine.execution import Execution
 
 RUNS, BY_POINT = "runs", "by-point"
 """Folders of a study: of the runs that are kept, and in it files by the addresses of
@@ -51,20 +55,30 @@ class Task:
     repeats: NDArray[np.intp]
 
 
+def _played(execution: Execution) -> Executed:
+    return execution.run()
+
+
 class Points:
     """Computes points of a study; made once in each process.
 
     Args:
         study: which.
         runs: where run folders are kept; None to keep none of a simulated bench.
+        play: carries out a run; whoever minds signals meanwhile gives another.
 
     Attributes:
         runs: the same.
     """
 
-    def __init__(self, study: Study, runs: Path | None = None) -> None:
+    def __init__(
+        self,
+        study: Study,
+        runs: Path | None = None,
+        play: Callable[[Execution], Executed] = _played,
+    ) -> None:
         self._study = study
-        self.runs = runs
+        self.runs, self._play = runs, play
         self._axes = Axes(study.design.axes, study.scene)
         self._with = lru_cache(SCENES)(self._scene_and_force)
 
@@ -73,6 +87,7 @@ class Points:
 
         Raises:
             UnsafeError: a coil's state is not known: nothing goes on.
+            KeyboardInterrupt: a run was stopped: nothing goes on.
         """
         size = task.addresses.size
         parts: dict[str, list[tuple[NDArray[np.intp], Column]]]
@@ -223,6 +238,7 @@ class Points:
     # --- the whole bench
 
     def _run(self, scene: Scene, repeat: int, address: str) -> dict[str, Value]:
+        from tactile_lab.acquisition.events import RunState
         from tactile_lab.engine.execution import Execution
         from tactile_lab.report.findings import find
         from tactile_lab.report.from_run import read
@@ -234,13 +250,19 @@ class Points:
             folder = self.runs or Path(
                 stack.enter_context(TemporaryDirectory(prefix="tactile-lab-"))
             )
-            done = Execution(scene, folder, realtime=self._study.on == "bench").run()
+            real = self._study.on == "bench"
+            done = self._play(Execution(scene, folder, realtime=real))
             if self.runs is not None:
                 named = self.runs / BY_POINT / address
                 named.parent.mkdir(exist_ok=True)
                 named.write_text(done.folder.name, encoding="utf-8")
             if not done.off.verified:
-                raise UnsafeError(done.off.text) from done.failure
+                raise UnsafeError(
+                    f"{done.told} The study stops; what was finished is kept. Make the "
+                    "coil safe and start it again."
+                ) from done.failure
+            if done.state is RunState.ABORTED:
+                raise KeyboardInterrupt  # a run that was stopped is no point
             if done.failure is not None:
                 raise done.failure
             run = stack.enter_context(Run.load(done.folder))

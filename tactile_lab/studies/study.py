@@ -24,7 +24,7 @@ from tactile_lab.studies.kept import Kept, kept
 from tactile_lab.table import SceneTable
 
 On = Literal["model", "simulated", "bench"]
-Order = Literal["random", "as written"]
+Order = Literal["random", "blocked", "as written"]
 ALWAYS = ("spike_count", "first_spike", "mean_rate")
 """Kept unless the study says what."""
 
