@@ -12,6 +12,9 @@ from typing import Any
 from serial.tools import list_ports
 
 from drivers.coil.source import CoilSource
+from drivers.picoscope.sdk import load
+from drivers.picoscope.sdk_calls import LibraryCalls
+from drivers.picoscope.unit import units
 from drivers.serial_line.link import SerialLink
 from drivers.teslameter import Teslameter
 from drivers.thermometer import Thermometer
@@ -213,6 +216,24 @@ def _serial(address: str, title: str, *, ask: bool) -> Found:
     )
 
 
+def _picoscopes() -> list[Found]:
+    """Those that PicoSDK knows, where it is installed; none is opened."""
+    try:
+        names = units(LibraryCalls(load()))
+    except InstrumentError:
+        return []
+    return [
+        Found(
+            address=f"serial {name}",
+            kind="usb",
+            title="PicoScope, as PicoSDK tells",
+            identity=name,
+            fits=("ps3000a",),
+        )
+        for name in names
+    ]
+
+
 def _title(port: Any) -> str:
     named = port.description and port.description != "n/a"
     parts = [port.description if named else "serial port"]
@@ -228,7 +249,8 @@ def _usb() -> list[Found]:
         devices = present()
     except InstrumentError as reason:
         told = "USB cannot be looked at; only USBTMC scopes need that"
-        return [Found(address=NO_USB, kind="usb", title=told, problem=str(reason))]
+        found = Found(address=NO_USB, kind="usb", title=told, problem=str(reason))
+        return [found, *_picoscopes()]
     return [
         Found(
             address=f"bus {one.bus} device {one.address}",

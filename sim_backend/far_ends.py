@@ -70,20 +70,21 @@ def serial_source(table: CoilSpec, world: World) -> CoilSource:
 def ps3000a(table: ScopeSpec, world: World) -> PicoScope:
     """A PicoScope 3404D at the plant's voltages, behind its vendor's functions."""
     from drivers.picoscope.scope import PicoScope
-    from sim_backend.picoscope.scope import Make
+    from sim_backend.picoscope.scope import SIMULATED, Make
     from sim_backend.picoscope.sdk import FakePs3000a
 
     clock_error = world.simulated.clock_error
     library = FakePs3000a(
         _wired(world),
         world.clock,
-        world.make or Make(clock_error=clock_error),
+        world.make or Make(serial=table.serial or SIMULATED, clock_error=clock_error),
         world.faults.get("scope", ()),
         world.plant.analogue_input,
     )
     return PicoScope(
         clock=world.clock,
         library=library,
+        serial=table.serial,
         # equal clocks let the driver find a single lost sample; unequal ones do not
         lag_tolerance=0.01 if clock_error else None,
         poll_interval=SIMULATED_POLL if world.clock.simulated else 0.02,

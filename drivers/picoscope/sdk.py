@@ -45,9 +45,12 @@ _int16s = POINTER(c_int16)
 _uint32s = POINTER(c_uint32)
 _floats = POINTER(c_float)
 
+ENUMERATE = "ps3000aEnumerateUnits"
+
 PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "ps3000aOpenUnit": (_int16s, _text),
     "ps3000aCloseUnit": (c_int16,),
+    ENUMERATE: (_int16s, _text, _int16s),
     "ps3000aGetUnitInfo": (c_int16, _text, c_int16, _int16s, c_uint32),
     "ps3000aPingUnit": (c_int16,),
     "ps3000aChangePowerSource": (c_int16, c_uint32),
@@ -116,7 +119,8 @@ def bind(library: Any) -> Any:
         try:
             function = getattr(library, name)
         except AttributeError:
-            missing.append(name)
+            if name != ENUMERATE:  # it only tells which scopes there are besides
+                missing.append(name)
             continue
         function.argtypes = argtypes
         function.restype = c_uint32

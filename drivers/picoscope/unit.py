@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.picoscope import status
-from drivers.picoscope.sdk import INFORMATION, INPUTS, bind, load
+from drivers.picoscope.sdk import ENUMERATE, INFORMATION, INPUTS, bind, load
 from drivers.picoscope.sdk_calls import LibraryCalls
 from tactile_lab.bench import Channel
 from tactile_lab.errors import LimitError, RefusedError
 
 _MOST_ACKNOWLEDGEMENTS = 4
+
+MOST_TEXT = 1024
+"""Characters of a list of serial numbers."""
 
 
 class ScopeUnit:
@@ -81,12 +85,21 @@ class ScopeUnit:
         try:
             self.accepted = self._acknowledged(code, f"Opening {which}")
             self.information = {name: self._read(name) for name in INFORMATION}
+            if self._serial is None:
+                self._tell_others()
             most = ctypes.c_int16()
             self.do("Reading full scale", "ps3000aMaximumValue", ctypes.byref(most))
             self.full_scale = most.value
         except Exception:
             self.close()
             raise
+
+    def _tell_others(self) -> None:
+        """Note which other scopes could have been meant."""
+        own = self.information["serial"]
+        found = [] if self._calls is None else units(self._calls)
+        if others := [one for one in found if one != own]:
+            self.information["others"] = ", ".join(others)
 
     def call(self, name: str, *arguments: Any) -> int:
         """Call a function with this handle and return its status.
@@ -179,6 +192,25 @@ class ScopeUnit:
             text, len(text), ctypes.byref(needed), INFORMATION[item],
         )  # fmt: skip
         return bytes(text).split(b"\0", 1)[0].decode("ascii", "replace")
+
+
+def units(calls: Callable[..., int]) -> list[str]:
+    """Serial numbers of the units that are attached; none where that is not told.
+
+    Args:
+        calls: calls a function of the library by its name.
+    """
+    count, length = ctypes.c_int16(0), ctypes.c_int16(MOST_TEXT)
+    text = (ctypes.c_int8 * MOST_TEXT)()
+    told = ctypes.byref(count), text, ctypes.byref(length)
+    try:
+        code = calls(ENUMERATE, *told)
+    except AttributeError:
+        return []  # a library that has no such function
+    if code != status.OK or count.value < 1:
+        return []
+    names = bytes(text).split(b"\0", 1)[0].decode("ascii", "replace").split(",")
+    return [one.strip() for one in names if one.strip()]
 
 
 def _text(serial: str) -> ctypes.Array[ctypes.c_int8]:

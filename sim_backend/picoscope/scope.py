@@ -16,6 +16,9 @@ from sim_backend.picoscope.faults import Schedule, ScopeFault
 from sim_backend.plant.scope_source import Acquisition, Codes, Input, SampleSource
 from tactile_lab.clock import Clock
 
+SIMULATED = "SIM04/0001"
+"""Serial number of a simulated unit."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Make:
@@ -25,6 +28,7 @@ class Make:
         serial: batch and serial number.
         variant: model.
         usb: "3.0" or "2.0".
+        others: serial numbers of other units that are attached.
         powers: power states reported when it is opened, one after the other.
         taken: another program has it open.
         usb_powered_inputs: inputs that work without the mains adapter.
@@ -36,9 +40,10 @@ class Make:
         beyond: times the model's own streaming rate, to find a computer's limit.
     """
 
-    serial: str = "SIM04/0001"
+    serial: str = SIMULATED
     variant: str = "3404D"
     usb: str = "3.0"
+    others: tuple[str, ...] = ()
     powers: tuple[int, ...] = ()
     taken: bool = False
     usb_powered_inputs: str = pico.INPUT_NAMES

@@ -112,7 +112,7 @@ class FakePs3000a:
             raise self.errors.pop(0)
 
     def _guarded(self, name: str, method: Any) -> Callable[..., int]:
-        takes_handle = name != "OpenUnit"
+        takes_handle = name not in ("OpenUnit", "EnumerateUnits")
 
         def entry(*arguments: Any) -> int:
             if not self._busy.acquire(blocking=False):
@@ -142,6 +142,16 @@ class FakePs3000a:
         status = self.device.open(text)
         handle[0] = 0 if status == unit.NOT_FOUND else _HANDLE
         return status
+
+    @header(POINTER(c_int16), POINTER(c_int8), POINTER(c_int16))
+    def _enumerate_units(self, count: Any, serials: Any, length: Any) -> int:
+        make = self.device.make
+        text = ",".join((make.serial, *make.others)).encode() + b"\0"
+        if not count or not length or not serials or length[0] < len(text):
+            return unit.NULL_PARAMETER
+        count[0], length[0] = 1 + len(make.others), len(text)
+        ctypes.memmove(serials, text, len(text))
+        return unit.OK
 
     @header(c_int16)
     def _close_unit(self) -> int:

@@ -273,9 +273,17 @@ class Execution(Task[Executed]):
         return DriveCheck(field, calibrated=used is not None and used.unit == "T")
 
     def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
+        scope = settings.get("scope", {})
+        found: tuple[str, ...] = ()
+        if others := scope.get("others"):
+            found = (
+                f"Several oscilloscopes are attached and the bench file names none: "
+                f"{scope.get('serial', 'the first')} was taken, not {others}. Write "
+                'serial = "..." into [scope].',
+            )
         if not self.plan.timeline.asks_force:
-            return ()
-        return check_coil(self.scene, settings)
+            return found
+        return found + check_coil(self.scene, settings)
 
     def _drive_for(self, trial: Trial, update_interval: float, before: float) -> Drive:
         return drive_for(trial, self.scene, before, update_interval)

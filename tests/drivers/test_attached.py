@@ -8,8 +8,12 @@ from replay import read_transcript
 
 from drivers.attached import ask_name, attached, fitting, lasting_name, try_out
 from drivers.diagnosis import diagnose, disk
+from drivers.picoscope.sdk import bind
+from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.serve import ServedBench
-from tactile_lab.errors import BadReplyError, InstrumentError
+from tactile_lab.clock import RealClock
+from tactile_lab.errors import BadReplyError, InstrumentError, NotFoundError
 
 
 @pytest.fixture
@@ -123,3 +127,15 @@ def test_a_row_with_a_wrong_line_is_found_out(served, tmp_path, role, line):
     try_out(served[role], name)
     with pytest.raises(InstrumentError):
         try_out(served[role], str(file))
+
+
+def test_picosdk_is_asked_where_usb_cannot_be_looked_at(monkeypatch):
+    def blind():
+        raise NotFoundError("no libusb")
+
+    library = FakePs3000a(None, RealClock(), Make(others=("SIM04/0002",)))
+    monkeypatch.setattr("drivers.attached.present", blind)
+    monkeypatch.setattr("drivers.attached.load", lambda: bind(library))
+    found = [one for one in attached(ask=False) if one["fits"] == ("ps3000a",)]
+    assert [one["identity"] for one in found] == ["SIM04/0001", "SIM04/0002"]
+    assert not library.device.is_open

@@ -9,9 +9,10 @@ import pytest
 from drivers.picoscope.scope import PicoScope
 from sim_backend.bench import open_bench
 from sim_backend.picoscope.faults import ScopeFault
+from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.acquisition.ending import Executed
-from tactile_lab.acquisition.events import RunState
+from tactile_lab.acquisition.events import Event, Message, RunState
 from tactile_lab.bench import Block
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
@@ -154,3 +155,19 @@ def test_what_a_run_survives(tmp_path: Path, fault: ScopeFault) -> None:
     assert done.off.verified
     assert dict(done.loss) == {"samples": 0, "spikes": 0}
     assert samples >= 300_000
+
+
+@pytest.mark.parametrize(
+    ("serial", "told"), [("", True), ("bench.scope.serial=SIM04/0001", False)]
+)
+def test_a_scope_that_was_chosen_among_several_is_told(
+    tmp_path: Path, serial: str, told: bool
+) -> None:
+    scene = load("demo", (*OVERRIDES, *filter(None, [serial])))
+    make = Make(others=("SIM04/0002",))
+    seen: list[Event] = []
+    bench = open_bench(scene, needs(scene), make=make)
+    done = Execution(scene, tmp_path, bench=bench, emit=seen.append).run()
+    assert done.state is RunState.COMPLETE, done.reason
+    said = [one.text for one in seen if isinstance(one, Message)]
+    assert any("SIM04/0001 was taken, not SIM04/0002" in one for one in said) is told
