@@ -293,6 +293,8 @@ class Recorder:
         self._flush()
 
     def _write_samples(self, block: Block) -> None:
+        if self._waiting["segments"] and self._file is not None:
+            self._write_rows(self._file)  # no kill leaves samples without their time
         wrote = [
             column.append(block.codes[row])
             for column, row in zip(self._columns, self._rows, strict=True)

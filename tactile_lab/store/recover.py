@@ -89,6 +89,8 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
     if not written.declared or not killed.exists():
         _refuse_if_there_may_be_samples(path, killed)
         return _without_samples(path, info)
+    if not written.rows.get("segments"):
+        written.rows["segments"] = _told_by(killed).rows.get("segments", [])
     check_space(path, killed.stat().st_size + RESERVE)
     new = path / "data.recovering.h5"
     try:
@@ -215,7 +217,8 @@ def _fill(
     channels = [_Chunks(file[f"samples/{name}"], written, killed) for name in names]
     columns = [SampleColumn(file, name) for name in names]
     longest = max((channel.length for channel in channels), default=0)
-    for number in count() if names else ():
+    # samples of which nothing tells the time are none
+    for number in count() if names and written.rows["segments"] else ():
         progress(min(number * channels[0].size / max(longest, 1), 1.0))
         codes = [channel.read(number) for channel in channels]
         samples = min(part.size for part in codes)

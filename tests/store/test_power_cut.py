@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import RecordingError
+from tactile_lab.store import ledger
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
@@ -100,6 +101,46 @@ def test_a_run_killed_before_it_was_called_complete_is_recovered(bench, folder):
         recorder.close("complete", 4000)
     assert recover(folder.path).samples == 4000
     assert verify(folder.path).sound
+
+
+def entries(data):
+    """Where each entry of a ledger begins, and its dataset."""
+    at = 0
+    while at < len(data):
+        dataset, _, size = ledger._HEAD.unpack_from(data, at)
+        yield at, dataset.rstrip(b"\0").decode()
+        at += ledger._HEAD.size + ledger._CRC.size + size
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_a_kill_between_two_entries_leaves_a_run(cut_runs, tmp_path, number):
+    """Killed before the place in time of its first samples was written: a traceback."""
+    left, made, _ = cut_runs
+    path = tmp_path / "run"
+    shutil.copytree(left, path)
+    data = (path / LEDGER).read_bytes()
+    starts = [at for at, _ in entries(data)]
+    (path / LEDGER).write_bytes(data[: starts[number]])
+    kept = recover(path).samples
+    assert verify(path).sound
+    if kept:
+        with Run.load(path) as run:
+            codes = run.signal("V_K").scope_codes(0, kept)
+            assert run.duration > 0
+        np.testing.assert_array_equal(codes, made[1, :kept])
+
+
+def test_samples_keep_their_time_where_the_ledger_lost_it(cut_runs, tmp_path):
+    left, _, _ = cut_runs
+    path = tmp_path / "run"
+    shutil.copytree(left, path)
+    data = bytearray((path / LEDGER).read_bytes())
+    for at, dataset in entries(data):
+        if dataset == "segments":
+            data[at + ledger._HEAD.size] ^= 1
+    (path / LEDGER).write_bytes(data)
+    assert recover(path).samples > SAMPLES // 2
+    assert verify(path).sound
 
 
 def broken_index(data):
