@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -11,13 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.compiled import source_stamp
-from tactile_lab.model.simulate import simulate
+from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.state import Start
 from tactile_lab.validation.reference import reference
 from tactile_lab.validation.table import provenance
 from tactile_lab.waveform import Waveform
+
+SAMPLES = 40
+"""Times at which V_C1 is compared."""
 
 
 @dataclass(frozen=True)
@@ -113,27 +116,56 @@ def saturated_case(seed: int) -> Case:
     return replace(case, circuit=circuit, force=force, until=until)
 
 
-def compare(case: Case, samples: int = 40) -> HonestyRow:
-    """Solve one case both ways; V_C1 is compared at `samples` random times."""
-    c = case
-    times = np.sort(np.random.default_rng(c.seed).uniform(0, c.until, samples))
+def _solved(case: Case, samples: int = SAMPLES) -> tuple[Result, FloatArray]:
+    """What our solver makes of a case, and `samples` random times, shape (n,), s."""
     found = simulate(
-        c.circuit, c.force, keep=("spikes", "V_C1"), until=c.until, start=c.start,
-        tolerance=c.tolerance,
+        case.circuit, case.force, keep=("spikes", "V_C1"), until=case.until,
+        start=case.start, tolerance=case.tolerance,
     )  # fmt: skip
-    exact = reference(c.circuit, c.force, c.until, start=c.start, times=times.tolist())
-    assert found.spike_times is not None
-    assert found.error.spike_time is not None and found.error.V_C1 is not None
-    spike_time = _largest_gap(found.spike_times.tolist(), exact.spike_times)
-    return HonestyRow(
-        c,
-        found.spike_times.size,
-        len(exact.spike_times),
-        spike_time,
-        found.error.spike_time,
-        _largest_gap(found.sample("V_C1", times).tolist(), exact.V_C1),
-        found.error.V_C1,
+    draw = np.random.default_rng(case.seed)
+    return found, np.sort(draw.uniform(0, case.until, samples))
+
+
+def _answer(found: Result, times: FloatArray) -> str:
+    """A stamp of spike times and V_C1, to the last bit, and of the reference's sources.
+
+    While it stays the same so do the true errors, whatever became of the estimates.
+    """
+    stamp = hashlib.sha1(usedforsecurity=False)
+    stamp.update(np.asarray(found.spike_times).tobytes())
+    stamp.update(found.sample("V_C1", times).tobytes())
+    for path in sorted(Path(__file__).parent.glob("decimal_*.py")):
+        stamp.update(path.read_bytes())
+    return stamp.hexdigest()[:16]
+
+
+def compare(case: Case, samples: int = SAMPLES) -> HonestyRow:
+    """Solve one case both ways; V_C1 is compared at `samples` random times."""
+    found, times = _solved(case, samples)
+    exact = reference(
+        case.circuit, case.force, case.until, start=case.start, times=times.tolist()
     )
+    spikes = [] if found.spike_times is None else found.spike_times.tolist()
+    return _row(
+        case,
+        found,
+        len(exact.spike_times),
+        _largest_gap(spikes, exact.spike_times),
+        _largest_gap(found.sample("V_C1", times).tolist(), exact.V_C1),
+    )
+
+
+def _row(
+    case: Case, found: Result, spikes_reference: int, spike_time: float, V_C1: float
+) -> HonestyRow:
+    """True errors, s and V, beside what `found` estimates them at."""
+    error, spikes = found.error, found.spike_times
+    assert spikes is not None and error.spike_time is not None
+    assert error.V_C1 is not None
+    return HonestyRow(
+        case, spikes.size, spikes_reference, spike_time, error.spike_time, V_C1,
+        error.V_C1,
+    )  # fmt: skip
 
 
 def _largest_gap(found: list[float], exact: tuple[Decimal, ...]) -> float:
@@ -152,47 +184,51 @@ NUMBERS = (
 def campaign(count: int, out: Path | None, say: Callable[[str], None]) -> Measured:
     """`count` random scenes, and a fifth as many where T1 saturates.
 
-    With `out`, each is written to honesty.csv as it is measured, with a stamp of the
-    solver's sources; those measured by the same solver before are read from it.
+    With `out`, each is written to honesty.csv as it is measured, with a stamp of our
+    answer. Where that is still the same, to the last bit, the true errors are read from
+    there, and only the estimates are taken anew.
     """
-    stamp = str(source_stamp())
     file = None if out is None else out / "honesty.csv"
-    known: dict[tuple[str, int], list[str]] = {}
-    if file is not None and file.exists():
-        with file.open(encoding="utf-8") as lines:
-            for scenes, number, by, *numbers in csv.reader(lines):
-                if by == stamp:
-                    known[scenes, int(number)] = numbers
+    kept = _kept(file)
     found: Measured = {}
     with ExitStack() as stack:
         writer = None
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
-            writer = csv.writer(
-                stack.enter_context(file.open("w", newline="", encoding="utf-8")),
-                lineterminator="\n",
-            )
-            writer.writerow(("scenes", "seed", "solver", *NUMBERS))
-            # all of it at once: a campaign stopped early keeps what it had
-            writer.writerows((*key, stamp, *known[key]) for key in sorted(known))
+            opened = stack.enter_context(file.open("a", newline="", encoding="utf-8"))
+            writer = csv.writer(opened, lineterminator="\n")
         for kind, draw in KINDS.items():
             found[kind] = []
             for seed in range(count if kind == "cascade" else -(-count // 5)):
                 case = draw(seed)
-                old = known.get((kind, seed))
-                if old is not None:
-                    row = HonestyRow(
-                        case, int(old[0]), int(old[1]), *map(float, old[2:])
-                    )
+                solved, times = _solved(case)
+                answer, old = _answer(solved, times), kept.get((kind, seed), [""])
+                if old[0] == answer:
+                    row = _row(case, solved, int(old[2]), float(old[3]), float(old[5]))
                 else:
                     row = compare(case)
-                    if writer is not None:
-                        kept = (getattr(row, name) for name in NUMBERS)
-                        writer.writerow((kind, seed, stamp, *kept))
+                numbers = [str(getattr(row, name)) for name in NUMBERS]
+                if writer is not None and old[0] != answer:
+                    writer.writerow((kind, seed, answer, *numbers))
+                kept[kind, seed] = [answer, *numbers]
                 found[kind].append(row)
                 if (seed + 1) % 50 == 0:
                     say(f"{kind}: {seed + 1} random scenes")
+    if file is not None:
+        with file.open("w", newline="", encoding="utf-8") as whole:
+            writer = csv.writer(whole, lineterminator="\n")
+            writer.writerow(("scenes", "seed", "answer", *NUMBERS))
+            writer.writerows((*key, *kept[key]) for key in sorted(kept))
     return found
+
+
+def _kept(file: Path | None) -> dict[tuple[str, int], list[str]]:
+    """Of each scene and seed the newest row of honesty.csv: answer and numbers."""
+    if file is None or not file.exists():
+        return {}
+    with file.open(encoding="utf-8") as lines:
+        rows = list(csv.reader(lines))
+    return {(row[0], int(row[1])): row[2:] for row in rows if row[1].isdecimal()}
 
 
 def report(count: int, rows: Measured) -> str:

@@ -34,6 +34,14 @@ def test_a_campaign_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(honesty, "compare", None)  # what is known is not measured again
     again = honesty.campaign(2, tmp_path, print)
     assert again == first
+    # while our answer is the same, so is its error; its estimate may be another
+    file = tmp_path / "honesty.csv"
+    rows = [line.split(",") for line in file.read_text().splitlines()]
+    changed = [[*row[:6], "7.0", row[7], "7.0"] for row in rows[1:]]
+    file.write_text("\n".join(map(",".join, [rows[0], *changed])) + "\n")
+    assert honesty.campaign(1, tmp_path, print)["cascade"] == first["cascade"][:1]
+    after = [line.split(",") for line in file.read_text().splitlines()]
+    assert after == [rows[0], rows[1], changed[1]], "what was not asked for stays"
     text = honesty.report(2, again | {"saturated": again["cascade"]})
     assert "2 of 2 (100.0%)" in text
     honesty.scatter(again, tmp_path / "honesty.svg")
