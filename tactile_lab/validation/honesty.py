@@ -238,7 +238,9 @@ def report(count: int, rows: Measured) -> str:
             "# Is the error estimate honest?\n",
             f"Written by `tactile-lab validate honesty --scenes {count} --out docs`. "
             "Random scenes and parameters (`tactile_lab/validation/honesty.py`), half "
-            "at random tolerances, against the 40-digit reference.\n",
+            "at random tolerances, against the 40-digit reference. A scene is measured "
+            "again when a bit of our answer or the reference's code has changed; until "
+            "then only its estimates are taken anew.\n",
             f"{provenance()}\n",
             "![estimate against true error](honesty.svg)\n",
             "## The cascade, Eqs. (16) to (18)\n",
