@@ -163,6 +163,7 @@ class Watched:
     def _listen(self) -> None:
         for word in sys.stdin:
             QTimer.singleShot(0, self.app, lambda word=word: self._act(word))
+        QTimer.singleShot(0, self.app, self.app.quit)  # who drives it has gone
 
 
 def main(folder: Path) -> None:
