@@ -131,16 +131,20 @@ def solved_blocks(
         LinkLostError: the workers of the scheduler are gone.
     """
     waiting: deque[tuple[slice, Future[Solved]]] = deque()
+    left_out = role == kernel.UNTOUCHED
     with _workers(loads, cores, scheduler) as workers:
-        size = role.size
-        starts = range(0, size, workers.block)
-        blocks = deque(slice(k, min(k + workers.block, size)) for k in starts)
+        blocks = _parts(left_out, workers.block)
         try:
             while blocks or waiting:
                 while blocks and len(waiting) < AHEAD * workers.threads:
                     part = blocks.popleft()
                     asked = (part, role[part], span[part])
-                    waiting.append((part, workers.submit(*asked)))
+                    if left_out[part].all():  # not worth sending
+                        future: Future[Solved] = Future()
+                        future.set_result(solve_block(loads, *asked))
+                    else:
+                        future = workers.submit(*asked)
+                    waiting.append((part, future))
                 part, future = waiting.popleft()
                 found = future.result()
                 refused = np.flatnonzero(found.role == kernel.REFUSED)
@@ -153,6 +157,19 @@ def solved_blocks(
         finally:
             for _, other in waiting:
                 other.cancel()
+
+
+def _parts(left_out: NDArray[np.bool_], block: int) -> deque[slice]:
+    """So many taxels each; those that are left out altogether in one go."""
+    found: deque[slice] = deque()
+    silent = False
+    for start in range(0, left_out.size, block):
+        part = slice(start, min(start + block, left_out.size))
+        before, silent = silent, bool(left_out[part].all())
+        if before and silent:
+            part = slice(found.pop().start, part.stop)
+        found.append(part)
+    return found
 
 
 class _Workers(NamedTuple):

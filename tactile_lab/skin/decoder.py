@@ -33,7 +33,7 @@ class Coding:
         score: share of test touches told right, with Wilson's 95 % interval.
         chance: share that guessing gets right.
         information: of a spike on the label by the taxel it comes from, bits, beyond
-            what shuffled labels give.
+            what shuffled labels give; 0 where these give as much.
         shuffled: the spread of that under shuffled labels, one standard deviation.
         taxel: the one whose trains are compared: it fires most.
         victor_purpura: its mean distance between touches of one label, over that
@@ -101,12 +101,24 @@ def information(counts: FloatArray, label: NDArray[Any]) -> float:
     return float(bits @ mean / mean.sum())
 
 
+def beyond_chance(
+    counts: FloatArray, label: NDArray[Any], seed: int
+) -> tuple[float, float]:
+    """`information` less its mean under shuffled labels, and its spread under these.
+
+    Bits; 0 where shuffled labels tell as much: no information is negative.
+    """
+    drawn = np.random.default_rng(seed)
+    chance = [information(counts, drawn.permutation(label)) for _ in range(SHUFFLES)]
+    told = information(counts, label) - float(np.mean(chance))
+    return max(told, 0.0), float(np.std(chance))
+
+
 def coding(data: Dataset, task: str) -> Coding:
     """All measures of one task, of its test touches unless said."""
     asked = data.chosen(task, test=True)
     counts, label = data.counts(asked), data.label[asked]
-    drawn = np.random.default_rng(data.seed)
-    chance = [information(counts, drawn.permutation(label)) for _ in range(SHUFFLES)]
+    told, shuffled = beyond_chance(counts, label, data.seed)
     taxel = int(counts.sum(axis=0).argmax())
     some = asked[:COMPARED]
     apart = distances([data.train(int(i), taxel) for i in some])
@@ -121,8 +133,8 @@ def coding(data: Dataset, task: str) -> Coding:
     return Coding(
         score=score(data, task),
         chance=1 / len(LABELS[task]),
-        information=information(counts, label) - float(np.mean(chance)),
-        shuffled=float(np.std(chance)),
+        information=told,
+        shuffled=shuffled,
         taxel=taxel,
         victor_purpura=ratios[0],
         van_rossum=ratios[1],

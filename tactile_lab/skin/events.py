@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,12 +19,15 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.model.circuit import FloatArray
+from tactile_lab.store.folder import lock
 
 EVENT = np.dtype([("time", np.float64), ("taxel", np.int32)])
 """One event: s, and the number of the taxel."""
 BUCKETS = 64
 """Stretches of time, sorted one by one: a 64th of all events is in memory."""
 FILE = "events.h5"
+WAITING = ".events-"
+"""How a folder of trains that wait to be sorted begins."""
 
 
 class EventWriter:
@@ -39,7 +43,11 @@ class EventWriter:
 
     def __init__(self, path: Path, duration: float) -> None:
         self._path, self._duration = path, duration
-        self._folder = tempfile.TemporaryDirectory(dir=path.parent, prefix=".events-")
+        _remove_left(path.parent)
+        with recording():
+            folder = tempfile.TemporaryDirectory(dir=path.parent, prefix=WAITING)
+            self._folder, self._lock = folder, (Path(folder.name) / "lock").open("w")
+        lock(self._lock)
         self._parts = [Path(self._folder.name) / str(k) for k in range(BUCKETS)]
         self._count = 0
 
@@ -52,6 +60,7 @@ class EventWriter:
         error: BaseException | None,
         where: TracebackType | None,
     ) -> None:
+        self._lock.close()
         self._folder.cleanup()
 
     def add(self, first: int, count: NDArray[np.int64], times: FloatArray) -> None:
@@ -112,6 +121,18 @@ class EventWriter:
         partial.replace(self._path)
 
 
+def _remove_left(folder: Path) -> None:
+    """Remove what waited to be sorted when its process was killed."""
+    for left in folder.glob(f"{WAITING}*"):
+        try:
+            with (left / "lock").open("r+") as file:
+                abandoned = lock(file)
+        except OSError:  # not begun, or just gone
+            continue
+        if abandoned:
+            shutil.rmtree(left, ignore_errors=True)
+
+
 @contextmanager
 def recording() -> Iterator[None]:
     """Turn a failing disk into an error of the tree."""
@@ -170,6 +191,11 @@ class Events:
                 about=json.loads(opened.attrs["about"]),
             )
         except (OSError, KeyError, ValueError) as reason:
+            if any(file.parent.glob(f"{WAITING}*")) and not file.exists():
+                raise RunFolderError(
+                    f"{file.parent} is not finished: it is being computed, or that was "
+                    "ended; then compute it again."
+                ) from reason
             raise RunFolderError(f"{file} holds no events: {reason}.") from reason
 
     def train(self, taxel: int) -> FloatArray:

@@ -48,7 +48,7 @@ class Frames(SceneTable):
         """
         try:
             found = np.load(Path(self.file), mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError) as reason:
+        except (OSError, ValueError, EOFError) as reason:
             raise SceneError(f"{self.file} is no .npy file: {reason}.") from reason
         if not isinstance(found, np.ndarray):
             raise SceneError(f"{self.file} is an archive; give one array as .npy.")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import shutil
 import time as wall
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import ParameterError
+from tactile_lab.errors import ParameterError, RecordingError
 from tactile_lab.model.circuit import (
     LARGEST_VOLTAGE,
     SUBTHRESHOLD_LIMIT,
@@ -19,12 +21,17 @@ from tactile_lab.model.circuit import (
 from tactile_lab.model.equations import fires_at_rest
 from tactile_lab.quantity import show
 from tactile_lab.skin import kernel
-from tactile_lab.skin.blocks import solved_blocks
+from tactile_lab.skin.blocks import solve_block, solved_blocks
 from tactile_lab.skin.bound import least_critical, spans
-from tactile_lab.skin.events import FILE, EventWriter
+from tactile_lab.skin.events import FILE, EventWriter, recording
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.skin import Skin
 
+TAXEL, SPIKE = 33, 26
+"""Bytes on the disk: of a taxel, and of a spike, which waits there for 16 to be sorted
+while some 10 of the file are written."""
+TRIED = 16
+"""Taxels at most that tell how many spikes will come."""
 CORNERS = 64
 """Times at which forces are looked at beforehand."""
 
@@ -70,7 +77,7 @@ def press(
     Raises:
         ParameterError: the parts of a taxel make no circuit.
         SolverError: a taxel cannot be solved to the tolerance.
-        RecordingError: the events cannot be written.
+        RecordingError: the events cannot be written, or there is no room for them.
         NotFoundError, SceneError: the scheduler cannot be used.
         LinkLostError: its workers are gone; nothing is written.
     """
@@ -85,7 +92,9 @@ def press(
     silent = (span < least_critical(skin)) & (role == kernel.FIRED)
     role[silent] = kernel.UNTOUCHED
     worst, pieces = 0.0, 0
-    folder.mkdir(parents=True, exist_ok=True)
+    _refuse_too_large(loads, role, span, folder)
+    with recording():
+        folder.mkdir(parents=True, exist_ok=True)
     with EventWriter(folder / FILE, skin.duration) as writer:
         for part, found in solved_blocks(loads, role, span, cores, scheduler):
             role[part], count[part], lines, force, error, times = found
@@ -118,6 +127,36 @@ def press(
             },
         )
     return Pressed(int(count.sum()), told, worst, seconds, warnings(skin, most))
+
+
+def _refuse_too_large(
+    loads: Loads, role: NDArray[np.uint8], span: FloatArray, folder: Path
+) -> None:
+    """Refuse what the disk cannot hold, going by some taxels that are tried.
+
+    Raises:
+        RecordingError: there is too little room.
+    """
+    array, asked = loads.skin.array, np.flatnonzero(role == kernel.FIRED)
+    spikes = len(array.stuck) * array.stuck_rate * loads.skin.duration
+    number = min(TRIED, math.ceil(asked.size / (1 << 8)))
+    tried = asked[np.linspace(0, asked.size, number, endpoint=False).astype(int)]
+    for n in tried:
+        one = slice(n, n + 1)
+        found = solve_block(loads, one, role[one], span[one])
+        spikes += found.times.size * asked.size / number
+    needed = array.size * TAXEL + spikes * SPIKE
+    there = next(
+        place for place in (folder, *folder.resolve().parents) if place.exists()
+    )
+    free = shutil.disk_usage(there).free
+    if needed > free:
+        raise RecordingError(
+            f"{folder} has room for {show(free, 'B', 2)}; about {show(needed, 'B', 2)} "
+            f"are needed for {array.size:,} taxels and some {spikes:,.2g} spikes, by "
+            f"{number} taxels that were tried. Make room, name another folder, or "
+            "make the array smaller or the duration shorter."
+        )
 
 
 def highest(skin: Skin) -> tuple[float, tuple[str, ...]]:

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from tactile_lab.cli import cli as command_line
 from tactile_lab.errors import RunFolderError
 from tactile_lab.skin.dataset import LABELS, Dataset, make, touch
-from tactile_lab.skin.decoder import distances, information
+from tactile_lab.skin.decoder import beyond_chance, distances, information
 from tactile_lab.skin.single import simulate_taxel
 
 
@@ -86,3 +86,13 @@ def test_what_is_no_data_set_is_refused(tmp_path):
     neither = CliRunner().invoke(command_line, ["skin"])
     assert both.exit_code == neither.exit_code == 2
     assert "or --dataset FOLDER" in both.output and "or --dataset" in neither.output
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_spikes_that_tell_nothing_tell_no_negative_amount(seed):
+    drawn = np.random.default_rng(seed)
+    counts, label = drawn.poisson(5.0, (80, 16)), np.arange(80) % 4
+    told, spread = beyond_chance(counts.astype(float), label, 1)
+    assert 0 <= told < 5 * spread and not f"{told:.3f}".startswith("-")
+    counts[label == 2] *= 4
+    assert beyond_chance(counts.astype(float), label, 1)[0] > 0.2

@@ -1,13 +1,25 @@
 """An array under a load: each taxel what it is alone, whatever the cores."""
 
+import shutil
+import subprocess
+import sys
+from collections import namedtuple
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from tactile_lab.cli import cli as command_line
-from tactile_lab.errors import NotFoundError, ParameterError, SolverError
+from tactile_lab.errors import (
+    NotFoundError,
+    ParameterError,
+    RecordingError,
+    RunFolderError,
+    SceneError,
+    SolverError,
+)
 from tactile_lab.skin import kernel
-from tactile_lab.skin.events import Events
+from tactile_lab.skin.events import Events, EventWriter
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.press import highest, press
 from tactile_lab.skin.receptive import receptive_field
@@ -213,3 +225,37 @@ def test_a_scheduler_that_cannot_be_used_is_named_and_nothing_is_left(tmp_path):
     words = ["skin", str(tmp_path / "s.toml"), "--scheduler", "tcp://127.0.0.1:9"]
     refused = CliRunner().invoke(command_line, [*words, "--cores", "2"])
     assert refused.exit_code == 2 and "no --cores" in refused.output
+
+
+def test_what_the_disk_cannot_hold_is_refused_before_it_is_computed(
+    tmp_path, monkeypatch
+):
+    skin = load_skin(SLIDE)
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**6, 10**6, 4000))
+    told = []
+    with pytest.raises(RecordingError, match=r"room for 4 kB; about .* 90 taxels and"):
+        press(skin, tmp_path / "new" / "skin", tell=told.append)
+    assert not told and not (tmp_path / "new").exists()
+
+
+def test_a_run_that_was_killed_is_told_and_its_remains_are_removed(tmp_path):
+    code = (
+        "import os, sys; from pathlib import Path;"
+        "from tactile_lab.skin.events import EventWriter;"
+        "begun = EventWriter(Path(sys.argv[1]) / 'events.h5', 1.0); os._exit(9)"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)
+    left = next(tmp_path.glob(".events-*"))
+    with pytest.raises(RunFolderError, match="not finished"):
+        Events.read(tmp_path)
+    with EventWriter(tmp_path / "events.h5", 1.0), EventWriter(tmp_path / "b", 1.0):
+        there = set(tmp_path.glob(".events-*"))
+        assert left not in there and len(there) == 2
+
+
+def test_an_empty_file_of_frames_is_refused_by_name(tmp_path):
+    (tmp_path / "f.npy").touch()
+    file = {"kind": "frames", "file": "f.npy"}
+    with pytest.raises(SceneError, match=r"f\.npy is no \.npy file: No data left"):
+        load_skin({**SLIDE, "stimulus": [file]}, folder=tmp_path)
