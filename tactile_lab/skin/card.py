@@ -91,8 +91,8 @@ def write_card(
         "",
         "Information: what a spike tells of the answer by the taxel it comes from, "
         "after Skaggs and others (1993), from mean counts of the test part, less the "
-        f"mean under {SHUFFLES} shuffles of the answers (0 where these tell as much); ± "
-        "is one standard deviation under these shuffles. What time tells is not in it.",
+        f"mean under {SHUFFLES} shuffles of the answers (0 where these tell as much); "
+        "± is one standard deviation under these. What time tells is not in it.",
         "",
         "Distances (elephant): the mean between touches of one answer over the mean "
         f"between answers, of the first {min(COMPARED, half)} test touches, by the "
