@@ -41,16 +41,19 @@ def main(scene: str, folder: str) -> int:
     window.resize(1720, 1080)
     window.show()
     kept: list[Executed] = []
+    started = False
 
     def read(line: LogLine) -> None:
         if line.text.startswith(PUBLISHED):
             print("lsl", line.text.removeprefix(PUBLISHED), file=sys.stderr, flush=True)
 
     def look() -> None:
-        if session.run.source is not None or kept:
-            if kept or not session.run.alive:
+        nonlocal started
+        if started:
+            if kept or session.state is WindowState.FAULT:
                 app.quit()
         elif session.state is WindowState.READY and session.plan.expectation:
+            started = True
             window.setup.start()
 
     session.log.added.connect(read)
