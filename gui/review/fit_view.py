@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGraphicsOpacityEffect, QGridLayout, QLabel, QWidget
 
 from gui.lanes.lane import title_of
 from gui.look.theme import Theme
@@ -14,6 +14,16 @@ from gui.session.fit import Bar, Card
 
 ROW = 19
 """Height of a bar's row, px."""
+
+HOW = {
+    "Onset": "Between the largest force that stayed silent and the least that fired.",
+    "Slope of the peak rate": "Median of the slopes between neighbouring forces, with "
+    "the least and the largest of them.",
+    "Adaptation 1/|β|": "Of α exp(βt) + γ fitted to the rate in the hold, with its "
+    "95 % interval.",
+    "Fall in the hold": "From the highest to the last rate in the hold.",
+}
+"""How each number was obtained, for its tool tip."""
 
 
 class FitCards(QWidget):
@@ -34,10 +44,25 @@ class FitCards(QWidget):
             self._labels.append((card, *parts))
         grid.setColumnStretch(0, 1)
         grid.setColumnStretch(1, 1)
+        self._pale = QGraphicsOpacityEffect(self)
+        self._pale.setOpacity(0.4)
+        self.setGraphicsEffect(self._pale)
+        self.mark_old(False)
         self.hide()
+
+    @property
+    def old(self) -> bool:
+        """Whether a step has ended that is not in them yet; they are pale then."""
+        return self._pale.isEnabled()
+
+    def mark_old(self, old: bool) -> None:
+        """A step that is not in them has ended, or all are in them."""
+        self._pale.setEnabled(old)
+        self.setToolTip("Without the newest step: it is being fitted" if old else "")
 
     def show_cards(self, cards: tuple[Card, ...]) -> None:
         """Show up to four fitted numbers."""
+        self.mark_old(False)
         for (frame, name, value, detail), card in zip(
             self._labels, cards, strict=False
         ):
@@ -47,7 +72,7 @@ class FitCards(QWidget):
             detail.setText(unbroken("\n".join(small)))
             spoken = ", ".join(small)
             frame.setAccessibleName(f"{card.name}: {card.value}. {spoken}")
-            frame.setToolTip(spoken)
+            frame.setToolTip("\n".join(filter(None, (spoken, HOW.get(card.name)))))
         self.setVisible(bool(cards))
 
 

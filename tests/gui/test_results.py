@@ -6,6 +6,7 @@ import pytest
 from gui.look.theme import Theme
 from gui.review.live_plots import COLUMNS, column_plot
 from gui.review.results import ResultsView
+from gui.session.fit import FitInput, fit
 from tactile_lab.measurement import MeasuredTrial
 
 SILENT, SLOW, FAST = (
@@ -54,3 +55,23 @@ def test_each_column_can_be_drawn_also_where_nothing_fired(y: str, x: str) -> No
     assert found is not None and found.panels[0].series[0].x.size == 2
     needs = {"force", "start", "spikes"}
     assert (column_plot([SILENT], y, x) is None) is not ({x, y} <= needs)
+
+
+def test_cards_without_the_newest_step_are_pale(results: ResultsView) -> None:
+    def fitted(steps: list[MeasuredTrial]) -> None:
+        results.show_fit(fit(steps, FitInput(np.empty(0), np.empty(0), {})))
+
+    def steps(count: int) -> list[MeasuredTrial]:
+        shown = [SILENT, SLOW, FAST][:count]
+        results.show_steps(shown, total=3, running=True, whole=False)
+        return shown
+
+    fitted(steps(2))
+    tips = [card.toolTip() for card, *_ in results.cards._labels]
+    assert "neighbouring" in tips[1] and "95 %" in tips[2], "how they were obtained"
+    assert not results.cards.old
+    three = steps(3)
+    assert results.cards.old, "they say that one step fired, beside a plot of two"
+    assert "newest" in results.cards.toolTip()
+    fitted(three)
+    assert not results.cards.old and not results.cards.toolTip()
