@@ -22,8 +22,9 @@ REFERENCE = 1.05e-3
 """What one round of the work takes where the seconds below were measured, s."""
 ROUNDS = 12
 
-START = 2.6
-"""Imports, opening of all instruments, figures and report, s."""
+START, FITTED = 2.8, 1.3
+"""Imports, opening of all instruments, figures and report; and what the lanes of spikes
+and the fits to them add where any are expected, s."""
 PER_TRIAL = 0.035
 """Played, judged and drawn, s."""
 PER_STREAMED_SECOND = 0.016
@@ -31,10 +32,12 @@ PER_STREAMED_SECOND = 0.016
 STORED, DETECTED = 0.006, 0.006
 """Per million samples of one channel: rendered, compressed, read again and drawn; and
 of the one on which spikes are looked for, s."""
-COMPARED, COMPARED_POINT, COMPARED_SPIKE = 1.3, 1.84e-3, 4.2e-3
+COMPARED, COMPARED_TRIAL = 0.6, 0.07
+COMPARED_POINT, COMPARED_SPIKE = 1.84e-3, 4.2e-3
 """Of the model beside the run, which is solved once as it is believed and once for each
-cause of uncertainty: with its figure, per set-point or point of a list, and per spike,
-s. The search for what explains a misfit is not in it: that cannot be foreseen."""
+cause of uncertainty: with its figure, per trial, per set-point or point of a list, and
+per spike, s. The search for what explains a misfit is not in it: that cannot be
+foreseen."""
 
 BASE = 270e6
 """Memory of the program with its instruments and figures, bytes."""
@@ -109,7 +112,9 @@ def computing(
     millions = drive.streamed * scene.record.sample_rate / 1e6
     points = set_points(drive, interval)
     told = {
-        "start and report": START + PER_TRIAL * len(drive.steps),
+        "start and report": (
+            START + (FITTED if spikes else 0.0) + PER_TRIAL * len(drive.steps)
+        ),
         "streaming": PER_STREAMED_SECOND * drive.streamed,
         "storing": STORED * millions * len(needed.stored),
     }
@@ -118,7 +123,10 @@ def computing(
     memory = BASE + MEMORY_CHANNEL * len(needed.channels)
     if scene.compared:
         told["model beside the run"] = (
-            COMPARED + COMPARED_POINT * points + COMPARED_SPIKE * spikes
+            COMPARED
+            + COMPARED_TRIAL * len(drive.steps)
+            + COMPARED_POINT * points
+            + COMPARED_SPIKE * spikes
         )
         memory += MEMORY_POINT * points
     time_ = {part: slow * seconds for part, seconds in told.items() if seconds}
