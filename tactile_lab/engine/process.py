@@ -10,16 +10,16 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
 
 FORKS = sys.platform == "linux"
 AHEAD = "tactile_lab.engine.ahead"
 
+CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")
+
 if FORKS:
     from multiprocessing import forkserver
-    from multiprocessing.context import ForkServerProcess as Process
-else:
-    from multiprocessing.context import SpawnProcess as Process
 
 Serve = Callable[[Connection, bool], None]
 
@@ -42,7 +42,7 @@ class EngineProcess:
 
     def __init__(self, serve: Serve, pipe: Connection, *, realtime: bool) -> None:
         self._pipe = pipe
-        self._process = Process(
+        self._process = CONTEXT.Process(
             target=_main, args=(dict(os.environ), serve, pipe, realtime), daemon=True
         )  # daemonic: a window that ends without `close` still sends it SIGTERM
         self._starting = threading.Thread(target=self._start, name="start", daemon=True)
