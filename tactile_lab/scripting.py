@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from tactile_lab.model.simulate import Result
     from tactile_lab.report.identified import FittedRuns
+    from tactile_lab.report.several import SeveralRuns
     from tactile_lab.report.write import Report
     from tactile_lab.studies.chosen import Chosen
 
@@ -95,22 +96,52 @@ def run(
     return Run.load(done.folder)
 
 
-def write_report(run: Run | str | Path, *, pdf: bool = False) -> Report:
-    """Write figure, report.html and results.json of a run, again, into its folder.
+@overload
+def write_report(
+    run: Run | str | Path, out: str | Path | None = ..., *, pdf: bool = ...
+) -> Report: ...
+@overload
+def write_report(
+    run: Sequence[Run | str | Path], out: str | Path | None = ..., *, pdf: bool = ...
+) -> SeveralRuns: ...
+def write_report(
+    run: Run | str | Path | Sequence[Run | str | Path],
+    out: str | Path | None = None,
+    *,
+    pdf: bool = False,
+) -> Report | SeveralRuns:
+    """Write figure, report.html and results.json of a run, or one page of several.
+
+    ``write_report(["runs/A", "runs/B"]).by_specimen``
 
     Args:
-        run: a run, or its folder.
+        run: a run, or its folder; or several, at least two.
+        out: folder to write into; the run's own unless given, of several
+            ./side-by-side.
         pdf: also write the figures as PDF.
 
     Raises:
         RunFolderError: not a run, or one without data.
+        ParameterError: one of several is named twice.
         OSError: the folder cannot be written.
     """
     from tactile_lab.report.from_run import read
     from tactile_lab.report.write import write
 
-    folder = run.path if isinstance(run, Run) else Path(run)
-    return write(folder, read(folder), pdf=pdf)
+    if isinstance(run, Run | str | Path):
+        folder = _folder(run)
+        into = folder if out is None else Path(out)
+        into.mkdir(parents=True, exist_ok=True)
+        return write(into, read(folder), pdf=pdf)
+    from tactile_lab.report.several import SeveralRuns
+
+    found = SeveralRuns.of([_folder(one) for one in run])
+    found.write(Path("side-by-side" if out is None else out), pdf=pdf)
+    return found
+
+
+def _folder(run: Run | str | Path) -> Path:
+    return run.path if isinstance(run, Run) else Path(run)
 
 
 @overload
@@ -233,7 +264,7 @@ def identify(
     from tactile_lab.report.identified import identify_runs
 
     several = [runs] if isinstance(runs, Run | str | Path) else runs
-    read_ = [read(r.path if isinstance(r, Run) else Path(r)) for r in several]
+    read_ = [read(_folder(one)) for one in several]
     return identify_runs(read_, parameters, force_scales=force_scales)
 
 

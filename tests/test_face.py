@@ -2,6 +2,7 @@
 
 import doctest
 import pydoc
+import shutil
 import subprocess
 import sys
 
@@ -186,6 +187,14 @@ def test_plan_and_report_show_themselves(run):
     assert report.html.parent == run.path
     assert repr(report) == f"<Report of {run.path.name}: {report.html}>"
     assert report._repr_html_().startswith("<iframe srcdoc=")
+
+
+def test_several_runs_are_reported_side_by_side(run, tmp_path):
+    other = shutil.copytree(run.path, tmp_path / "other")
+    found = tactile_lab.write_report([run, other], tmp_path / "page")
+    assert [one.entry.name for one in found.runs] == [run.path.name, "other"]
+    (page,) = (tmp_path / "page").glob("*.html")
+    assert "2 runs side by side" in page.read_text(encoding="utf-8")
 
 
 def test_simulate_takes_a_circuit_or_a_scene():

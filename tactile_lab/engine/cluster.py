@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
 from tactile_lab.plugins import registered
@@ -40,13 +41,14 @@ def cluster(address: str) -> Iterator[Any]:
         import distributed
     except ImportError as reason:
         raise NotFoundError(
-            "--scheduler needs Dask: pip install 'tactile-lab[cluster]'."
+            "--scheduler needs Dask. In the checkout: pip install -e '.[cluster]'."
         ) from reason
     if not address.startswith(SCHEMES):
         raise NotFoundError(
             f"--scheduler {address}: write its address, such as tcp://HOST:8786."
         )
     try:
+        urlsplit(address).port  # noqa: B018  Dask leaves a client behind otherwise
         open_client: Any = distributed.Client  # untyped
         client = open_client(address, timeout="5s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as reason:

@@ -60,8 +60,8 @@ def require_libraries() -> None:
     """
     if not (find_spec("sklearn") and find_spec("elephant")):
         raise NotFoundError(
-            "A data set is scored with scikit-learn and elephant: "
-            "pip install 'tactile-lab[dataset]'."
+            "A data set is scored with scikit-learn and elephant. In the checkout: "
+            "pip install -e '.[dataset]'."
         )
 
 

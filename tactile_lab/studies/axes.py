@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import QuantityError, SceneError
 from tactile_lab.quantity import SIFloat, parse, show
+from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 
 FloatArray = NDArray[np.float64]
@@ -58,6 +59,7 @@ class Axis:
         values: what it takes, in order: SI numbers, or whatever a file holds there.
             Empty where it is drawn.
         spread: what it is drawn from; None where it has values.
+        listed: whether the key takes a list, and each value stands for a list of one.
         group: axes of one group go through their values together; None for one of its
             own.
     """
@@ -66,6 +68,7 @@ class Axis:
     unit: str
     values: tuple[Any, ...] = ()
     spread: Spread | None = None
+    listed: bool = False
     group: str | None = None
 
     @property
@@ -88,6 +91,8 @@ class Axis:
             return f"{self.key}={json.dumps(value)}"
         if isinstance(value, bool):
             return f"{self.key}={json.dumps(value)}"
+        if self.listed:
+            return f'{self.key}=["{value} {self.unit}"]'
         return f"{self.key}={value} {self.unit}".rstrip()
 
 
@@ -105,24 +110,31 @@ def axis(key: str, given: Mapping[str, Any], scene: Scene) -> Axis:
     now, unit = _at(scene, key)
     try:
         if "values" in given:
+            values = _values(given["values"], unit)
             return Axis(
                 key=key,
                 unit=unit,
-                values=_values(given["values"], unit),
+                values=values,
+                listed=bool(unit)
+                and isinstance(now, list | tuple)
+                and all(isinstance(one, float) for one in values),
                 group=given.get("zip"),
             )
         kind = next(kind for kind in ("normal", "uniform") if kind in given)
         return Axis(key=key, unit=unit, spread=_spread(kind, given[kind], now, unit))
     except QuantityError as reason:
+        if now is None:  # maybe there is no such key, which says more
+            load(scene, {key: 0})
         raise SceneError(f"axis {key}: {reason}") from reason
 
 
 def changed(axes: Sequence[Axis], values: Sequence[Any]) -> dict[str, Any]:
     """Changes of the scene's keys, as `load` takes them, numbers in SI."""
-    return {
-        axis.key: SIFloat(value) if isinstance(value, float) else value
-        for axis, value in zip(axes, values, strict=True)
-    }
+    changes = {}
+    for axis, value in zip(axes, values, strict=True):
+        number = SIFloat(value) if isinstance(value, float) else value
+        changes[axis.key] = [number] if axis.listed else number
+    return changes
 
 
 def _at(scene: Scene, key: str) -> tuple[Any, str]:

@@ -65,7 +65,8 @@ class Forecast:
     Attributes:
         points: in all.
         there: computed before.
-        seconds: a point takes one worker, s; None where nothing is left to compute.
+        seconds: a point takes one worker, s; None where nothing is left to compute, or
+            all that were tried failed.
         reason: why a tried point failed, if one did.
     """
 
@@ -99,9 +100,11 @@ def forecast(study: Study, out: Path) -> Forecast:
         for number in missing[:FIRST]:
             began = time.perf_counter()
             batch = points.batch(_task(study, named, np.array([number])))
-            tried.append(time.perf_counter() - began)
-            reason = reason or batch.reasons.get(0, "")
-        seconds = min(tried)  # the first one compiles
+            took, failed = time.perf_counter() - began, batch.reasons.get(0, "")
+            reason = reason or failed
+            if not failed:  # what is refused takes no time
+                tried.append(took)
+        seconds = min(tried, default=None)  # the first one compiles
     return Forecast(size, size - missing.size, seconds, reason)
 
 

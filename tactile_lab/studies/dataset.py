@@ -122,7 +122,7 @@ def write(found: Gathered, folder: Path) -> None:
     part, whole = folder / f"{DATA}.part", folder / DATA
     for old in (part, folder / f"{DATA}.old"):
         shutil.rmtree(old, ignore_errors=True)
-    found.to_xarray().to_zarr(part, consolidated=False, zarr_format=2)
+    found.to_xarray().to_zarr(part, consolidated=True, zarr_format=2)
     if whole.exists():
         whole.rename(folder / f"{DATA}.old")
     part.rename(whole)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from tactile_lab.complaint import validated
 from tactile_lab.errors import QuantityError, SceneError, choices
@@ -39,10 +39,15 @@ def _share(value: Any) -> float:
     found = _PERCENT.fullmatch(value) if isinstance(value, str) else None
     if found is None:
         raise ValueError('a percentage is needed, such as "5 %"')
-    return float(found[1]) / 100
+    share = float(found[1]) / 100
+    if not 0 < share <= 1:
+        raise ValueError("more than 0 % and at most 100 % is needed")
+    return share
 
 
 Share = Annotated[float, Unit("", above=0.0, most=1.0), BeforeValidator(_share)]
+IS = Field(alias="is")
+"""In a file; Python cannot name a field so."""
 Newton = Annotated[float, Unit("N", above=0.0)]
 Series = Literal["E24", "E96"]
 
@@ -56,7 +61,7 @@ class Threshold(SceneTable):
         within: relative.
     """
 
-    value: Newton
+    value: Annotated[Newton, IS]
     within: Share = 0.05
 
 
@@ -71,7 +76,7 @@ class Rate(SceneTable):
     """
 
     force: Newton
-    value: Annotated[float, Unit("Hz", above=0.0)]
+    value: Annotated[float, Unit("Hz", above=0.0), IS]
     within: Share = 0.1
 
 
@@ -86,7 +91,7 @@ class Silence(SceneTable):
     """
 
     force: Newton
-    value: Annotated[float, Unit("s", above=0.0, most=600.0)]
+    value: Annotated[float, Unit("s", above=0.0, most=600.0), IS]
     within: Share = 0.1
 
 
@@ -218,7 +223,7 @@ def load_specification(
             raise SceneError(f"Specification {path} does not exist.")
         origin, name, folder = str(path), path.stem, path.parent
         data = read_toml(path, "Specification")
-    table = validated(SpecificationFile, _renamed(data), (), lambda at: origin, None)
+    table = validated(SpecificationFile, data, (), lambda at: origin, None)
     if not table.want.names:
         raise SceneError(
             f"{origin}: [want] is empty; want at least one of {', '.join(WANTS)}."
@@ -239,20 +244,6 @@ def load_specification(
         parts=parts,
         seed=table.seed,
     )
-
-
-def _renamed(data: Mapping[str, Any]) -> dict[str, Any]:
-    """With ``is`` of a want as `value`, which Python can name."""
-    wants = data.get("want")
-    if not isinstance(wants, Mapping):
-        return dict(data)
-    renamed = {
-        name: {"value" if key == "is" else key: v for key, v in want.items()}
-        if isinstance(want, Mapping)
-        else want
-        for name, want in wants.items()
-    }
-    return {**data, "want": renamed}
 
 
 def _part(name: str, given: PartTable, circuit: Circuit, origin: str) -> Part:

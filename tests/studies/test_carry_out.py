@@ -341,6 +341,8 @@ def test_an_address_without_a_scheme_is_refused_at_once(tmp_path: Path) -> None:
         done(load_study(LEVELS), tmp_path, count=None, scheduler="there:8786")
     with pytest.raises(NotFoundError, match="such as tcp://HOST:8786"):
         done(load_study(LEVELS), tmp_path, count=None, scheduler="http://there:8786")
+    with pytest.raises(NotFoundError, match="does not answer: Port"):
+        done(load_study(LEVELS), tmp_path, count=None, scheduler="tcp://there:port")
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
@@ -423,6 +425,9 @@ def test_the_forecast_opens_nothing_and_keeps_nothing(tmp_path: Path) -> None:
     assert (cost.points, cost.there) == (15, 0)
     assert cost.seconds is not None and cost.seconds > 0
     assert not list(tmp_path.iterdir())
+    cost = forecast(load_study({**LEVELS, "keep": {"a": "1 / 0"}}), tmp_path)
+    assert cost.seconds is None, "the time of what fails tells nothing"
+    assert "ZeroDivisionError" in cost.reason
 
 
 def test_a_script_gets_one_labelled_data_set(tmp_path: Path) -> None:

@@ -79,6 +79,12 @@ def test_what_cannot_be_had_is_named_and_ends_with_1(tmp_path: Path) -> None:
         ({"want": {"treshold": {"is": "1 mN"}}}, 'did you mean "threshold"'),
         ({"want": {"threshold": {"is": "20 mV"}}}, "N is needed"),
         ({"want": {"threshold": {"is": "20 mN", "within": "5"}}}, "a percentage"),
+        ({"want": {"threshold": {"iss": "1 mN"}}}, 'did you mean "is"'),
+        ({"want": {"threshold": {"is": "-1 mN"}}}, "is = "),
+        (
+            {"want": {"threshold": {"is": "20 mN", "within": "-5 %"}}},
+            "more than 0 % and at most 100 %",
+        ),
         ({"parts": {"R9": {}}}, "no part of the circuit"),
         ({"parts": {"L": {}}}, "resistors, capacitors and voltages"),
         ({"parts": {"R1": {"least": "2 MOhm", "most": "1 MOhm"}}}, "must be below"),

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import xarray
 from click.testing import CliRunner
 
 from tactile_lab.cli import cli
@@ -16,13 +17,17 @@ SHORT = (
 def test_a_sweep_runs_the_bench_at_each_value(tmp_path: Path) -> None:
     answer = CliRunner().invoke(
         cli,
-        [*SHORT, "--sweep", "sensor.V_GS=1.4 V,1.42 V", "--sweep", "protocol.seed=1,2",
+        [*SHORT, "--sweep", "sensor.V_GS=1.4 V,1.42 V",
+         "--sweep", "protocol.levels=180 mN:200 mN:20 mN",
          "--out", str(tmp_path), "--json"],
     )  # fmt: skip
     assert answer.exit_code == 0, answer.output
     assert json.loads(answer.stdout)["points"] == 4
     page = (tmp_path / "demo_sweep" / "report.html").read_text(encoding="utf-8")
     assert "response to sensor.V_GS" in page
+    assert "response to protocol.levels" in page
+    levels = xarray.open_zarr(tmp_path / "demo_sweep" / "data.zarr")["protocol.levels"]
+    assert levels.values.tolist() == [0.18, 0.2] and levels.attrs["units"] == "N"
     assert "Simulated bench" in page
     listed = CliRunner().invoke(cli, ["runs", str(tmp_path)])
     assert listed.exit_code == 0, "what a study keeps is no broken run"
@@ -33,5 +38,7 @@ def test_what_belongs_to_one_run_is_refused(tmp_path: Path) -> None:
         answer = CliRunner().invoke(cli, [*SHORT, *more, "--realtime"])
         assert answer.exit_code == 2
         assert "--realtime cannot go with --sweep" in answer.stderr
+    answer = CliRunner().invoke(cli, [*SHORT, "--sweep", "protocol.level=1 N:2 N:1 N"])
+    assert answer.exit_code == 2 and 'did you mean "levels"' in answer.stderr
     answer = CliRunner().invoke(cli, [*SHORT, "--sweep", "sensor.V_GS"])
     assert answer.exit_code == 2 and "KEY=FROM:TO:STEP" in answer.stderr
