@@ -58,7 +58,7 @@ def command(
     take the folder of a skin, as csv and nwb do.
     """
     with reading(run):
-        from tactile_lab.skin.events import FILE
+        from tactile_lab.skin.events import FILE, WAITING
         from tactile_lab.store.selection import Selection
 
         selection = Selection(
@@ -68,7 +68,7 @@ def command(
             rate=_quantity("--rate", rate, "S/s"),
         )
         try:
-            if (run / FILE).exists():
+            if (run / FILE).exists() or any(run.glob(f"{WAITING}*")):
                 written = _of_skin(run, form, out, selection)
             else:
                 written = _of_run(run, form, out, selection)

@@ -47,7 +47,7 @@ def skin_of(kind, strength, sensor="table1", **more):
     )  # fmt: skip
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     kind=st.sampled_from(sorted(LOADS)),
     strong=st.floats(0.02, 2.0),
@@ -126,7 +126,7 @@ def test_a_taxel_left_out_is_told_with_its_bound(preset, tmp_path, monkeypatch):
     events = Events.read(tmp_path)
     out = events.role == kernel.UNTOUCHED
     assert done.taxels["left out"] == out.sum() > 0
-    assert (len(drawn) == skin.array.size) == (preset == "fig5b")
+    assert (len(set(drawn)) == skin.array.size) == (preset == "fig5b")
     for taxel in range(skin.array.size):
         force = force_of(skin, taxel).value.max()
         bound = events.largest_force[taxel]

@@ -212,13 +212,9 @@ def test_a_dask_cluster_gives_the_same_to_the_last_bit(tmp_path):
 
 def test_a_scheduler_that_cannot_be_used_is_named_and_nothing_is_left(tmp_path):
     skin = load_skin(SLIDE)
-    for address, told in (
-        ("tcp://127.0.0.1:9", "does not answer"),
-        ("somewhere:8786", "such as tcp://HOST:8786"),
-    ):
-        with pytest.raises(NotFoundError, match=told):
-            press(skin, tmp_path / "s", scheduler=address)
-        assert not list((tmp_path / "s").iterdir())
+    with pytest.raises(NotFoundError, match="such as tcp://HOST:8786"):
+        press(skin, tmp_path / "s", scheduler="somewhere:8786")
+    assert not list((tmp_path / "s").iterdir())
     (tmp_path / "s.toml").write_text(
         'duration = "0.1 s"\n[array]\ngrid = [2, 2]\n[[stimulus]]\nkind = "sphere"\n'
     )
