@@ -60,6 +60,11 @@ class StoredRun:
         path = Path(path)
         info = read_info(path)
         file = path / DATA
+        if not file.exists() and info.get("samples"):
+            raise RunFolderError(
+                f"{path} has no {DATA}, which was written: it was moved or deleted. "
+                f"Put it back; `tactile-lab run --again {path}` repeats the run."
+            )
         if not file.exists():
             raise RunFolderError(
                 f"{path} has no {DATA}: the run ended ({info['status']}) before the "

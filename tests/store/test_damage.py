@@ -204,6 +204,8 @@ def test_a_missing_file_and_a_wrong_counter_are_found(complete):
     assert "4999" in str(verify(complete).findings[0])
     (complete / "data.h5").unlink()
     assert verify(complete).findings[0].where == "data.h5"
+    with pytest.raises(RunFolderError, match="moved or deleted"):
+        Run.load(complete)
 
 
 def test_a_changed_scene_is_found(bench, recorder, folder):
