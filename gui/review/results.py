@@ -288,6 +288,7 @@ class ResultsView(QWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         header.setMinimumSectionSize(36)
+        header.setStyleSheet("QHeaderView::section { padding: 4px 2px; }")
         header.setDefaultAlignment(RIGHT)
         first = table.horizontalHeaderItem(0)
         if first is not None:

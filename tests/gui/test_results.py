@@ -1,5 +1,7 @@
 """The results: any column of the steps against any other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,17 @@ def test_cards_without_the_newest_step_are_pale(results: ResultsView) -> None:
     assert "newest" in results.cards.toolTip()
     fitted(three)
     assert not results.cards.old and not results.cards.toolTip()
+
+
+def test_a_step_that_was_cut_short_says_so_in_full(results: ResultsView, app) -> None:
+    cut = replace(FAST, label="200 mN", complete=False)
+    results.resize(332, 700)  # as wide as the panel
+    results.show()
+    results.show_steps([cut], total=3, running=False, whole=False)
+    app.processEvents()
+    table = results.table
+    words = table.fontMetrics().horizontalAdvance(table.item(0, 0).text())
+    assert table.item(0, 0).text() == "200 mN, cut short"
+    assert words < table.columnWidth(0)
+    heads = table.horizontalHeader()
+    assert all(heads.sectionSize(k) >= heads.sectionSizeHint(k) for k in range(1, 6))
