@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 from typing import cast
@@ -31,8 +32,18 @@ def compiler(engine: Engine) -> tuple[bool, bool]:
     return "sim_backend.bench" in sys.modules, "numba.np.arraymath" in sys.modules
 
 
+@pytest.fixture
+def code_on_disk():
+    """What engines are forked from finds its code compiled: it begins after that is."""
+    subprocess.run([sys.executable, "-c", f"import {process.AHEAD}"], check=True)
+    with Link() as link:
+        before = answered(link, parent_of).value
+        assert before is not None
+        os.kill(before, signal.SIGKILL)
+
+
 @forks
-def test_an_engine_has_what_it_needs_and_the_next_shares_it():
+def test_an_engine_has_what_it_needs_and_the_next_shares_it(code_on_disk):
     with Link() as one, Link() as other:
         assert answered(one, compiler).value == (True, False)
         parents = {answered(link, parent_of).value for link in (one, other)}
@@ -65,7 +76,7 @@ def test_an_engine_that_cannot_be_started_is_lost(monkeypatch):
     def refuse(self: object) -> None:
         raise OSError("no more processes")
 
-    monkeypatch.setattr(process.Process, "start", refuse)
+    monkeypatch.setattr(process.CONTEXT.Process, "start", refuse)
     lost: list[str] = []
     with Link(lost=lost.append) as link:
         reply = answered(link, pid_of)
