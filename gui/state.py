@@ -106,7 +106,12 @@ class InstrumentView:
     @property
     def short(self) -> str:
         """The name where there is little room."""
-        known = {"Coil source": "Coil", "Oscilloscope": "Scope", "Teslameter": "Field"}
+        known = {
+            "Coil source": "Coil",
+            "Oscilloscope": "Scope",
+            "Teslameter": "Field",
+            "Thermometer": "Temp",
+        }
         return known.get(self.name, self.name.removeprefix("Source of "))
 
 

@@ -78,6 +78,7 @@ class SerialLink:
         self._free_at = 0.0
         self._doubtful = False
         self._half_sent = False
+        self._names_due = 0
 
     @property
     def is_open(self) -> bool:
@@ -101,7 +102,8 @@ class SerialLink:
                 self._serial.reset_input_buffer()
             self._rest_from(self._clock.now())  # whoever spoke to it before
             self._send_preamble()
-            answer = self._exchange(self._identify)
+            answer = self._ask_name()
+            self._has_said_its_name()
         except BaseException:
             self.close()
             raise
@@ -192,10 +194,11 @@ class SerialLink:
         answer = ""
         for _ in range(3):
             try:
-                answer = self._exchange(self._identify)
+                answer = self._ask_name()
             except BadReplyError as reason:
                 answer = str(reason)
             if answer == self.identity:
+                self._has_said_its_name()
                 return
             self._doubtful = True
             self.drain()
@@ -204,15 +207,25 @@ class SerialLink:
             f"not {self.identity!r} as before. Check what is connected there."
         )
 
-    def drain(self) -> None:
-        """Read and drop until the line has been quiet for a while.
+    def _ask_name(self) -> str:
+        self._names_due += 1
+        return self._exchange(self._identify)
+
+    def _has_said_its_name(self) -> None:
+        """Let no second answer come later, where it was asked more than once."""
+        if self._names_due > 1:
+            self.drain(self.wire.timeout)
+        self._names_due = 0
+
+    def drain(self, quiet: float = QUIET) -> None:
+        """Read and drop until the line has been `quiet` for so long, s.
 
         Raises:
             LinkLostError: unplugged.
             BadReplyError: it does not fall quiet.
         """
-        quiet = max(QUIET, 2 * self.wire.character_time)
-        give_up = self._clock.now() + LONGEST_DRAIN
+        quiet = max(quiet, 2 * self.wire.character_time)
+        give_up = self._clock.now() + LONGEST_DRAIN + quiet
         quiet_since = self._clock.now()
         while self._clock.now() - quiet_since < quiet:
             dropped = b""

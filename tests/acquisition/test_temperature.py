@@ -1,5 +1,7 @@
 """The sensor's temperature: an analogue thermometer on a scope channel, or a serial."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from benches import WITH_A_SOURCE_METER
@@ -12,6 +14,7 @@ from sim_backend.thermometer import SensorFault
 from tactile_lab.acquisition.events import RunState, TemperatureRead
 from tactile_lab.bench import Channel
 from tactile_lab.engine.execution import Execution
+from tactile_lab.engine.jobs import InstrumentAnswer
 from tactile_lab.errors import SceneError
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
@@ -214,3 +217,36 @@ def test_slices_of_any_size_show_the_same_warming_world():
 
     one, other = rendered(20_000).astype(int), rendered(2_500).astype(int)
     assert np.abs(one - other)[0].max() <= 256  # a code
+
+
+def test_its_chip_tells_who_it_is_and_what_it_reads(serial):
+    from gui.session.chips import Chips
+    from gui.session.expectation import expect
+    from gui.state import Lamp, WindowState
+
+    answers = (InstrumentAnswer("thermometer", "LSCI,MODEL335,12/0,1.0", ""),)
+    status = SimpleNamespace(state=WindowState.READY)
+    bench = SimpleNamespace(answers=answers, age=0.0, known=True, field=None)
+    run = SimpleNamespace(voltages={}, kelvin=None, agreement=None)
+    chips = Chips(status, bench, run, SimpleNamespace(alive=False))
+    plan = expect(serial())
+
+    def chip():
+        found = {view.name: view for view in chips.views(plan, None)}
+        return found["Thermometer"]
+
+    assert (chip().detail, chip().value) == ("LSCI MODEL335", "—")
+    status.state, run.kelvin = WindowState.RUNNING, 295.153
+    assert (chip().lamp, chip().value) == (Lamp.ACTIVE, "295.15 K")
+
+
+def test_a_bench_file_that_the_window_writes_keeps_it(serial, tmp_path):
+    from gui.dialogs.bench_text import save_bench, show_bench, start_choice
+
+    choice = start_choice()
+    show_bench(choice, serial().bench)
+    assert save_bench(choice, tmp_path / "a.toml").thermometer is None  # simulated
+    wired = serial("bench.thermometer.port=/dev/ttyUSB3", "bench.thermometer.input=B")
+    show_bench(choice, wired.bench)
+    kept = save_bench(choice, tmp_path / "b.toml").thermometer
+    assert (kept.port, kept.input) == ("/dev/ttyUSB3", "B")

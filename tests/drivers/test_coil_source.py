@@ -308,3 +308,17 @@ def test_a_slow_link_is_waited_for_as_the_bench_file_says(resistor, timeout, ope
     unplug(end)
     with pytest.raises(SceneError, match="at most"):
         load("demo", {"bench.coil.timeout": "1 s"})
+
+
+@pytest.mark.parametrize("late", [0.41, 0.42, 0.43, 0.44])
+def test_a_name_that_comes_late_is_no_answer_to_what_is_asked_next(serial_bench, late):
+    """Asked its name twice, a slow source says it twice: a set-point was "refused"."""
+    coil, end = serial_bench.coil, serial_bench.end
+    coil.open()
+    coil.energise()
+    end.faults.add(SerialFault(kind="late", amount=late, line="CURR"))
+    end.faults.add(SerialFault(kind="late", amount=0.24, line="IDN", times=2))
+    serial_bench.drive(0.1)
+    assert end.faults.struck >= 3
+    assert coil.read_current().value == pytest.approx(0.1, abs=0.02)
+    assert coil.safe_off().verified
