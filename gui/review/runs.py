@@ -32,8 +32,8 @@ from gui.review.thumbnails import Thumbnails
 from tactile_lab.quantity import count
 from tactile_lab.store.summary import RunSummary
 
-PAGE = 60
-"""Runs listed at once; a button lists as many more."""
+PAGE = 20
+"""Runs listed at once, 0.25 MB each; a button lists as many more."""
 
 FILTERS: dict[str, Callable[[RunSummary], bool]] = {
     "All": lambda entry: True,
