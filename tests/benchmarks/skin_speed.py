@@ -37,25 +37,33 @@ RIVALS = 64
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 STEPS = (1e-4, 2e-5, 5e-6)
 SIMULATORS = Path(sys.prefix) / "simulators"
+LOADS = (
+    (25, "plate"), (50, "plate"), (100, "plate"), (100, "grating slides"),
+    (100, "texture slides"), (100, "ball"), (200, "ball"), (1000, "ball"),
+)  # fmt: skip
+"""Taxels in a row, and what presses."""
 GROWN = (
-    "taxels", "solved", "fired", "spikes", "CPU time", "a solved taxel", "a spike",
-    "wall time", "times real time", "load",
+    "load", "taxels", "solved", "fired", "spikes", "CPU time", "a taxel", "a spike",
+    "wall time", "times real time", "machine's load",
 )  # fmt: skip
 HEADS = ("method", "setting", "spikes", "largest error of a time", "CPU time", "ratio")
 
 
-def plate(rows: int, columns: int, seconds: int, firm: bool = True) -> Skin:
-    """An array under a rough plate that is pressed once a second."""
+def plate(rows: int, columns: int, seconds: int, how: str = "plate") -> Skin:
+    """An array under a rough plate that is pressed once a second, or one of LOADS."""
     load = {**PLATE, "times": seconds}
-    if not firm:  # a ball on a corner: most taxels stay silent
+    if how == "ball":  # on one spot: most taxels stay silent
+        load |= {"kind": "sphere", "force": "2 N", "radius": "5 mm"}
+        del load["pressure"]
+    if how.endswith("slides"):
         load = {
-            "kind": "sphere", "force": "2 N", "radius": "5 mm", "start": "0.2 s",
-            "ramp": "20 ms", "hold": "0.5 s", "times": seconds, "period": "1 s",
+            "kind": how.split()[0], "pressure": "100 kPa", "speed": "40 mm/s",
+            "hold": f"{seconds} s",
         }  # fmt: skip
     return load_skin(
         {
             "duration": f"{seconds} s",
-            "sensor": {"preset": "fig5b" if firm else "table1"},
+            "sensor": {"preset": "table1" if how == "ball" else "fig5b"},
             "array": {"grid": [rows, columns], "pitch": "1.5 mm"},
             "stimulus": [load],
         }
@@ -157,14 +165,15 @@ def rivals(seconds: int) -> tuple[list[str], int]:
 def growth(seconds: int) -> list[str]:
     """CPU time of arrays of several sizes."""
     rows = []
-    for side, firm in ((25, True), (50, True), (100, True), (100, False), (200, False)):
-        skin = plate(side, side, seconds, firm)
+    for side, how in LOADS:
+        skin = plate(side, side, seconds, how)
         events, cpu, wall = pressed(skin)
         active = int((events.role <= kernel.SILENT).sum())
         fired, spikes = int((events.count > 0).sum()), int(events.count.sum())
         rows.append(
-            f"| {side * side:,} | {active:,} | {fired:,} | {spikes:,} | {cpu:.2f} s | "
-            f"{cpu / active * 1e6:.0f} µs | {cpu / max(spikes, 1) * 1e6:.2f} µs | "
+            f"| {how} | {side * side:,} | {active:,} | {fired:,} | {spikes:,} | "
+            f"{cpu:.2f} s | {cpu / skin.array.size * 1e6:,.1f} µs | "
+            f"{cpu / max(spikes, 1) * 1e6:.2f} µs | "
             f"{wall:.2f} s | {skin.duration / wall:.1f} | {os.getloadavg()[0]:.1f} |"
         )
         print(rows[-1], flush=True)
@@ -218,10 +227,10 @@ spike's place inside its step. Ratios of one run on one machine, load
 
 ## Growth
 
-"Solved" are the taxels that could come to threshold, "fired" those of them that did;
-the last two rows are sensors of preset table1 under a ball on one spot, where nearly
-all taxels are left out.
-CPU times hold forces, events and the file.
+"Solved" are the taxels that could come to threshold, "fired" those of them that did.
+The plate is pressed once a second; grating and texture slide at 40 mm/s all the time.
+The last three rows are sensors of preset table1 under a ball on one spot, where nearly
+all taxels are left out. CPU times hold forces, events and the file.
 
 | {" | ".join(GROWN)} |
 {"|---" * len(GROWN)}|
