@@ -75,8 +75,10 @@ def _check_versions(client: Any, address: str) -> None:
         theirs = {where: one.result(timeout=ANSWER) for where, one in asked.items()}
     except OSError as reason:  # a timeout, too
         raise LinkLostError(
-            f"The scheduler {address} or one of its workers went silent: {reason}. "
-            "Nothing is lost; start again."
+            f"The scheduler {address} or one of its workers went silent: "
+            f"{str(reason).rstrip('.')}. Those that lack this program, or have another "
+            "version of it, may not answer either: install the same on each. Nothing "
+            "is lost; start again."
         ) from reason
     except ImportError as reason:
         raise SceneError(
