@@ -1,8 +1,6 @@
 """How soon an engine is there, and answers who is on a bench."""
 
 import os
-import signal
-import subprocess
 import sys
 import threading
 from typing import cast
@@ -28,24 +26,14 @@ def word(engine: Engine) -> str | None:
     return os.environ.get("A_WORD")
 
 
-def compiler(engine: Engine) -> tuple[bool, bool]:
-    return "sim_backend.bench" in sys.modules, "numba.np.arraymath" in sys.modules
-
-
-@pytest.fixture
-def code_on_disk():
-    """What engines are forked from finds its code compiled: it begins after that is."""
-    subprocess.run([sys.executable, "-c", f"import {process.AHEAD}"], check=True)
-    with Link() as link:
-        before = answered(link, parent_of).value
-        assert before is not None
-        os.kill(before, signal.SIGKILL)
+def loaded(engine: Engine) -> bool:
+    return "sim_backend.bench" in sys.modules
 
 
 @forks
-def test_an_engine_has_what_it_needs_and_the_next_shares_it(code_on_disk):
+def test_an_engine_has_what_it_needs_and_the_next_shares_it():
     with Link() as one, Link() as other:
-        assert answered(one, compiler).value == (True, False)
+        assert answered(one, loaded).value
         parents = {answered(link, parent_of).value for link in (one, other)}
         assert len(parents) == 1 and os.getpid() not in parents
         assert answered(one, pid_of).value != answered(other, pid_of).value
@@ -59,17 +47,6 @@ def test_an_engine_is_asked_in_the_environment_of_who_asks(monkeypatch):
     monkeypatch.setenv("A_WORD", "said later")
     with Link() as link:
         assert answered(link, word).value == "said later"
-
-
-@forks
-def test_what_engines_are_forked_from_may_be_killed():
-    with Link() as link:
-        parent = answered(link, parent_of).value
-        assert parent is not None
-        os.kill(parent, signal.SIGKILL)
-        assert answered(link, pid_of).value == link.pid
-        with Link() as other:
-            assert answered(other, parent_of).value not in (parent, os.getpid())
 
 
 def test_an_engine_that_cannot_be_started_is_lost(monkeypatch):
