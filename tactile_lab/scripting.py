@@ -97,7 +97,7 @@ def run(
 
 
 @overload
-def write_report(
+def write_report(  # type: ignore[overload-overlap]  # a str is a sequence of str, too
     run: Run | str | Path, out: str | Path | None = ..., *, pdf: bool = ...
 ) -> Report: ...
 @overload

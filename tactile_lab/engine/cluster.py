@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -13,6 +15,8 @@ from urllib.parse import urlsplit
 from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
 from tactile_lab.plugins import registered
 
+GREETING = 5.0
+"""For which a scheduler is waited for, s."""
 ANSWER = 60.0
 """For which a Dask worker is waited for to tell its version, s."""
 SCHEMES = ("tcp://", "inproc://", "tls://", "ucx://", "ws://", "wss://")
@@ -49,11 +53,14 @@ def cluster(address: str) -> Iterator[Any]:
         )
     try:
         urlsplit(address).port  # noqa: B018  Dask leaves a client behind otherwise
+        with ThreadPoolExecutor(1) as beside:  # a notebook has a loop of its own
+            beside.submit(lambda: asyncio.run(_greet(address))).result()
         open_client: Any = distributed.Client  # untyped
-        client = open_client(address, timeout="5s", set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as reason:
+        client = open_client(address, timeout=GREETING, set_as_default=False)
+    except (OSError, ValueError) as reason:  # a timeout, too
+        why = str(reason).rstrip(".") or f"it was silent for {GREETING:g} s"
         raise NotFoundError(
-            f"The scheduler {address} does not answer: {reason}. Is `dask scheduler` "
+            f"The scheduler {address} does not answer: {why}. Is `dask scheduler` "
             "running there, and the address of the form tcp://HOST:8786?"
         ) from reason
     try:
@@ -63,30 +70,57 @@ def cluster(address: str) -> Iterator[Any]:
         client.close()
 
 
+async def _greet(address: str) -> None:
+    """Shake hands: a client waits without end for a port that takes it and is silent.
+
+    Raises:
+        OSError: nothing answers.
+    """
+    from distributed.comm import connect
+
+    greeted: Any = connect  # untyped
+    comm = await asyncio.wait_for(greeted(address, timeout=GREETING), GREETING + 1)
+    await comm.close()
+
+
+def _question() -> Callable[[], dict[str, str] | None]:
+    """What a worker is asked; it is sent whole, to be understood without this program.
+
+    It answers None where it lacks this program, or has one of before this question.
+    """
+
+    def ask() -> dict[str, str] | None:
+        try:
+            from tactile_lab.engine.cluster import code_digests
+        except ImportError:
+            return None
+        return code_digests()
+
+    return ask
+
+
 def _check_versions(client: Any, address: str) -> None:
     """Refuse workers that would compute something else."""
     if not client.nthreads():
         raise NotFoundError(f"The scheduler {address} has no workers; start some.")
     try:
         asked = {
-            where: client.submit(code_digests, workers=[where], pure=False)
+            where: client.submit(_question(), workers=[where], pure=False)
             for where in client.nthreads()
         }
         theirs = {where: one.result(timeout=ANSWER) for where, one in asked.items()}
     except OSError as reason:  # a timeout, too
         raise LinkLostError(
             f"The scheduler {address} or one of its workers went silent: "
-            f"{str(reason).rstrip('.')}. Those that lack this program, or have another "
-            "version of it, may not answer either: install the same on each. Nothing "
-            "is lost; start again."
-        ) from reason
-    except ImportError as reason:
-        raise SceneError(
-            f"Workers of {address} lack this program ({reason}); install the same "
-            "version on each."
+            f"{str(reason).rstrip('.')}. Nothing is lost; start again."
         ) from reason
     ours = code_digests()
     for where, found in theirs.items():
+        if found is None:
+            raise SceneError(
+                f"The worker {where} of {address} lacks this program, or has a version "
+                "of before this one; install the same on each."
+            )
         missing = [package for package in ours if package not in found]
         other = [p for p, digest in found.items() if ours.get(p, digest) != digest]
         if missing or other:

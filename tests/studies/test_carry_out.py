@@ -4,18 +4,22 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
 from concurrent.futures import Future
 from pathlib import Path
 
+import cloudpickle
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from distributed.protocol import pickle
 
 from tactile_lab import simulate, study
 from tactile_lab.cli import cli
+from tactile_lab.engine import cluster
 from tactile_lab.engine.cluster import _check_versions, code_digests
 from tactile_lab.errors import (
     LinkLostError,
@@ -289,6 +293,36 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path) -> None:
         done(load_study(LEVELS), tmp_path, count=None, scheduler="tcp://127.0.0.1:9")
 
 
+def test_a_port_that_takes_a_client_and_is_silent_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dask's client waits for it without end."""
+    monkeypatch.setattr(cluster, "GREETING", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(NotFoundError, match=r"silent for 0\.2 s"):
+            done(load_study(LEVELS), tmp_path, count=None, scheduler=address)
+
+
+def test_a_worker_without_this_program_understands_what_it_is_asked(
+    tmp_path: Path,
+) -> None:
+    """One that did not was waited for for a minute."""
+    sent = pickle.dumps(cluster._question())
+    libraries = str(Path(cloudpickle.__file__).parents[1])
+    answer = (
+        f"import sys, pickle; sys.path.append({libraries!r}); "
+        f"print(pickle.loads({sent!r})())"
+    )
+    told = subprocess.run(
+        [sys.executable, "-S", "-c", answer],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert told.stdout == "None\n"
+    ours = pickle.loads(sent)()
+    assert ours == OURS
+
+
 class Cluster:
     """A scheduler whose workers answer so when they are asked for their version."""
 
@@ -325,7 +359,7 @@ OURS = code_digests()
             SceneError,
             "worker a of .* lacks drivers",
         ),
-        ({"a": ModuleNotFoundError("no tactile_lab")}, SceneError, "lack this program"),
+        ({"a": None}, SceneError, "worker a of .* lacks this program"),
         ({"a": TimeoutError("timed out")}, LinkLostError, "went silent"),
     ],
 )
