@@ -76,7 +76,7 @@ async def _greet(address: str) -> None:
     Raises:
         OSError: nothing answers.
     """
-    from distributed.comm import connect
+    from distributed.comm.core import connect
 
     greeted: Any = connect  # untyped
     comm = await asyncio.wait_for(greeted(address, timeout=GREETING), GREETING + 1)
