@@ -49,6 +49,12 @@ STATUS: dict[events.RunState, Status] = {
 }
 """What a run's folder calls the states a run can end in."""
 
+LOOK = 0.05
+"""Time between two looks whether a wait is over, s."""
+
+_COLD_FROM: dict[str, float] = {}
+"""When the coil of a real bench counts as cold, by the bench's name; monotonic, s."""
+
 
 class Execution(Task[Executed]):
     """A scene about to run. Making one validates, plans and makes the run's folder.
@@ -143,8 +149,9 @@ class Execution(Task[Executed]):
         Raises:
             RecordingError: the run could not be begun in its folder.
         """
-        began = time.monotonic()
         keep_scene(self.folder, self.scene)
+        self._let_cool()
+        began = time.monotonic()
         self._runner = runner = Runner(
             self._program(),
             self.bench,
@@ -155,6 +162,9 @@ class Execution(Task[Executed]):
             *self._others,
         )
         ending = runner.run()
+        if not self.bench.simulated:
+            cold = time.monotonic() + self.plan.estimate.cool_down
+            _COLD_FROM[self.bench.name] = cold
         took = time.monotonic() - began
         proof: Certificate | None = None
         try:
@@ -172,6 +182,22 @@ class Execution(Task[Executed]):
             duration=runner.duration,
             took=took,
         )
+
+    def _let_cool(self) -> None:
+        """Wait until a coil that a run before has heated is as cold as plans take it.
+
+        Simulated coils are new, and so cold, with each run. Who asks to stop ends it.
+        """
+        cold = _COLD_FROM.get(self.bench.name, 0.0)
+        if self.needs.coil and (left := cold - time.monotonic()) > 0:
+            text = (
+                f"The coil is still warm from the run before: this one begins in "
+                f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
+                "Stop ends the waiting."
+            )
+            self._emit(events.Message("info", text))
+        while cold > time.monotonic() and not self.stop.requested and self.needs.coil:
+            time.sleep(LOOK)
 
     def _begin_record(self, stream: Stream | None) -> Recorder:
         """Start the record; codes can be scaled from now on."""

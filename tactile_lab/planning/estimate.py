@@ -8,7 +8,7 @@ import numpy as np
 
 from tactile_lab.bench import Channel, CoilLimits
 from tactile_lab.instruments.registry import coil_capability
-from tactile_lab.planning.heat import heat_along
+from tactile_lab.planning.heat import cool_down, heat_along
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
@@ -34,6 +34,7 @@ class Cost:
         disk_raw, disk: bytes before and after compression.
         peak_force, peak_current: largest magnitudes, N and A.
         heat, heat_budget: largest leaky I^2 t and what is allowed, A^2 s.
+        cool_down: time after the run until the coil counts as cold, s.
         update_interval: time between two set-points of the coil, s; None where no
             coil is opened.
         step_current, step_force: largest change from one set-point to the next, A, N.
@@ -51,6 +52,7 @@ class Cost:
     peak_current: float
     heat: float
     heat_budget: float
+    cool_down: float
     update_interval: float | None
     step_current: float
     step_force: float
@@ -65,6 +67,7 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     if needed.coil and coil is not None:
         interval = coil_capability(coil).update_interval
     limits = CoilLimits() if coil is None else coil.limits
+    left, most, _ = heat_along(current, limits)
     samples = round(drive.streamed * scene.record.sample_rate)
     if not needed.channels:
         samples = 0
@@ -80,8 +83,9 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
         disk=round(raw / COMPRESSION),
         peak_force=drive.force.peak,
         peak_current=current.peak,
-        heat=heat_along(current, limits)[1],
+        heat=most,
         heat_budget=limits.heat,
+        cool_down=cool_down(left, limits),
         update_interval=interval,
         step_current=step,
         step_force=step * abs(scene.bench.magnet.newtons_per_ampere),

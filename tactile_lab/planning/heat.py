@@ -8,6 +8,21 @@ import math
 from tactile_lab.bench import CoilLimits
 from tactile_lab.waveform import Waveform
 
+COLD = 0.01
+"""Share of its heat budget at which a coil counts as cold."""
+
+
+def cool_down(used: float, limits: CoilLimits) -> float:
+    """Time without current until a coil that used heat counts as cold, s.
+
+    Args:
+        used: heat, A^2 s.
+        limits: budget and recovery.
+    """
+    if used <= COLD * limits.heat:
+        return 0.0
+    return limits.recovery * math.log(used / (COLD * limits.heat))
+
 
 def heat_along(
     current: Waveform, limits: CoilLimits, used: float = 0.0

@@ -295,7 +295,8 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     yield (
         "coil",
         f"peak {show(cost.peak_current, 'A')} for {show(cost.peak_force, 'N')}, heat "
-        f"{cost.heat:.2g} of {cost.heat_budget:g} A² s",
+        f"{cost.heat:.2g} of {cost.heat_budget:g} A² s"
+        + (f", cold {show(cost.cool_down, 's')} later" if cost.cool_down else ""),
     )
     ways = {used.way for used in plan.ways}
     by_points = not ways or "set-points" in ways
