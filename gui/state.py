@@ -57,9 +57,9 @@ class CoilView:
     """The coil as last read back.
 
     Attributes:
-        output: whether the output is on; None if nobody knows.
+        output: whether the output is on, or was told to go on; None if nobody knows.
         current: read back, A; None if never read.
-        setpoint: last sent, A.
+        setpoint: last sent, A; None where the output was just told to go on.
         age: of the source's last acknowledgement, s.
         read_age: of the read-back, s.
         under: set-point that stood when it was read back, A.
@@ -206,8 +206,10 @@ def stop_text(state: WindowState, coil: CoilView | None) -> StopText:
         return StopText("STOPPING", f"{now} → 0")
     if what is CoilKnowledge.LIVE:
         if coil.told is None:
-            sent = milliamperes(coil.setpoint)
-            return StopText("STOP · COIL OFF", f"{sent} sent, not read back")
+            sent = "switched on"
+            if coil.setpoint is not None:
+                sent = f"{milliamperes(coil.setpoint)} sent"
+            return StopText("STOP · COIL OFF", f"{sent}, not read back")
         return StopText("STOP · COIL OFF", f"{now} live")
     if state is WindowState.FAULT:
         return StopText("COIL IS OFF", f"{now} verified")

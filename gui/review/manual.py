@@ -133,8 +133,10 @@ class ManualView(QWidget):
         what = truth(WindowState.READY, coil)
         if what is CoilKnowledge.UNKNOWN:
             self.force.setText("state unknown: look at the source")
-        elif coil is None or coil.current is None or coil.output is not True:
+        elif coil is None or coil.output is not True:
             self.force.setText("output off" if coil is not None else "")
+        elif coil.current is None:
+            self.force.setText("switched on, not read back")
         else:
             force = show(round(coil.current * self._gain, 6), "N", 3)
             self.force.setText(f"read back · drives {force}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 from gui.session.log import Log, Severity
-from gui.session.status import Status
+from gui.session.status import UNKNOWN, Status
 from gui.state import WindowState
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import (
@@ -224,6 +224,7 @@ class ConnectedBench(QObject):
             if self.found is None:
                 self.spec = self.choice = None
             self.found = None
+            status.coil.left(UNKNOWN)  # nobody looked, and somebody may be using it
             status.set_fault(*words)
             return
         broken = [one for one in found.found if one.problem]

@@ -96,7 +96,8 @@ class Chips:
             CoilKnowledge.OFF: Lamp.BAD if state is WindowState.FAULT else idle,
         }[what]
         value = "—" if coil.current is None else milliamperes(coil.current)
-        if what is CoilKnowledge.LIVE and coil.told is None:
+        sent = coil.setpoint is not None
+        if what is CoilKnowledge.LIVE and coil.told is None and sent:
             value = f"→ {milliamperes(coil.setpoint)}"
         if what is CoilKnowledge.UNKNOWN:
             return InstrumentView(name, lamp, "state unknown", "?")

@@ -5,11 +5,15 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from gui.state import CoilView
+from gui.state import STALE, CoilView
 from tactile_lab.bench import CoilLimits, OffReport
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import CoilState
+
+
+NEVER = float("-inf")
+"""When the output was read back that is not on."""
 
 
 class CoilWatch:
@@ -24,7 +28,7 @@ class CoilWatch:
         self._off: OffReport | None = None
         self._since = time.monotonic()
         self._sign = time.monotonic()
-        self._read: float | None = None
+        self._read: float | None = NEVER
         self._under: float | None = None
 
     def use(self, limits: CoilLimits | None) -> None:
@@ -41,21 +45,28 @@ class CoilWatch:
         """The source acknowledged a set-point or was read back just now."""
         self._sign = time.monotonic()
 
-    def view(self, state: CoilState | None) -> CoilView | None:
-        """What may be shown; `state` is None while nobody drives the coil."""
+    def view(
+        self, state: CoilState | None, heard: float | None = None
+    ) -> CoilView | None:
+        """What may be shown.
+
+        Args:
+            state: of the coil, as told last; None while nobody drives it.
+            heard: when whoever may switch it on told so, s; None while nobody may.
+        """
         if self.limits is None:
             return None
-        limit = self.limits.current
-        if state is None or (state.off is not None and not state.live):
-            off = self._off if state is None else state.off
+        limit, now = self.limits.current, time.monotonic()
+        if state is None or not state.live:
+            self._read = NEVER
+            off = None if state is None else state.off
+            if off is None and (heard is None or now - heard <= STALE):
+                off = self._off  # nothing was switched on: as it was left before
             if off is None:
                 return CoilView(None, limit=limit)
             return CoilView(
                 False, off.current, 0.0, verified_off=off.verified, limit=limit
             )
-        if not state.live:
-            return self.view(None)  # nothing was switched on: as it was left before
-        now = time.monotonic()
         if state.read != self._read:
             self._read, self._since, self._sign = state.read, now, now
             self._under = state.setpoint

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
@@ -12,7 +13,7 @@ from gui.session.log import Log
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.engine.engine import ServedTask
-from tactile_lab.engine.events import Ended, Samples, TaskEvent
+from tactile_lab.engine.events import Begun, Ended, Samples, TaskEvent
 from tactile_lab.engine.link import Link, RemoteTask
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class LiveTask(QObject):
     Attributes:
         task: in the engine; None between two.
         coil: its state, as told last; None before the first word and after the end.
+        heard: when that was, s; None where it cannot switch anything on: before it has
+            begun, and after the end.
     """
 
     def __init__(self, link: Link, status: Status, log: Log) -> None:
@@ -39,6 +42,7 @@ class LiveTask(QObject):
         self._link, self._status, self._log = link, status, log
         self.task: RemoteTask | None = None
         self.coil: CoilState | None = None
+        self.heard: float | None = None
 
     @property
     def alive(self) -> bool:
@@ -63,9 +67,11 @@ class LiveTask(QObject):
     def take(self, event: TaskEvent) -> None:
         """Take what the task told."""
         if isinstance(event, Ended):
-            self.task = self.coil = None
+            self.task = self.coil = self.heard = None
             self.has_ended(event.ending)
             return
+        if isinstance(event, Begun | Samples):
+            self.heard = time.monotonic()
         if isinstance(event, Samples):
             self.coil = event.coil
         self.hear(event)
@@ -76,7 +82,7 @@ class LiveTask(QObject):
         *arguments: P.args,
         **named: P.kwargs,
     ) -> None:
-        self.coil = None
+        self.coil = self.heard = None
         self.task = self._link.begin(self.take, act, *arguments, **named)
 
     @abstractmethod

@@ -246,8 +246,8 @@ class Session(QObject):
 
     def coil_view(self) -> CoilView | None:
         """The coil as it is known now."""
-        coil = self.manual.coil if self.manual.alive else self.run.coil
-        return self.status.coil.view(coil)
+        task = self.manual if self.manual.alive else self.run
+        return self.status.coil.view(task.coil, task.heard)
 
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""

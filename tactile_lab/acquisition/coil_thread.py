@@ -94,6 +94,9 @@ class CoilThread(InstrumentThread):
     analogue input, keeps its time.
 
     Attributes:
+        switched_on: the source was told to switch on and not yet off again; until
+            `live`, too, nobody knows whether it is.
+        live: the output is on, as it was read back.
         loaded: the list that the source holds, or None.
         list: the list of this trial, playing or played, or None.
         generator: plays lists into the source's analogue input; None where it is not
@@ -110,7 +113,7 @@ class CoilThread(InstrumentThread):
         super().__init__("coil", clock)
         self.coil = coil
         self.off: OffReport | None = None
-        self.live = False
+        self.switched_on = self.live = False
         self.skipped = 0
         self.last: Applied | None = None
         self.measured: float | None = None
@@ -137,7 +140,7 @@ class CoilThread(InstrumentThread):
         """What is known of the coil now."""
         sent = None if self.last is None else self.last.setpoint
         read = None if self.measured is None else self._read
-        return CoilState(self.live, sent, self.measured, self.off, read)
+        return CoilState(self.switched_on, sent, self.measured, self.off, read)
 
     def energise(self) -> None:
         """Ask for the output to be switched on at 0 A; `live` tells when it is."""
@@ -193,6 +196,7 @@ class CoilThread(InstrumentThread):
                 return
             self._lease.check()
             if self._energise:
+                self.switched_on = True  # before it is: its answers may come late
                 self.coil.energise()
                 self.settings.update(self.coil.settings())
                 # before the first trial: its ramp would lose set-points to this
@@ -219,7 +223,7 @@ class CoilThread(InstrumentThread):
         flowed = last is not None and abs(last.setpoint) > RESOLUTION
         if flowed and self.off.verified:  # it fell from there
             self._note(Applied(asked, self.clock.now(), 0.0, self.off.current))
-        self.live = False
+        self.switched_on = self.live = False
         try:
             if self.off.verified and self.opened:
                 self.settings_after = self.coil.settings()

@@ -16,7 +16,8 @@ class CoilState:
     """What is known of the coil now; nothing where there is none.
 
     Attributes:
-        live: the output is on.
+        live: the output is on, or may be: it was told to go on, and until `read` is
+            there nothing more is known.
         setpoint: last sent, A.
         measured: last read back, A.
         off: how it was left; None while the run lasts.

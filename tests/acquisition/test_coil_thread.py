@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from sim_backend.serial_line import wires
+from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.engine.bench import open_bench
@@ -15,15 +17,20 @@ BACK = Waveform(np.array([0.0, 0.25]), np.array([0.4, 0.0]))
 LONGEST = 5.0
 
 
+def coil_thread() -> CoilThread:
+    """The thread of a simulated source; nobody holds a lease."""
+    scene = load("demo")
+    bench = open_bench(scene, needs(scene))
+    lease = Lease(bench.clock)
+    lease.end()
+    return CoilThread(bench.coil, bench.clock, StopRequest(bench.clock), lease)
+
+
 @pytest.fixture(scope="module")
 def playing():
     """A coil that is live and plays what it is asked, and its clock."""
-    scene = load("demo")
-    bench = open_bench(scene, needs(scene))
-    clock = bench.clock
-    lease = Lease(clock)
-    lease.end()
-    thread = CoilThread(bench.coil, clock, StopRequest(clock), lease)
+    thread = coil_thread()
+    clock = thread.clock
     with clock.taking_part("test"):
         thread.start()
         thread.energise()
@@ -77,3 +84,34 @@ def test_a_read_back_does_not_delay_a_ramp_that_comes(playing) -> None:
         moving = [a for a in thread.take_applied() if a.setpoint > 0]
         assert moving[0].asked - (begin + wait) <= 1.1 * interval
         played(thread, clock, BACK)
+
+
+@pytest.mark.parametrize("spoilt", ["", "late", "missing", "garbled"])
+def test_an_output_that_is_on_is_never_told_to_be_off(
+    spoilt: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Asked whenever the source has acted on a line, so that nothing lies between."""
+    thread = coil_thread()
+    far = [far for name, far in wires._far_ends.items() if "coil" in name][-1]
+    act, seen = far.instrument.line, []
+
+    def acted(line: bytes) -> bytes | None:
+        answer = act(line)
+        told = thread.state
+        on = far.instrument.output_on
+        if spoilt and on and not any(was for was, *_ in seen):
+            far.faults.add(SerialFault(kind=spoilt, times=3, amount=0.3))
+        seen.append((on, told.live, told.off))
+        return answer
+
+    monkeypatch.setattr(far.instrument, "line", acted)
+    with thread.clock.taking_part("test"):
+        thread.start()
+        thread.energise()
+        settled = thread.clock.now() + LONGEST
+        thread.clock.wait_for(lambda: thread.live or thread.ended, settled)
+        thread.leave()
+        thread.clock.wait_for(lambda: thread.ended, thread.clock.now() + 60.0)
+    assert [told for on, *told in seen if on and told != [True, None]] == []
+    assert sum(on for on, *_ in seen) >= 2, "it was on, and asked"
+    assert thread.state.off is not None and not thread.state.live

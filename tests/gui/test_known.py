@@ -95,6 +95,17 @@ def test_an_output_that_is_switched_on_by_hand_is_told_and_left_on(
     assert not source.output, "connecting again makes it safe"
 
 
+def test_a_coil_that_could_not_be_looked_at_is_not_called_off(
+    served: Session, source: Source
+) -> None:
+    """STOP between runs sends the coil off again; here it cannot."""
+    source.bench.write_text("broken")
+    served.stop()
+    until(served, lambda: served.state is WindowState.FAULT)
+    known = truth(served.state, served.coil_view())
+    assert known is CoilKnowledge.UNKNOWN
+
+
 def test_a_run_that_begins_during_a_look_waits_for_its_end(
     served: Session, source: Source
 ) -> None:
