@@ -32,7 +32,9 @@ def read_back(account, times):
     for at in times:
         applied = [Applied(at - 0.01, at, 0.5, 0.501)]
         coil = SimpleNamespace(take_warnings=list, take_applied=lambda a=applied: a)
-        account.readings(SimpleNamespace(coil=coil, meter=None, voltages=()))
+        account.readings(
+            SimpleNamespace(coil=coil, meter=None, thermometer=None, voltages=())
+        )
 
 
 def test_readings_of_a_standing_current_take_16_bytes_each():

@@ -40,7 +40,7 @@ class SlowMeter:
 def test_every_reading_is_taken_whenever_it_comes(latency, every):
     clock = SimulatedClock()
     meter = SlowMeter(clock, latency)
-    thread, taken = MeterThread(meter, clock), []
+    thread, taken = MeterThread("teslameter", meter, clock, 0.1), []
     with clock.taking_part("test"):
         thread.start()
         while clock.now() < 3.0:
