@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -68,17 +69,13 @@ class Box(pg.ViewBox):  # type: ignore[misc]
 
     Attributes:
         whole: (x range, y range) in which all is in view.
-        at: what is drawn at a place of the view, as `Series.of` has it; -1 for nothing.
-        picked: told what was clicked.
-        tell: says what it is, for a person; "" for nothing.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, panel: PanelItem) -> None:
         super().__init__(enableMenu=False)
+        # a circle would leave the plot's end to Python's collector, in whatever thread
+        self._panel = weakref.ref(panel)
         self.whole: list[list[float]] = [[0.0, 1.0], [0.0, 1.0]]
-        self.at: Callable[[QPointF], int] = lambda place: -1
-        self.picked: Callable[[int], None] = lambda number: None
-        self.tell: Callable[[int], str] = lambda number: ""
 
     @property
     def moved(self) -> bool:
@@ -91,21 +88,25 @@ class Box(pg.ViewBox):  # type: ignore[misc]
 
     def hoverEvent(self, event: Any) -> None:
         """Say what lies below, where a click would open it."""
-        number = -1
-        if not event.isExit():
-            number = self.at(self.mapSceneToView(event.scenePos()))
+        number = -1 if event.isExit() else self._number(event)
         shape = Qt.CursorShape
         self.setCursor(shape.PointingHandCursor if number >= 0 else shape.ArrowCursor)
-        self.setToolTip(self.tell(number) if number >= 0 else "")
+        self.setToolTip(self.getViewWidget().tell(number) if number >= 0 else "")
+
+    def _number(self, event: Any) -> int:
+        """What is drawn below an event, as `Series.of` has it; -1 for nothing."""
+        panel = self._panel()
+        place = self.mapSceneToView(event.scenePos())
+        return -1 if panel is None else panel.at(place)
 
     def mouseClickEvent(self, event: Any) -> None:
         """A click opens what lies below, a double one shows all, right is a menu."""
         if event.double():
             self.show_all()
         elif event.button() is Qt.MouseButton.LeftButton:
-            number = self.at(self.mapSceneToView(event.scenePos()))
+            number = self._number(event)
             if number >= 0:
-                self.picked(number)
+                self.getViewWidget().picked.emit(number)
         elif event.button() is Qt.MouseButton.RightButton:
             view = self.getViewWidget()
             menu = QMenu(view)
@@ -191,8 +192,6 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             foot = (FOOT if plot.x_label else LOW) if last else 8
             ratio = self.devicePixelRatio()
             item = PanelItem(plot, plot.panels[row], tokens, ratio, foot)
-            item.box.picked = self.picked.emit
-            item.box.tell = lambda number: self.tell(number)
             self.addItem(item, row, 0)
             self.ci.layout.setRowStretchFactor(row, height)
             if self.panels and not plot.beside:
@@ -237,8 +236,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         self._x_by, self._y_by = x_by, y_by
         self.setContentsMargins(0, 0, 0, 0)
         self.setSpacing(0)
-        self.box = Box()
-        self.box.at = self._at
+        self.box = Box(self)
         left, bottom = RoundAxis("left", 26), RoundAxis("bottom", 60, whole=plot.whole)
         if panel.label:
             self.addItem(_Heading(self._heading(y_text)), 0, 0, 1, 2)
@@ -271,7 +269,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             at = (1, 0) if panel.corner == "upper" else (1, 1)
             words.anchor(itemPos=at, parentPos=at)
 
-    def _at(self, place: QPointF) -> int:
+    def at(self, place: QPointF) -> int:
         """What the nearest point stands for, or else the cell below; -1 for nothing."""
         wide, high = self.box.viewPixelSize()
         nearest, found = REACH, -1

@@ -1,5 +1,7 @@
 """The plots in the window, as painted."""
 
+import gc
+import weakref
 from dataclasses import replace
 from typing import get_args
 
@@ -128,6 +130,19 @@ def test_a_paint_that_fails_leaves_the_picture_and_is_told(app, qtbot):
         view.close()
         app.processEvents()
     assert {str(one[1]) for one in told} == {"cannot be painted"} and len(told) >= 3
+
+
+def test_one_that_is_dropped_goes_at_once(app):
+    """One left to Python's collector ended in the thread it ran in, and crashed."""
+    gc.collect()
+    gc.disable()
+    try:
+        view = shown(app)
+        left = [weakref.ref(one) for one in (view, *view.panels, view.panels[0].box)]
+        del view
+        assert [one() for one in left] == [None] * len(left)
+    finally:
+        gc.enable()
 
 
 def test_every_mark_is_drawn(app):
