@@ -148,12 +148,8 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
-        link, can = self._wire.link, self.capability
-        return {
-            "identity": self.identity,
-            "dialect": self.dialect.id,
-            "port": link.port,
-            "baud": str(link.wire.baud),
+        can = self.capability
+        return self._known | {
             "compliance_A": f"{self._wire.compliance():g}",
             "setpoint_V": f"{self._wire.setpoint():.6g}",
             "output": "on" if self._wire.output_is_on() else "off",

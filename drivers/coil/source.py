@@ -316,12 +316,7 @@ class CoilSource(SerialInstrument[CoilWire]):
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
-        link = self._wire.link
-        return {
-            "identity": self.identity,
-            "dialect": self.dialect.id,
-            "port": link.port,
-            "baud": str(link.wire.baud),
+        return self._known | {
             "compliance_V": f"{self._wire.compliance():g}",
             "setpoint_A": f"{self._wire.setpoint():g}",
             "output": "on" if self._wire.output_is_on() else "off",

@@ -39,6 +39,17 @@ class SerialInstrument(Generic[W]):
         """
         self._wire.link.record(path)
 
+    @property
+    def _known(self) -> dict[str, str]:
+        """Who it is and how it is reached, with which its settings begin."""
+        link, dialect = self._wire.link, self._wire.dialect
+        return {
+            "identity": self.identity,
+            "dialect": dialect.id,
+            "port": link.port,
+            "baud": str(link.wire.baud),
+        }
+
     @contextmanager
     def _met(self) -> Iterator[W]:
         """Connected for a look, in which nothing is set, and closed after it."""

@@ -71,15 +71,8 @@ class SerialMeter(SerialInstrument[Conversation[M]]):
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
-        link = self._wire.link
-        known = {
-            "identity": self.identity,
-            "dialect": self.dialect.id,
-            "port": link.port,
-            "baud": str(link.wire.baud),
-        }
         asked = {k: self._wire.query(line) for k, line in self.dialect.report.items()}
-        return known | asked
+        return self._known | asked
 
     def close(self) -> None:
         """Let go of the port; idempotent."""
