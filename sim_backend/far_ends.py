@@ -138,14 +138,18 @@ def serial_thermometer(table: ThermometerSpec, world: World) -> Thermometer:
     """A serial thermometer at the plant's sensor."""
     from drivers.thermometer import Thermometer
     from sim_backend.serial_line.wires import plug_in
-    from sim_backend.thermometer import SensorFault, thermometer_far_end
+    from sim_backend.thermometer import (
+        SensorFault,
+        SimThermometer,
+        thermometer_far_end,
+    )
 
     row = thermometer_row(table)
     warm = thermometer_far_end(world.plant, row, world.clock, seed=world.simulated.seed)
     given = world.faults.get("thermometer", ())
     for one in given:
-        if isinstance(one, SensorFault):
-            warm.fault = one
+        if isinstance(one, SensorFault) and isinstance(warm, SimThermometer):
+            warm.fault = one  # a row does not say what its model answers then
     faults = [one for one in given if not isinstance(one, SensorFault)]
     far_end = plug_in(warm, row.serial, world.clock, "thermometer", faults)
     return Thermometer(row, far_end.url, world.clock)

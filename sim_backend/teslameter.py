@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -201,7 +200,9 @@ MODELS: dict[
 each model, by dialect row."""
 
 
-class RowMeter:
+def row_teslameter(
+    plant: DrivenCoil, row: TeslameterDialect, clock: Clock
+) -> RowParser:
     """A simulated teslameter made from its row; it has neither range nor noise.
 
     Args:
@@ -212,27 +213,18 @@ class RowMeter:
     Raises:
         SceneError: no answer can be made from one of its patterns.
     """
+    per_tesla = 1 / row.scale
 
-    def __init__(self, plant: DrivenCoil, row: TeslameterDialect, clock: Clock) -> None:
-        self.reply_end = row.serial.reply_end.encode("ascii")
-        self.clearing = row.serial.preamble.encode("ascii")
-        self.gap = row.serial.min_gap
-        per_tesla = 1 / row.scale
+    def field() -> str:
+        value = plant.field(clock.now()) * per_tesla
+        return invented(row.number, f"{value:.7f}")
 
-        def field() -> str:
-            value = plant.field(clock.now()) * per_tesla
-            return invented(row.number, f"{value:.7f}")
-
-        answers: dict[str, Answer] = dict.fromkeys(row.report.values(), lambda: "1")
-        if row.multiplier is not None:
-            per_tesla /= MULTIPLIERS["m"]
-            answers[row.multiplier] = lambda: "m"
-        answers[row.field] = field
-        self._talk = RowParser(row, answers, lambda text: False, deque())
-
-    def line(self, line: bytes) -> bytes | None:
-        """Act on one line; the answer without terminator, or None."""
-        return self._talk.line(line)
+    answers: dict[str, Answer] = dict.fromkeys(row.report.values(), lambda: "1")
+    if row.multiplier is not None:
+        per_tesla /= MULTIPLIERS["m"]
+        answers[row.multiplier] = lambda: "m"
+    answers[row.field] = field
+    return RowParser(row, answers)
 
 
 def meter_far_end(
@@ -242,7 +234,7 @@ def meter_far_end(
     *,
     noise: float = 0.0,
     seed: int = 0,
-) -> SimTeslameter | RowMeter:
+) -> SimTeslameter | RowParser:
     """The simulated teslameter that speaks `row`, as `coil_far_end`.
 
     Args:
@@ -254,4 +246,4 @@ def meter_far_end(
     """
     if row.id in MODELS:
         return SimTeslameter(plant, row.id, clock, noise=noise, seed=seed)
-    return RowMeter(plant, row, clock)
+    return row_teslameter(plant, row, clock)

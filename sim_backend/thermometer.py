@@ -6,8 +6,8 @@ fails; a row of the user's own is served as it says.
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -101,7 +101,7 @@ MODELS: dict[str, tuple[str, str, int, bytes]] = {
 """Name, inputs, digits behind the point and terminator of each model, by its row."""
 
 
-class RowThermometer:
+def row_thermometer(place: Warm, row: ThermometerDialect, clock: Clock) -> RowParser:
     """A simulated thermometer made from its row, at the input the row is for.
 
     Args:
@@ -113,30 +113,20 @@ class RowThermometer:
         SceneError: no answer can be made from one of its patterns.
     """
 
-    def __init__(self, place: Warm, row: ThermometerDialect, clock: Clock) -> None:
-        self.reply_end = row.serial.reply_end.encode("ascii")
-        self.clearing = row.serial.preamble.encode("ascii")
-        self.gap = row.serial.min_gap
-        self.fault: SensorFault | None = None  # a row does not say what it answers then
+    def kelvin() -> str:
+        value = place.temperature(clock.now()) - row.zero
+        return invented(row.number, f"{value:.3f}")
 
-        def kelvin() -> str:
-            value = place.temperature(clock.now()) - row.zero
-            return invented(row.number, f"{value:.3f}")
-
-        answers: dict[str, Answer] = dict.fromkeys(row.report.values(), lambda: "1")
-        if row.status is not None:
-            answers[row.status] = lambda: invented(row.status_ok)
-        answers[row.temperature] = kelvin
-        self._talk = RowParser(row, answers, lambda text: False, deque())
-
-    def line(self, line: bytes) -> bytes | None:
-        """Act on one line; the answer without terminator, or None."""
-        return self._talk.line(line)
+    answers: dict[str, Answer] = dict.fromkeys(row.report.values(), lambda: "1")
+    if row.status is not None:
+        answers[row.status] = partial(invented, row.status_ok)
+    answers[row.temperature] = kelvin
+    return RowParser(row, answers)
 
 
 def thermometer_far_end(
     place: Warm, row: ThermometerDialect, clock: Clock, *, seed: int = 0
-) -> SimThermometer | RowThermometer:
+) -> SimThermometer | RowParser:
     """The simulated thermometer that speaks `row`, as `coil_far_end`.
 
     Args:
@@ -147,4 +137,4 @@ def thermometer_far_end(
     """
     if row.id in MODELS:
         return SimThermometer(place, row.id, clock, seed=seed)
-    return RowThermometer(place, row, clock)
+    return row_thermometer(place, row, clock)

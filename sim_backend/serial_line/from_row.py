@@ -25,11 +25,16 @@ Answer = Callable[[], str]
 class RowParser:
     """What is common to all rows: name, settings that are accepted, error queue.
 
+    An instrument that only answers is no more than this.
+
     Args:
         row: the dialect.
         answers: further queries.
         acts: further lines; each says whether it was meant.
         errors: of the instrument, oldest first.
+
+    Attributes:
+        reply_end, clearing, gap: as the row has them, see `LineInstrument`.
 
     Raises:
         SceneError: no answer can be made from one of the row's patterns.
@@ -39,9 +44,13 @@ class RowParser:
         self,
         row: SerialDialect,
         answers: dict[str, Answer],
-        acts: Callable[[str], bool],
-        errors: deque[str],
+        acts: Callable[[str], bool] = lambda line: False,
+        errors: deque[str] | None = None,
     ) -> None:
+        errors = deque() if errors is None else errors
+        self.reply_end = row.serial.reply_end.encode("ascii")
+        self.clearing = row.serial.preamble.encode("ascii")
+        self.gap = row.serial.min_gap
         name, fine = invented(row.match), invented(row.error_ok)
         self._answers = {row.identify: lambda: name} | answers
         for query, wanted in row.confirm.items():

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from drivers.coil.source import CoilSource
 from drivers.teslameter import Teslameter
 from sim_backend.coil.source import RowCoil, coil_far_end
-from sim_backend.serial_line.from_row import invented
+from sim_backend.serial_line.from_row import RowParser, invented
 from sim_backend.serial_line.wires import plug_in
 from sim_backend.serve import ServedBench
-from sim_backend.teslameter import RowMeter, meter_far_end
+from sim_backend.teslameter import meter_far_end, row_teslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import SceneError
@@ -74,7 +74,7 @@ def test_a_source_made_from_its_row_plays_a_session(row):
 def test_a_meter_made_from_its_row_reads_the_field(row):
     clock, plant = SimulatedClock(), Resistor()
     plant.amperes = -0.5
-    meter = Teslameter(row, wired(row, RowMeter(plant, row, clock), clock), clock)
+    meter = Teslameter(row, wired(row, row_teslameter(plant, row, clock), clock), clock)
     with clock.taking_part("test"):
         meter.open()
         assert meter.read().value == pytest.approx(-5.5e-3, rel=1e-3)
@@ -99,7 +99,7 @@ def test_rows_that_ship_keep_the_far_ends_written_from_manuals():
     for row in COILS:
         assert not isinstance(coil_far_end(Resistor(), row, clock), RowCoil)
     for row in METERS:
-        assert not isinstance(meter_far_end(Resistor(), row, clock), RowMeter)
+        assert not isinstance(meter_far_end(Resistor(), row, clock), RowParser)
 
 
 def test_one_polarity_is_refused_by_the_far_end_too():
