@@ -164,7 +164,8 @@ class Execution(Task[Executed]):
         ending = runner.run()
         if not self.bench.simulated:
             cold = time.monotonic() + self.plan.estimate.cool_down
-            _COLD_FROM[self.bench.name] = cold
+            before = _COLD_FROM.get(self.bench.name, cold)
+            _COLD_FROM[self.bench.name] = max(before, cold)
         took = time.monotonic() - began
         proof: Certificate | None = None
         try:
@@ -188,15 +189,15 @@ class Execution(Task[Executed]):
 
         Simulated coils are new, and so cold, with each run. Who asks to stop ends it.
         """
-        cold = _COLD_FROM.get(self.bench.name, 0.0)
-        if self.needs.coil and (left := cold - time.monotonic()) > 0:
+        cold = _COLD_FROM.get(self.bench.name, 0.0) if self.needs.coil else 0.0
+        if (left := cold - time.monotonic()) > 0:
             text = (
                 f"The coil is still warm from the run before: this one begins in "
                 f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
                 "Stop ends the waiting."
             )
             self._emit(events.Message("info", text))
-        while cold > time.monotonic() and not self.stop.requested and self.needs.coil:
+        while cold > time.monotonic() and not self.stop.requested:
             time.sleep(LOOK)
 
     def _begin_record(self, stream: Stream | None) -> Recorder:

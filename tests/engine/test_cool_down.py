@@ -64,7 +64,8 @@ def test_the_next_run_waits_until_the_coil_is_cold(source: Source, tmp_path: Pat
 
 def test_a_stop_ends_the_waiting(source: Source, tmp_path: Path):
     one = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
-    execution._COLD_FROM[one.bench.name] = time.monotonic() + 1e6
+    cold = execution._COLD_FROM[one.bench.name] = time.monotonic() + 1e6
     one.stop("not today")
     assert one.run().state is RunState.ABORTED
+    assert execution._COLD_FROM[one.bench.name] == cold, "it is warm all the same"
     assert not source.log.exists() or '"value": true' not in source.log.read_text()
