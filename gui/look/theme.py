@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
@@ -61,11 +63,11 @@ class _Dress(QObject):
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
-        self._theme, self._window = theme, window
+        self._theme = theme
         theme.changed.connect(self.put_on)
 
     def put_on(self) -> None:
-        self._window.setStyleSheet(sheet(self._theme.tokens))
+        cast("QWidget", self.parent()).setStyleSheet(sheet(self._theme.tokens))
 
 
 def palette(tokens: Tokens) -> QPalette:
