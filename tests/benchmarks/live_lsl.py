@@ -129,7 +129,10 @@ def measured(seconds: float, window: bool, folder: Path) -> tuple[str, bool]:
         told = run.stdout.read()
         if run.returncode:
             raise SystemExit((folder / "said").read_text())
-        result = json.loads(told)
+        first, *more = told.splitlines()
+        if more:  # what a library said on its way out
+            print(*more, sep="\n", file=sys.stderr)
+        result = json.loads(first)
     heard = stays.heard()
     number, delay = heard[:, 0], heard[:, 2] - heard[:, 1]
     spikes = int(result["spikes"])
