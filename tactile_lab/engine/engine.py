@@ -43,6 +43,14 @@ QUIET = 2.0
 LEAVE = 60.0
 """Longest wait for tasks to end after the pipe's other end has gone, s."""
 
+MOST_TASKS, MOST_QUESTIONS = 8, 64
+"""Tasks that may be begun and not yet ended, one of which has the instruments; and
+questions that may wait for their answers. Each has threads of its own: whoever asks for
+more asks by mistake, as a script does that never waits for an end."""
+
+LOOK = 0.1
+"""Time between two looks at whether what waits for the instruments was stopped, s."""
+
 EVERY, AT_LEAST = 0.02, 0.2
 """Time between two looks at the newest samples and at the coil, and after which they
 are told although nothing changed, s."""
@@ -92,6 +100,7 @@ class Engine:
         self._sending = threading.Lock()
         self.tasks: dict[int, ServedTask] = {}
         self.instruments = threading.Lock()
+        self._questions = threading.BoundedSemaphore(MOST_QUESTIONS)
 
     def serve(self) -> None:
         """Do what is asked until the other end has gone; then leave every coil off."""
@@ -123,6 +132,14 @@ class Engine:
     def begin(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         """Have `act(served, ...)` make a task, and run it in a thread of its own."""
         self._forget_ended()
+        if len(self.tasks) >= MOST_TASKS:
+            words = (
+                f"{MOST_TASKS} tasks have been begun and have not ended; one has the "
+                "instruments, the others wait for them. Wait until one has ended, or "
+                "stop one."
+            )
+            self.tell(number, Ended(Ending.refused(words)))
+            return
         self.tasks[number] = ServedTask(
             lambda served: act(served, *arguments, **named),
             lambda told: self.tell(number, told),
@@ -138,7 +155,19 @@ class Engine:
     def ask(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         """Have `act(engine, ...)` worked out beside everything else, and reply."""
         work = partial(act, self, *arguments, **named)
-        start(lambda: self.tell(number, _reply(work)), act.__name__)
+
+        def answer() -> None:
+            try:
+                reply = _reply(work)
+            finally:
+                self._questions.release()
+            self.tell(number, reply)
+
+        if self._questions.acquire(blocking=False):
+            start(answer, act.__name__)
+        else:
+            words = f"{MOST_QUESTIONS} questions wait for their answers already."
+            self.tell(number, Reply(None, f"{words} Wait for some of them."))
 
     def tell(self, number: int, told: TaskEvent | Reply[Any]) -> None:
         """Tell the other end; one that has gone hears nothing."""
@@ -178,6 +207,7 @@ class ServedTask:
         self.model: LiveModel | None = None
         self.answers: SimpleQueue[str] = SimpleQueue()
         self._said: list[Callable[[Any], None]] = []
+        self._stopped: str | None = None
         self._lock = threading.Lock()
         self.thread = start(self._main, "task")
 
@@ -191,6 +221,7 @@ class ServedTask:
 
     def stop(self, reason: str) -> None:
         """Switch off and end it; returns at once."""
+        self._stopped = reason
         self.to_task(lambda task: task.stop(reason))
 
     def emit(self, event: Event) -> None:
@@ -232,6 +263,16 @@ class ServedTask:
             self._tell(Ended(replace(ending, failure=None)))
 
     def _carry_out(self) -> Ending:
+        """Wait for the instruments, and only then make what uses them, and run it."""
+        while not self._instruments.acquire(timeout=LOOK):
+            if self._stopped is not None:
+                return Ending.refused(f"It had not begun: {self._stopped}.")
+        try:
+            return self._make_and_run()
+        finally:
+            self._instruments.release()
+
+    def _make_and_run(self) -> Ending:
         try:
             task = self._make(self)
         except (TactileLabError, OSError) as error:
@@ -262,8 +303,7 @@ class ServedTask:
             follow = self.model
             beside.append(start(lambda: self._tell_model(follow, task, over), "model"))
         try:
-            with self._instruments:
-                ending: Ending = task.run()
+            ending: Ending = task.run()
         except BaseException as error:
             off = task.coil_state.off or OffReport(False, None, "not verified")
             what = f"It broke. {type(error).__name__}: {error}"

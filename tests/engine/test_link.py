@@ -15,7 +15,7 @@ from engine_answers import answered, pid_of
 from tactile_lab.acquisition.events import RunState, SpikesSeen
 from tactile_lab.engine import engine as module
 from tactile_lab.engine.commands import begin_monitor, begin_run
-from tactile_lab.engine.engine import Engine, Reply
+from tactile_lab.engine.engine import MOST_QUESTIONS, MOST_TASKS, Engine, Reply
 from tactile_lab.engine.events import Begun, Ended, Samples
 from tactile_lab.engine.jobs import check_bench
 from tactile_lab.engine.link import Link
@@ -117,6 +117,67 @@ def test_a_question_is_answered_even_where_it_breaks(tmp_path):
         assert "KeyError: 'nothing'" in polled(link, breaks).problem
         gone = polled(link, check_bench, Request("gone.toml"))
         assert gone.value is None and "gone.toml" in gone.problem
+
+
+def take_instruments(engine: Engine) -> int:
+    """Hold what every task needs, as a long run does; how many threads there are."""
+    engine.instruments.acquire()
+    return threading.active_count()
+
+
+def let_go(engine: Engine) -> int:
+    """Hold it no longer; how many threads there are by now."""
+    engine.instruments.release()
+    return threading.active_count()
+
+
+def test_runs_begun_again_and_again_wait_in_few_threads_and_can_be_stopped(tmp_path):
+    """An engine was once seen with 6,958 threads: three for each run that waited."""
+    with Link(separate=False, realtime=False) as link:
+        before = answered(link, take_instruments).value
+        runs = [
+            link.follow(begin_run, Request("demo"), tmp_path, {}) for _ in range(60)
+        ]
+        for run in runs[MOST_TASKS:]:
+            (told,) = run
+            assert told.ending.state is RunState.REFUSED
+            assert "have not ended" in told.ending.reason
+        for run in runs[:MOST_TASKS]:
+            assert run.alive
+            run.stop("enough")
+            (told,) = run
+            assert "had not begun: enough" in told.ending.reason and told.ending.off
+        assert answered(link, let_go).value <= before + MOST_TASKS
+        assert not list(tmp_path.iterdir()), "what has not begun leaves no folder"
+
+
+MAY_ANSWER = threading.Event()
+
+
+def wait(engine: Engine) -> str:
+    """Answer when the test says so, or after a minute."""
+    MAY_ANSWER.wait(60)
+    return "answered"
+
+
+def test_one_question_too_many_is_refused_and_those_before_it_are_answered():
+    MAY_ANSWER.clear()
+    replies: list[Reply[str]] = []
+    with Link(separate=False, realtime=False) as link:
+        for _ in range(MOST_QUESTIONS + 1):
+            link.ask(replies.append, wait)
+        while not replies:
+            link.poll()
+            time.sleep(0.001)
+        MAY_ANSWER.set()
+        assert (
+            replies[0].value is None and "wait for their answers" in replies[0].problem
+        )
+        while len(replies) <= MOST_QUESTIONS:
+            link.poll()
+            time.sleep(0.001)
+        assert {one.value for one in replies[1:]} == {"answered"}
+        assert answered(link, pid_of).value, "and there is room again"
 
 
 def test_an_engine_of_which_nothing_is_asked_ends_and_the_next_question_starts_one():
