@@ -59,6 +59,8 @@ class Actions(QObject):
 
     fold_asked = Signal(QWidget, bool)
     """Fold a side panel, or unfold it."""
+    lanes_asked = Signal()
+    """Put the lanes into a window of their own, or back."""
 
     def __init__(
         self,
@@ -73,10 +75,8 @@ class Actions(QObject):
         self.window, self.panels, self.screen = window, panels, screen
         self.runs, self.preferences = runs, preferences
         self.keys = self._all()
-        for key in self.keys:
-            for keys in () if key.single else key.keys:
-                self._bind(keys, key)
-        StopAnywhere(window, panels.header.stop, closing, panels.session)
+        self.bind(window)
+        StopAnywhere(window, panels.stops, closing, panels.session)
         panels.header.help_asked.connect(lambda: self.show_help())
         for button, topic in (
             (panels.setup.help, "Protocol"),
@@ -92,9 +92,12 @@ class Actions(QObject):
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
 
-    def _bind(self, keys: str, key: Shortcut) -> None:
-        shortcut = QShortcut(QKeySequence(keys), self.window)
-        shortcut.activated.connect(lambda: key.act())
+    def bind(self, window: QWidget) -> None:
+        """Let all keys but the single ones act in a window."""
+        for key in self.keys:
+            for keys in () if key.single else key.keys:
+                shortcut = QShortcut(QKeySequence(keys), window)
+                shortcut.activated.connect(lambda key=key: key.act())
 
     def take_key(self, event: QKeyEvent) -> bool:
         """A key no widget wanted; whether it was one of the single ones.
@@ -170,6 +173,9 @@ class Actions(QObject):
                 ("F8",), "Fold the right panel", lambda: self._fold(panels.review)
             ),
             Shortcut(("F11",), "Lanes only", self._focus),
+            Shortcut(
+                ("Ctrl+L",), "Lanes in a window of their own", self.lanes_asked.emit
+            ),
             Shortcut(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
             Shortcut(
                 ("?", "F1"),
@@ -281,6 +287,7 @@ class Actions(QObject):
             open_skin=self.ask_skin,
             show_studies=self.show_studies,
             export_view=self.export_view,
+            part_lanes=self.lanes_asked.emit,
             connect=self.connect_dialog,
             settings=self.show_preferences,
             copy_command=self.copy_command,

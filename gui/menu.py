@@ -30,6 +30,7 @@ class Acts:
     open_skin: Act
     show_studies: Act
     export_view: Act
+    part_lanes: Act
     connect: Act
     settings: Act
     copy_command: Act
@@ -77,6 +78,7 @@ class GearMenu(QMenu):
         self._add("Studies …", "", acts.show_studies)
         self._add("About this run …", "Ctrl+I", acts.about_run)
         self._add("Export view …", "Ctrl+E", acts.export_view)
+        self._add("Lanes in a window of their own", "Ctrl+L", acts.part_lanes)
         self.addSeparator()
         free = not session.busy and not session.monitor.alive
         use = partial(session.connect_bench, "sim")

@@ -1,8 +1,10 @@
-"""STOP from anywhere: its button and its keys act whatever else is open."""
+"""STOP from anywhere: its buttons and its keys act whatever else is open."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt
+from collections.abc import Sequence
+
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
@@ -18,22 +20,26 @@ class StopAnywhere(QObject):
     - F12 is STOP.
     - Esc is STOP while anything drives the coil. In the question asked on closing it
       keeps running. Else it closes what is open; where nothing is, it is STOP.
-    - A press on the button STOP acts, also where it would only close a menu.
+    - A press on a button STOP acts, also where it would only close a menu.
     - No dialog is modal, whoever opens it: Qt keeps from a covered window every click,
       and does so with its own questions within a file dialog, too.
 
     Args:
-        window: what has the button; cards cover it, menus and dialogs are its own.
-        stop: the button.
+        window: the main one; cards cover it, menus and dialogs are its own.
+        stops: every such button there is now; a window with one is not "open".
         closing: the question in which Esc is not STOP.
         session: is stopped.
     """
 
     def __init__(
-        self, window: QWidget, stop: StopButton, closing: Closing, session: Session
+        self,
+        window: QWidget,
+        stops: Sequence[StopButton],
+        closing: Closing,
+        session: Session,
     ) -> None:
         super().__init__(window)
-        self._window, self._stop = window, stop
+        self._window, self._stops = window, stops
         self._closing, self._session = closing, session
         application = QApplication.instance()
         if application is not None:
@@ -72,7 +78,8 @@ class StopAnywhere(QObject):
             if cards:
                 cards[-1].hide()
                 return True
-            if not self._window.isActiveWindow() or QApplication.activePopupWidget():
+            main = any(stop.isActiveWindow() for stop in self._stops)
+            if not main or QApplication.activePopupWidget():
                 return False  # Qt closes it
         return self._act("STOP by Esc")
 
@@ -83,5 +90,5 @@ class StopAnywhere(QObject):
         left = event.button() == Qt.MouseButton.LeftButton
         if not left or QApplication.activePopupWidget() is None:
             return False
-        area = QRect(self._stop.mapToGlobal(QPoint()), self._stop.size())
-        return area.contains(event.globalPosition().toPoint())
+        at = event.globalPosition().toPoint()
+        return any(s.rect().contains(s.mapFromGlobal(at)) for s in self._stops)

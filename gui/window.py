@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSettings, Qt, QTimer
 from PySide6.QtGui import (
@@ -36,6 +37,9 @@ from gui.session.session import Session
 from gui.setup.panel import SetupPanel
 from gui.state import Snapshot, WindowState
 from gui.tab_order import move_on
+
+if TYPE_CHECKING:
+    from gui.lanes_window import LanesWindow
 
 NARROW = 1280
 """Window width, px, below which there is room for one side panel."""
@@ -89,6 +93,7 @@ class Window(QMainWindow):
         self.review.noise.follow(session)
         CursorStatistics(self.centre.stack, session)
         self._leaving = False
+        self.apart: LanesWindow | None = None
         self._connect()
         self.render_state()
 
@@ -146,6 +151,25 @@ class Window(QMainWindow):
     def _show_folds(self) -> None:
         self.header.show_folded(self.setup.isHidden(), self.review.isHidden())
 
+    def part_lanes(self) -> None:
+        """Put the lanes into a window of their own, or back."""
+        from gui.lanes_window import LanesWindow
+
+        if self.apart is not None:
+            self.apart.close()
+            return
+        kept = self._settings.value("lanes") if self._settings is not None else None
+        self.apart = LanesWindow(self, self.panels, self.actions_, kept)
+        self.apart.closed.connect(self._lanes_back)
+        self.apart.show()
+
+    def _lanes_back(self) -> None:
+        if self.apart is not None:
+            if self._settings is not None:
+                self._settings.setValue("lanes", self.apart.saveGeometry())
+            self.apart.deleteLater()
+            self.apart = None
+
     # --- closing
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -160,7 +184,11 @@ class Window(QMainWindow):
             event.ignore()
             return
         self.frames.stop()
+        apart = self.apart is not None
+        if self.apart is not None:
+            self.apart.close()
         if self._settings is not None:
+            self._settings.setValue("apart", apart)
             self._settings.setValue("geometry", self.saveGeometry())
             self._settings.setValue("columns", self.columns.saveState())
             self._settings.setValue("centre", self.centre.splitter.saveState())
@@ -253,6 +281,7 @@ class Window(QMainWindow):
         self.screen_.changed.connect(self.render_state)
         self.frames.told.connect(self.render_clock)
         self.actions_.fold_asked.connect(self.fold)
+        self.actions_.lanes_asked.connect(self.part_lanes)
         sides = (self.setup, self.review)
         self.header.unfold_asked.connect(lambda n: self.fold(sides[n], False))
         for line in session.log.lines:  # the bench may have been asked already
@@ -323,3 +352,5 @@ class Window(QMainWindow):
                 kept = self._settings.value(name)
                 if kept is not None:
                     restore(kept)
+            if self._settings.value("apart", False, bool):
+                QTimer.singleShot(0, self.part_lanes)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtWidgets import QFrame, QLabel, QSplitter, QWidget
 
 from gui.lanes.lane import Lane
@@ -66,6 +65,25 @@ class EmptyCard(QFrame):
         scene.clicked.connect(self.open_asked)
         theme.changed.connect(self._tint)
         self._tint()
+        parent.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Stay in the middle of what it lies on."""
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self.place()
+        return False
+
+    def place(self) -> None:
+        """Lie in the middle, as large as it needs to be and has room for."""
+        below = self.parentWidget()
+        self.setFixedWidth(min(520, below.width() - 40))
+        self.adjustSize()
+        height = min(self.sizeHint().height() + 12, below.height() - 16)
+        self.setFixedHeight(height)
+        self.move(
+            (below.width() - self.width()) // 2, max((below.height() - height) // 2, 8)
+        )
+        self.raise_()
 
     def show_recent(self, folders: list[tuple[str, Path]]) -> None:
         """Offer recent runs as (title, folder)."""
@@ -79,6 +97,8 @@ class EmptyCard(QFrame):
                 lambda _=False, folder=folder: self.recent_asked.emit(folder)
             )
             self._recent.addWidget(button)
+        if self.isVisible():
+            self.place()
 
     def _tint(self) -> None:
         self._picture.setPixmap(pixmap("bench", self._theme.tokens.accent, 44))
@@ -94,26 +114,26 @@ class Centre(QWidget):
         self.tools = Tools(self.stack, self.view, theme)
         self.progress = ProgressStrip(theme)
         self.log = LogView(theme)
-        upper = panel()
+        self.lanes = panel()
         self.notice = label("", "muted")
         self.notice.setContentsMargins(14, 6, 14, 6)
         self.notice.hide()
         self.compare_bar = CompareBar(self.stack, self.view, theme)
         self.monitor_bar = MonitorBar()
         bars = (self.tools, line(), self.notice, self.compare_bar, self.monitor_bar)
-        column(upper, *bars, (self.stack, 1), margin=1, spacing=0)
+        column(self.lanes, *bars, (self.stack, 1), margin=1, spacing=0)
         lower = panel()
         below = column(lower, self.progress, (self.log, 1), spacing=7)
         below.setContentsMargins(12, 10, 12, 10)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
-        self.splitter.addWidget(upper)
+        self.splitter.addWidget(self.lanes)
         self.splitter.addWidget(lower)
         self.splitter.setStretchFactor(0, 4)
         self.splitter.setStretchFactor(1, 1)
         self.splitter.setHandleWidth(8)
         self.splitter.setSizes([780, 200])
         self.splitter.setChildrenCollapsible(False)
-        upper.setMinimumHeight(320)
+        self.lanes.setMinimumHeight(320)
         lower.setMinimumHeight(151)
         column(self).addWidget(self.splitter)
         self.empty = EmptyCard(self.stack, theme)
@@ -172,30 +192,4 @@ class Centre(QWidget):
         """Show or hide the card of the empty state."""
         self.empty.setVisible(wanted)
         if wanted:
-            self._place()
-
-    def show_recent(self, folders: list[tuple[str, Path]]) -> None:
-        """Offer recent runs on the card, which grows with them."""
-        self.empty.show_recent(folders)
-        self._place()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep the card in the middle."""
-        super().resizeEvent(event)
-        self.tools.set_width(self.width())
-        self._place()
-
-    def _place(self) -> None:
-        if not self.empty.isVisible():
-            return
-        width = min(520, self.stack.width() - 40)
-        self.empty.setFixedWidth(width)
-        self.empty.adjustSize()
-        height = min(self.empty.sizeHint().height() + 12, self.stack.height() - 16)
-        self.empty.setGeometry(
-            (self.stack.width() - width) // 2,
-            max((self.stack.height() - height) // 2, 8),
-            width,
-            height,
-        )
-        self.empty.raise_()
+            self.empty.place()

@@ -53,9 +53,10 @@ class Frames(QObject):
         begun = time.perf_counter()
         panels, session = self._panels, self._panels.session
         moved = session.poll()
-        panels.header.stop.show_coil(session.state, session.coil_view())
+        for stop in panels.stops:
+            stop.show_coil(session.state, session.coil_view())
         now = time.monotonic()
-        source, seen = self._screen.live, not panels.centre.window().isMinimized()
+        source, seen = self._screen.live, not panels.centre.lanes.window().isMinimized()
         if source is not None and seen and not self.frozen:
             if source.running or moved:
                 self._show_newest(source)

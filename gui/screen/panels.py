@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gui.header.header import Header
+from gui.header.stop import StopButton
 from gui.look.theme import Theme
 from gui.review.panel import ReviewPanel
 from gui.screen.centre import Centre
@@ -14,7 +15,11 @@ from gui.setup.panel import SetupPanel
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """The session and the panels that show it."""
+    """The session and the panels that show it.
+
+    Attributes:
+        stops: every STOP there is; the header's is the first.
+    """
 
     session: Session
     theme: Theme
@@ -22,3 +27,7 @@ class Panels:
     setup: SetupPanel
     centre: Centre
     review: ReviewPanel
+    stops: list[StopButton] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.stops.append(self.header.stop)

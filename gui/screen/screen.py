@@ -381,7 +381,7 @@ class Screen(QObject):
     def _list(self, found: list[RunSummary]) -> None:
         self._panels.review.runs.show_entries(found)
         newest = found[:-5:-1]
-        self._panels.centre.show_recent(
+        self._panels.centre.empty.show_recent(
             [(f"{e.title} · {day(e.started)} · {e.status}", e.folder) for e in newest]
         )
 

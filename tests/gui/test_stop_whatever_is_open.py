@@ -16,6 +16,7 @@ from gui.ask_file import ask_file
 from gui.dialogs.connect import Connect
 from gui.dialogs.overlay import Overlay
 from gui.dialogs.preferring import PreferencesCard
+from gui.lanes_window import LanesWindow
 from gui.plots.small_plot import SmallPlot
 from gui.skin.window import SkinWindow
 from tactile_lab.store.summary import RunSummary
@@ -23,6 +24,7 @@ from tactile_lab.store.summary import RunSummary
 OPENS = re.compile(
     r"\bQMenu\(|\bask_file\(|WindowType\.|\bQDialog\(|QMessageBox\(|QInputDialog"
     r"|QProgressDialog|class \w+\((Overlay|QMenu|QDialog|QMainWindow|QMessageBox)\)"
+    r"|WindowTitle\("
 )
 """What has something open over the window, or beside it, as it is written."""
 
@@ -99,6 +101,7 @@ def openers(lab, tmp_path: Path) -> dict[str, tuple[Open, ...]]:
         "lanes/tools.py": (window.centre.tools.lanes.click,),
         "menu.py": (acts.show_menu,),
         "plots/small_plot.py": (plot_menu,),
+        "lanes_window.py": (window.part_lanes,),
         "review/runs.py": (lambda: window.review.runs._show_menu(entry, QPoint(9, 9)),),
         "screen/screen.py": (window.screen_.ask_scene, window.screen_.ask_run),
         "setup/fields.py": (window.setup.form.field("levels")._choose_file,),
@@ -115,7 +118,7 @@ def seen(window: QWidget) -> list[QWidget]:
     """What is open over the window, or beside it."""
     cards = [card for card in window.findChildren(Overlay) if card.isVisible()]
     popup = QApplication.activePopupWidget()
-    kinds = QFileDialog, QMessageBox, SkinWindow
+    kinds = QFileDialog, QMessageBox, SkinWindow, LanesWindow
     beside = [one for one in QApplication.topLevelWidgets() if isinstance(one, kinds)]
     return [*cards, *([popup] if popup else []), *(b for b in beside if b.isVisible())]
 
