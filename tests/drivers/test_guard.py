@@ -32,9 +32,10 @@ from patient import patient
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.current_list import CurrentList
+from tactile_lab.instruments.dialects import coil_dialect
 guard.SILENCE = float(sys.argv[4])
 clock = RealClock()
-coil = CoilSource(patient("kepco-bop"), sys.argv[1], CoilLimits(), clock)
+coil = CoilSource(patient(coil_dialect("kepco-bop")), sys.argv[1], CoilLimits(), clock)
 coil.open()
 coil.energise()
 listed = sys.argv[3] == "list"
@@ -243,7 +244,7 @@ def guarded(served, tmp_path, monkeypatch):
     monkeypatch.setattr("drivers.coil.guard.SILENCE", LONG_SILENCE)
     monkeypatch.setattr("drivers.coil.wire.VERIFICATIONS", 1)
     _, server = served
-    row = patient("kepco-bop", timeout=0.6)
+    row = patient(coil_dialect("kepco-bop"), timeout=0.6)
     log = tmp_path / "tactile-lab" / "guard.log"
     guard = Guard(server.url, row, row.serial, log)
     coil = CoilSource(row, server.url, CoilLimits(), RealClock(), guard=guard)

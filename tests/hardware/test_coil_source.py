@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checklist import PORT, by_hand, fact, needs, row_of
 
 from drivers.coil.source import CoilSource
 from drivers.serial_line.conversation import Conversation
@@ -26,35 +27,17 @@ from tactile_lab.clock import RealClock
 from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.dialects import coil_dialect
-from tactile_lab.instruments.serial_dialect import CoilDialect
 
-pytestmark = [
-    pytest.mark.hardware,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        os.environ.get("TACTILE_LAB_HARDWARE") != "coil",
-        reason="needs a current source; set TACTILE_LAB_HARDWARE=coil",
-    ),
-]
-PORT = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
-ROW = os.environ.get("TACTILE_LAB_DIALECT", "kepco-bop")
+pytestmark = needs("coil", "a current source")
+NAME = os.environ.get("TACTILE_LAB_DIALECT", "kepco-bop")
+ROW = row_of(coil_dialect, NAME)
 LIMITS = CoilLimits(current=0.3, slew=2.0, compliance=5.0)
-
-
-def patient(row: CoilDialect) -> CoilDialect:
-    """The row with a long timeout: how busy this computer is, is not asked here."""
-    wire = row.serial.model_copy(update={"timeout": 2.0})
-    return row.model_copy(update={"serial": wire})
-
-
-def fact(name: str, value: object) -> None:
-    print(f"\nFACT {name}: {value}")
 
 
 @pytest.fixture
 def coil(monkeypatch: pytest.MonkeyPatch) -> Iterator[CoilSource]:
     monkeypatch.setattr("drivers.coil.guard.SILENCE", 5.0)
-    source = CoilSource(patient(coil_dialect(ROW)), PORT, LIMITS, RealClock())
+    source = CoilSource(ROW, PORT, LIMITS, RealClock())
     source.open()
     yield source
     source.close()
@@ -64,8 +47,7 @@ def coil(monkeypatch: pytest.MonkeyPatch) -> Iterator[CoilSource]:
 @pytest.fixture
 def bare() -> Iterator[SerialLink]:
     """The wire alone: the source is as its front panel has it."""
-    row = patient(coil_dialect(ROW))
-    one = SerialLink(PORT, row.serial, RealClock(), what="coil source")
+    one = SerialLink(PORT, ROW.serial, RealClock(), what="coil source")
     one.open()
     yield one
     one.close()
@@ -74,7 +56,7 @@ def bare() -> Iterator[SerialLink]:
 @pytest.fixture
 def link(bare: SerialLink) -> SerialLink:
     """The same, remotely controlled: in local a source refuses all alike."""
-    Conversation(bare, patient(coil_dialect(ROW))).offer(coil_dialect(ROW).optional)
+    Conversation(bare, ROW).offer(ROW.optional)
     return bare
 
 
@@ -101,14 +83,13 @@ def test_name_and_settings(coil: CoilSource) -> None:
 
 
 def test_latency(link: SerialLink) -> None:
-    row = coil_dialect(ROW)
     times = []
     for _ in range(50):
         begun = time.monotonic()
-        answer = link.query(row.set_query)
+        answer = link.query(ROW.set_query)
         times.append(time.monotonic() - begun)
-    characters = len(row.set_query) + len(answer) + 3
-    wire = characters * row.serial.character_time
+    characters = len(ROW.set_query) + len(answer) + 3
+    wire = characters * ROW.serial.character_time
     fact("round trip, ms", f"{1e3 * statistics.median(times):.1f}")
     fact("of it latency, ms", f"{1e3 * (statistics.median(times) - wire):.1f}")
     fact("raw answer to the set-point query", repr(answer))
@@ -116,12 +97,11 @@ def test_latency(link: SerialLink) -> None:
 
 def test_remote(bare: SerialLink) -> None:
     """What it says to the row's optional lines, and to a set-point before and after."""
-    row = coil_dialect(ROW)
-    for line in (row.set_line(0.0), *row.optional, row.set_line(0.0)):
-        *first, last = row.verified(line)
+    for line in (ROW.set_line(0.0), *ROW.optional, ROW.set_line(0.0)):
+        *first, last = ROW.verified(line)
         for part in first:
             bare.write(part)
-        fact(f"answer to {line}", bare.query(last) if row.error else "not asked")
+        fact(f"answer to {line}", bare.query(last) if ROW.error else "not asked")
 
 
 OWNER = """
@@ -148,7 +128,7 @@ while True:
 def test_guard(tmp_path: Path) -> None:
     """Kill a program that has the output on, and see the guard switch it off."""
     with subprocess.Popen(
-        [sys.executable, "-c", OWNER, PORT, ROW],
+        [sys.executable, "-c", OWNER, PORT, NAME],
         stdout=subprocess.PIPE,
         env=os.environ | {"XDG_STATE_HOME": str(tmp_path)},
     ) as owner:
@@ -163,10 +143,9 @@ def test_guard(tmp_path: Path) -> None:
     for line in log.read_text().splitlines():
         fact("guard", line)
     assert "NOT verified" not in log.read_text()
-    row = patient(coil_dialect(ROW))
-    one = SerialLink(PORT, row.serial, RealClock(), what="coil source")
+    one = SerialLink(PORT, ROW.serial, RealClock(), what="coil source")
     one.open()
-    fact("output after it", one.query(row.on_query))
+    fact("output after it", one.query(ROW.on_query))
     one.close()
 
 
@@ -202,20 +181,18 @@ def test_off_answers(coil: CoilSource) -> None:
 
 
 def test_error_answers(link: SerialLink) -> None:
-    row = coil_dialect(ROW)
-    if row.error is None:
+    if ROW.error is None:
         pytest.skip("the row has no error query")
     link.write("NONSENSE 1")
-    fact("answer after an unknown command", link.query(row.error))
-    link.write(row.set.format(i=99.0))
-    fact("answer after 99 A", link.query(row.error))
-    fact("and after that", link.query(row.error))
+    fact("answer after an unknown command", link.query(ROW.error))
+    link.write(ROW.set.format(i=99.0))
+    fact("answer after 99 A", link.query(ROW.error))
+    fact("and after that", link.query(ROW.error))
 
 
 def test_compound_lines(link: SerialLink) -> None:
     """Whether a set-point and the error query go in one line, as the row has it."""
-    row = coil_dialect(ROW)
-    lines = row.verified(row.set_line(0.0))
+    lines = ROW.verified(ROW.set_line(0.0))
     fact("sent", lines)
     for line in lines[:-1]:
         link.write(line)
@@ -225,7 +202,7 @@ def test_compound_lines(link: SerialLink) -> None:
 @pytest.mark.parametrize("baud", [9600, 19200, 38400])
 def test_baud_rates(baud: int) -> None:
     """Set the source to each rate at its panel; others do not answer."""
-    wire = coil_dialect(ROW).serial.model_copy(update={"baud": baud})
+    wire = ROW.serial.model_copy(update={"baud": baud})
     one = SerialLink(PORT, wire, RealClock(), what="coil source")
     try:
         one.open()
@@ -236,10 +213,7 @@ def test_baud_rates(baud: int) -> None:
         one.close()
 
 
-@pytest.mark.skipif(
-    os.environ.get("TACTILE_LAB_OPERATOR") != "1",
-    reason="someone must pull the cable; set TACTILE_LAB_OPERATOR=1",
-)
+@by_hand("pull the cable")
 def test_pulled_cable(coil: CoilSource) -> None:
     coil.energise()
     print("\nPull the serial cable now.")
@@ -251,7 +225,7 @@ def test_pulled_cable(coil: CoilSource) -> None:
     assert coil.safe_off().verified
 
 
-@pytest.mark.skipif(coil_dialect(ROW).list is None, reason="the row has no list mode")
+@pytest.mark.skipif(ROW.list is None, reason="the row has no list mode")
 def test_list(coil: CoilSource) -> None:
     coil.energise()
     currents = np.array([0.002 * min(k, 100 - k) for k in range(101)])
@@ -267,9 +241,7 @@ def test_list(coil: CoilSource) -> None:
     assert coil.safe_off().verified
 
 
-@pytest.mark.skipif(
-    "TACTILE_LAB_OPERATOR" not in os.environ, reason="asks a person for a voltage"
-)
+@by_hand("give a voltage")
 def test_analogue_input(coil: CoilSource) -> None:
     """What flows with 0 A set and 0.2 V at the analogue input."""
     coil.energise()

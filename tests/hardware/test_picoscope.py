@@ -14,6 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from checklist import by_hand, fact, needs
 
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import RANGES
@@ -21,14 +22,7 @@ from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LimitError
 
-pytestmark = [
-    pytest.mark.hardware,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        os.environ.get("TACTILE_LAB_HARDWARE") != "picoscope",
-        reason="needs a PicoScope; set TACTILE_LAB_HARDWARE=picoscope",
-    ),
-]
+pytestmark = needs("picoscope", "a PicoScope")
 
 SECONDS = float(os.environ.get("TACTILE_LAB_SECONDS", "100"))
 FOUR = tuple(
@@ -37,10 +31,6 @@ FOUR = tuple(
         ("V_C1", "V_C2", "V_K", "coil_current"), "ABCD", strict=True
     )
 )
-
-
-def fact(name: str, value: object) -> None:
-    print(f"\nFACT {name}: {value}")
 
 
 @pytest.fixture
@@ -166,9 +156,7 @@ def test_the_callback_comes_on_the_polling_thread(scope: PicoScope) -> None:
     assert seen
 
 
-@pytest.mark.skipif(
-    "TACTILE_LAB_OPERATOR" not in os.environ, reason="asks a person to pull plugs"
-)
+@by_hand("pull plugs")
 @pytest.mark.parametrize(
     "plug", ["USB cable", "mains adapter", "mains adapter back in"]
 )

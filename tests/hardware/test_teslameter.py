@@ -7,39 +7,24 @@ lakeshore-425) and the probe in its zero chamber.
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Iterator
 
 import pytest
+from checklist import PORT, by_hand, fact, needs, row_of
 
 from drivers.teslameter import Teslameter
 from tactile_lab.clock import RealClock
 from tactile_lab.instruments.dialects import teslameter_dialect
 
-pytestmark = [
-    pytest.mark.hardware,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        os.environ.get("TACTILE_LAB_HARDWARE") != "teslameter",
-        reason="needs a teslameter; set TACTILE_LAB_HARDWARE=teslameter",
-    ),
-]
-
-
-def fact(name: str, value: object) -> None:
-    print(f"\nFACT {name}: {value}")
+pytestmark = needs("teslameter", "a teslameter")
 
 
 @pytest.fixture
 def meter() -> Iterator[Teslameter]:
-    row = teslameter_dialect(os.environ.get("TACTILE_LAB_DIALECT", "lakeshore-425"))
-    # how busy this computer is, is not asked here
-    wire = row.serial.model_copy(update={"timeout": 2.0})
-    row = row.model_copy(update={"serial": wire})
-    port = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
-    one = Teslameter(row, port, RealClock())
+    row = row_of(teslameter_dialect, "lakeshore-425")
+    one = Teslameter(row, PORT, RealClock())
     one.open()
     yield one
     one.close()
@@ -69,10 +54,7 @@ def test_latency(meter: Teslameter) -> None:
     assert max(times) < meter.dialect.serial.timeout
 
 
-@pytest.mark.skipif(
-    os.environ.get("TACTILE_LAB_OPERATOR") != "1",
-    reason="someone must move a magnet; set TACTILE_LAB_OPERATOR=1",
-)
+@by_hand("move a magnet")
 def test_sign_unit_and_overload(meter: Teslameter) -> None:
     for what in ("a magnet's north pole", "its south pole", "a field beyond the range"):
         input(f"\nHold {what} at the probe, then press Enter. ")

@@ -7,40 +7,24 @@ lakeshore-218) and a sensor at its first input.
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Iterator
 
 import pytest
+from checklist import PORT, by_hand, fact, needs, row_of
 
 from drivers.thermometer import Thermometer
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LimitError
 from tactile_lab.instruments.dialects import thermometer_dialect
 
-pytestmark = [
-    pytest.mark.hardware,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        os.environ.get("TACTILE_LAB_HARDWARE") != "thermometer",
-        reason="needs a thermometer; set TACTILE_LAB_HARDWARE=thermometer",
-    ),
-]
-PORT = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
+pytestmark = needs("thermometer", "a thermometer")
 
 
-def fact(name: str, value: object) -> None:
-    print(f"\nFACT {name}: {value}")
-
-
-def made(gap: float | None = None) -> Thermometer:
-    """The thermometer, perhaps with another rest between messages, s."""
-    row = thermometer_dialect(os.environ.get("TACTILE_LAB_DIALECT", "lakeshore-218"))
-    # how busy this computer is, is not asked here
-    rest = row.serial.min_gap if gap is None else gap
-    wire = row.serial.model_copy(update={"timeout": 2.0, "min_gap": rest})
-    row = row.model_copy(update={"serial": wire})
+def made(**wire: float) -> Thermometer:
+    """The thermometer, with changes of how its wire is used."""
+    row = row_of(thermometer_dialect, "lakeshore-218", **wire)
     return Thermometer(row.at(None), PORT, RealClock())
 
 
@@ -70,7 +54,7 @@ def test_latency_and_noise(thermometer: Thermometer) -> None:
 
 @pytest.mark.parametrize("gap", [0.0, 0.03])
 def test_rest_between_messages(gap: float) -> None:
-    one, told = made(gap), f"with {1e3 * gap:g} ms between messages"
+    one, told = made(min_gap=gap), f"with {1e3 * gap:g} ms between messages"
     try:
         one.open()
         fact(told, [one.read().value for _ in range(3)])
@@ -80,10 +64,7 @@ def test_rest_between_messages(gap: float) -> None:
         one.close()
 
 
-@pytest.mark.skipif(
-    os.environ.get("TACTILE_LAB_OPERATOR") != "1",
-    reason="someone must pull the sensor; set TACTILE_LAB_OPERATOR=1",
-)
+@by_hand("pull the sensor")
 def test_status_of_an_open_sensor(thermometer: Thermometer) -> None:
     input("\nPull the sensor's lead, wait 5 s, then press Enter. ")
     try:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from checklist import fact, needs
 
 from drivers.usb_presence import present
 from drivers.usbtmc.scope import UsbtmcScope
@@ -20,18 +21,7 @@ from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import RealClock
 from tactile_lab.instruments.dialects import scope_dialect
 
-pytestmark = [
-    pytest.mark.hardware,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        os.environ.get("TACTILE_LAB_HARDWARE") != "usbtmc",
-        reason="needs a USBTMC oscilloscope; set TACTILE_LAB_HARDWARE=usbtmc",
-    ),
-]
-
-
-def fact(name: str, value: object) -> None:
-    print(f"\nFACT {name}: {value}")
+pytestmark = needs("usbtmc", "a USBTMC oscilloscope")
 
 
 @pytest.fixture

@@ -7,43 +7,26 @@ tests/hardware/test_voltage_source.py``, with TACTILE_LAB_DIALECT naming the row
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Iterator
 
 import pytest
+from checklist import PORT, by_hand, fact, needs, row_of
 
 from drivers.voltage_source import STEP_EVERY, SourceMeter
 from tactile_lab.clock import RealClock
 from tactile_lab.instruments.dialects import voltage_dialect
 from tactile_lab.voltage_source import VoltageLimits
 
-pytestmark = [
-    pytest.mark.hardware,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        os.environ.get("TACTILE_LAB_HARDWARE") != "voltage_source",
-        reason="needs a source meter; set TACTILE_LAB_HARDWARE=voltage_source",
-    ),
-]
-
-
-def fact(name: str, value: object) -> None:
-    print(f"\nFACT {name}: {value}")
+pytestmark = needs("voltage_source", "a source meter")
 
 
 @pytest.fixture
 def source() -> Iterator[SourceMeter]:
-    row = voltage_dialect(
-        os.environ.get("TACTILE_LAB_DIALECT", "keithley-2400-voltage")
-    )
-    # how busy this computer is, is not asked here
-    wire = row.serial.model_copy(update={"timeout": 2.0})
-    row = row.model_copy(update={"serial": wire})
-    port = os.environ.get("TACTILE_LAB_PORT", "/dev/ttyUSB0")
+    row = row_of(voltage_dialect, "keithley-2400-voltage")
     limits = VoltageLimits(highest=2.0, slew=5.0)
-    one = SourceMeter("V_GS", row, port, limits, RealClock())
+    one = SourceMeter("V_GS", row, PORT, limits, RealClock())
     one.open()
     yield one
     left = one.go_to_rest()
@@ -78,10 +61,7 @@ def test_latency(source: SourceMeter) -> None:
     assert max(times) < source.dialect.serial.timeout
 
 
-@pytest.mark.skipif(
-    os.environ.get("TACTILE_LAB_OPERATOR") != "1",
-    reason="someone must read a multimeter; set TACTILE_LAB_OPERATOR=1",
-)
+@by_hand("read a multimeter")
 def test_steps_against_a_multimeter(source: SourceMeter) -> None:
     step = source.capability.resolution
     for volts in (1.4, 1.4 + step, 1.4 + 2 * step):

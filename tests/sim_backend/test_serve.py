@@ -13,6 +13,10 @@ from sim_backend.serve import ServedBench
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, SceneError
+from tactile_lab.instruments.dialects import coil_dialect, teslameter_dialect
+
+KEPCO = patient(coil_dialect("kepco-bop"))
+LAKESHORE = patient(teslameter_dialect("lakeshore-425"))
 
 
 @pytest.mark.parametrize("where", ["pty", "tcp:0"])
@@ -22,13 +26,13 @@ def test_both_instruments_look_at_one_coil(where, tmp_path):
     bench.start()
     clock = RealClock()
     coil = CoilSource(
-        patient("kepco-bop"),
+        KEPCO,
         bench.addresses["coil"],
         CoilLimits(),
         clock,
         guarded=False,
     )
-    meter = Teslameter(patient("lakeshore-425"), bench.addresses["teslameter"], clock)
+    meter = Teslameter(LAKESHORE, bench.addresses["teslameter"], clock)
     coil.open()
     meter.open()
     coil.energise()
@@ -80,9 +84,7 @@ def test_the_command_serves_until_told_to_end(ending):
         text=True,
     )
     address = json.loads(served.stdout.readline())["coil"]
-    coil = CoilSource(
-        patient("kepco-bop"), address, CoilLimits(), RealClock(), guarded=False
-    )
+    coil = CoilSource(KEPCO, address, CoilLimits(), RealClock(), guarded=False)
     coil.open()
     assert coil.identity.startswith("KEPCO")
     coil.close()
