@@ -147,6 +147,11 @@ class Coil(Protocol):
         """Time one verified set-point takes, s; measured when opened."""
         ...
 
+    @property
+    def acted(self) -> float:
+        """When the source is taken to have acted on the last command, clock time, s."""
+        ...
+
     def open(self) -> None:
         """Connect, identify, make safe, measure the update interval."""
         ...

@@ -90,6 +90,11 @@ class CoilSource(SerialInstrument[CoilWire]):
         return self._interval
 
     @property
+    def acted(self) -> float:
+        """When it is taken to have acted on the last command, clock time, s."""
+        return self._wire.acted
+
+    @property
     def setpoint(self) -> float | None:
         """Current last commanded, A; None while unknown."""
         return self._setpoint

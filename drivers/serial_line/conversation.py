@@ -39,11 +39,16 @@ class Conversation(Generic[D]):
     Args:
         link: the wire.
         dialect: the row.
+
+    Attributes:
+        acted: when the last command is taken to have been acted on, clock time, s: as
+            what came after it on the wire, its answer, set out.
     """
 
     def __init__(self, link: SerialLink, dialect: D) -> None:
         self.link = link
         self.dialect = dialect
+        self.acted = -math.inf
 
     def connect(self) -> None:
         """Open the link and have the instrument listen.
@@ -184,13 +189,20 @@ class Conversation(Generic[D]):
             raise
 
     def _command(self, line: str, query: Callable[[str], str]) -> None:
+        asked = self.link.now
         if self.dialect.error is None:
             self.link.write(line)
+            self.acted = self.link.now
             return
         *first, last = self.dialect.verified(line)
         for one in first:
             self.link.write(one)
         answer = query(last)
+        wire = self.link.wire
+        later = len(answer) + len(wire.reply_end)
+        later += len(last) + len(wire.send_end) if first else 0
+        # where the baud rate is a mere number, as over a network, it may be less
+        self.acted = max(asked, self.link.now - later * wire.character_time)
         if re.search(self.dialect.error_ok, answer) is None:
             raise RefusedError(f"The instrument refused {line!r}: {answer}.")
 

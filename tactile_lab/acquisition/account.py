@@ -180,7 +180,8 @@ class Account:
                 self._applied.extend((applied.time, flows))
                 self._unwritten.append(applied)
                 row = (self.axis(applied.time), applied.setpoint, applied.measured)
-                self.emit(events.CoilCurrent(*row, asked=self.axis(applied.asked)))
+                between = self.axis(applied.asked), self.axis(applied.acted)
+                self.emit(events.CoilCurrent(*row, *between))
             if not any(one.listed for one in self._unwritten):
                 self.write_current()
         for meter, tell in (

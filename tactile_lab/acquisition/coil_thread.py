@@ -49,6 +49,8 @@ class Applied:
         measured: current read back, A; None where only the set-point was sent.
         ratio: resistance over that of the cold coil, as last looked at, or None.
         listed: it is a point of a list that the source played.
+        answered: clock time at which the source's answer set out, s; None where it
+            was not asked, or knew the time better.
     """
 
     asked: float
@@ -57,6 +59,12 @@ class Applied:
     measured: float | None
     ratio: float | None = None
     listed: bool = False
+    answered: float | None = None
+
+    @property
+    def acted(self) -> float:
+        """When the source is taken to have acted, clock time, s."""
+        return self.time if self.answered is None else self.answered
 
 
 @dataclass(frozen=True)
@@ -247,13 +255,12 @@ class CoilThread(InstrumentThread):
         last = self.last
         if last is None or abs(setpoint - last.setpoint) > RESOLUTION:
             commanded = self.coil.set_current(setpoint)
-            acted = self.clock.now()
+            heard, acted = self.clock.now(), self.coil.acted
             measured = None
             if now - self._read >= READ_BACK_AT_LEAST:
                 measured = self.coil.read_current().value
-            self._note(
-                Applied(now, acted, commanded, measured, self.coil.resistance_ratio)
-            )
+            ratio = self.coil.resistance_ratio
+            self._note(Applied(now, heard, commanded, measured, ratio, answered=acted))
         elif now - last.time >= READ_BACK_EVERY and self._rests(waveform, now):
             self._note(self._read_back(now, last.setpoint))
         interval = self.coil.update_interval

@@ -81,17 +81,25 @@ class CoilCurrent:
 
     Attributes:
         asked: when the source was addressed, s: it acted between then and `time`.
+        answered: when its answer set out, s.
     """
 
     time: float
     setpoint: float
     measured: float | None
     asked: float | None = None
+    answered: float | None = None
 
     @property
     def acted(self) -> float:
-        """When the source is taken to have acted, s: half-way, as far as is known."""
-        return self.time if self.asked is None else (self.asked + self.time) / 2
+        """When the source is taken to have acted, s: as it began to answer."""
+        return self.time if self.answered is None else self.answered
+
+    @property
+    def doubt(self) -> float:
+        """By how much it may have acted earlier or later, s."""
+        asked = self.time if self.asked is None else self.asked
+        return max(self.time - self.acted, self.acted - asked)
 
     @property
     def amperes(self) -> float:

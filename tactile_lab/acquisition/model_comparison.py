@@ -19,8 +19,8 @@ FloatArray = NDArray[np.float64]
 class ModelComparison:
     """Compares each outcome with the model under the current that was applied.
 
-    Each set-point is taken to act half-way between asking the source and hearing from
-    it, and how far that may be off is said; the report puts it where the shunt saw it.
+    Each set-point is taken to act as the source begins to answer, and how far that may
+    be off is said; the report puts it where the shunt saw it.
 
     Args:
         scene: what is run.
@@ -30,13 +30,13 @@ class ModelComparison:
     def __init__(self, scene: Scene, *, searched: bool) -> None:
         self._model: LiveModel | None = LiveModel.of(scene)
         self._searched = searched
-        self._late = 0.0
+        self._doubt = 0.0
         self._model.until(0.0)  # compiles, before the coil waits for anything
 
     def add(self, applied: CoilCurrent) -> None:
         """The source has given a current."""
         if self._model is not None:
-            self._late = max(self._late, applied.time - applied.acted)
+            self._doubt = max(self._doubt, applied.doubt)
             self._model.add(applied.acted, applied.amperes)
 
     def ended(self, outcome: Outcome) -> str:
@@ -84,8 +84,8 @@ class ModelComparison:
         offsets = match(outcome.spike_times, mine).offsets
         if offsets.size:
             text += f", {_signed(1e3 * float(np.median(offsets)))} ms (median"
-            if self._late > 0:
-                text += f"; the coil's steps are known to ±{1e3 * self._late:.2g} ms"
+            if self._doubt > 0:
+                text += f"; the coil's steps are known to ±{1e3 * self._doubt:.2g} ms"
             text += ")"
         return text
 
