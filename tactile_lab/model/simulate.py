@@ -115,7 +115,6 @@ def simulate(
         SolverError: the model cannot answer to that tolerance.
     """
     # compiled code, which only those who simulate load
-    from tactile_lab.model.advance import rest
     from tactile_lab.model.solver import solve
 
     duration = force.end if until is None else until
@@ -132,9 +131,7 @@ def simulate(
     need = Need.of(keep, circuit.saturation)
     tolerance = checked_tolerance(tolerance)
     began = wall.perf_counter()
-    first = rest(circuit, force=float(force.value[0]))
-    if start is not None:
-        first = _started(circuit, start, first.force)
+    first = state_at_start(circuit, float(force.value[0]), start)
     solution = solve(circuit, first, force, duration, need, tolerance)
     return Result(
         duration=duration,
@@ -144,7 +141,16 @@ def simulate(
     )
 
 
-def _started(circuit: Circuit, start: Start, force: float) -> State:
+def state_at_start(circuit: Circuit, force: float, start: Start | None) -> State:
+    """The state at time 0: as `start` says, or at rest under `force` N.
+
+    Raises:
+        ParameterError: a voltage the circuit cannot start at.
+    """
+    from tactile_lab.model.advance import rest
+
+    if start is None:
+        return rest(circuit, force=force)
     for name, low, high in (
         ("V_P", -LARGEST_VOLTAGE, LARGEST_VOLTAGE),
         ("V_C1", 0.0, circuit.V_S),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
-    from tactile_lab.model.simulate import Result
+    from tactile_lab.model.advance import Outputs
+    from tactile_lab.model.state import State
 
 TRACE_POINTS = 2000
 
@@ -42,40 +43,88 @@ class Step:
     voltages: Mapping[str, float] = field(default_factory=dict)
 
 
+class ModelAlong:
+    """The model along the steps of a plan, solved a step at a time as it is asked for.
+
+    Each step goes on from the state the one before has left, so that many presses take
+    as much longer as there are more of them.
+
+    Attributes:
+        steps: in order; whoever plans puts them in.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.steps: list[Step] = []
+        self._states: dict[tuple[Any, ...], list[State]] = {}
+
+    def during(self, index: int, keep: tuple[str, ...]) -> Outputs:
+        """What the model does in a step, at times of the run.
+
+        Raises:
+            ParameterError: a force or start the model does not take.
+            SolverError: the model cannot answer.
+        """
+        from tactile_lab.model.advance import advance
+        from tactile_lab.model.simulate import state_at_start
+        from tactile_lab.planning.preview import DEFAULT_TOLERANCE
+
+        voltages = self.steps[index].voltages
+        # V_P depends on no voltage, and the rest has settled since one was changed
+        circuit = self.scene.circuit.at(voltages)
+        known = self._states.setdefault((keep, *sorted(voltages.items())), [])
+        if not known:
+            force = float(self.steps[0].force.value[0])
+            known.append(state_at_start(circuit, force, self.scene.start))
+        while True:
+            at = min(len(known) - 1, index)
+            step, before = self.steps[at], known[at]
+            # lists load between two steps, where the force stays as it was
+            held = Waveform.constant(before.force)
+            state, found = advance(
+                circuit,
+                before,
+                joined([(before.time, held), (step.start, step.force)]),
+                step.start + step.trial.length,
+                keep=keep,
+                tolerance=DEFAULT_TOLERANCE,
+            )
+            if at + 1 == len(known):
+                known.append(state)
+            if at == index:
+                return found
+
+
 class ModelOutcome(Outcome):
     """An outcome the model computes when, and only when, it is looked at."""
 
-    def __init__(
-        self, scene: Scene, step: Step, index: int, steps: Sequence[Step]
-    ) -> None:
+    def __init__(self, model: ModelAlong, index: int) -> None:
+        step = model.steps[index]
         for name, value in (
             ("trial", step.trial),
             ("index", index),
             ("start", step.start),
             ("skipped", 0),
             ("codes", {}),
-            ("_scene", scene),
-            ("_step", step),
-            ("_steps", steps),
+            ("_model", model),
             ("looked_at", False),
         ):
             object.__setattr__(self, name, value)
 
-    _scene: Scene
-    _step: Step
-    _steps: Sequence[Step]
+    _model: ModelAlong
     looked_at: bool
     """Whether anything of the model was asked for: what follows may depend on it."""
 
     @property
     def spike_times(self) -> NDArray[np.float64]:
         """Spikes of this trial, s from its start."""
-        if not self._scene.asked & {"spikes", "rate"}:
+        scene = self._model.scene
+        if not scene.asked & {"spikes", "rate"}:
             raise SceneError(
-                f"protocol {self._scene.protocol.name} looks at spikes, but neither "
+                f"protocol {scene.protocol.name} looks at spikes, but neither "
                 'records them nor declares needs = ("spikes",).'
             )
-        spikes = self._model("spikes").spike_times
+        spikes = self._found("spikes").spike_times
         assert spikes is not None
         end = self.start + self.trial.length
         return spikes[(spikes >= self.start) & (spikes < end)] - self.start
@@ -83,7 +132,7 @@ class ModelOutcome(Outcome):
     @property
     def current(self) -> NDArray[np.float64]:
         """Planned current, A."""
-        wave = self._step.current
+        wave = self._model.steps[self.index].current
         if wave is None:
             return np.empty((0, 2))
         return np.column_stack([wave.time, wave.value])
@@ -91,16 +140,16 @@ class ModelOutcome(Outcome):
     @property
     def rest(self) -> dict[str, float]:
         """The model's signals just before the trial."""
-        found = self._model(*self._measured)
+        found = self._found(*self._measured)
         at = np.array([self.start])
         return {name: float(found.sample(name, at)[0]) for name in self._measured}
 
     @property
     def traces(self) -> dict[str, NDArray[np.float64]]:
         """The model's signals during the trial."""
-        found = self._model(*self._measured)
+        found = self._found(*self._measured)
         times = np.linspace(0.0, self.trial.length, TRACE_POINTS)
-        absolute = np.minimum(self.start + times, found.duration)
+        absolute = np.minimum(self.start + times, found.end)
         return {
             name: np.column_stack([times, found.sample(name, absolute)])
             for name in self._measured
@@ -109,18 +158,12 @@ class ModelOutcome(Outcome):
     @property
     def _measured(self) -> tuple[str, ...]:
         signals = ("V_C1", "V_C2")
-        return tuple(name for name in signals if name in self._scene.record.signals)
+        recorded = self._model.scene.record.signals
+        return tuple(name for name in signals if name in recorded)
 
-    def _model(self, *keep: str) -> Result:
-        from tactile_lab.planning.preview import model
-
+    def _found(self, *keep: str) -> Outputs:
         object.__setattr__(self, "looked_at", True)
-        force = joined(
-            [(step.start, step.force) for step in self._steps[: self.index + 1]]
-        )
-        end = self.start + self.trial.length
-        # V_P depends on no voltage, and the rest has settled since one was changed
-        return model(self._scene, force, end, keep, voltages=self._step.voltages)
+        return self._model.during(self.index, keep)
 
 
 def joined(waves: Sequence[tuple[float, Waveform]]) -> Waveform:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from tactile_lab.errors import SceneError
 from tactile_lab.model.simulate import Result, simulate
@@ -24,7 +24,6 @@ def model(
     duration: float,
     keep: Sequence[str],
     tolerance: float = DEFAULT_TOLERANCE,
-    voltages: Mapping[str, float] | None = None,
 ) -> Result:
     """The scene's circuit under `force` (N), from the scene's start, for `duration` s.
 
@@ -34,22 +33,20 @@ def model(
         duration: s.
         keep: what is wanted.
         tolerance: of spike times, s, and V_C1, V.
-        voltages: of the circuit, by name, V, other than the scene's; needed where its
-            protocol sets some from trial to trial.
 
     Raises:
-        SceneError: they are needed.
+        SceneError: its protocol sets voltages from trial to trial.
         ParameterError: the tolerance cannot be asked for.
         SolverError: the model cannot answer to that tolerance.
     """
-    if scene.protocol.sets and voltages is None:
+    if scene.protocol.sets:
         raise SceneError(
             f"protocol {scene.protocol.name} sets {', '.join(scene.protocol.sets)} "
             "from trial to trial; the model alone has one for all. `tactile-lab run` "
             "plays it on the simulated bench."
         )
     return simulate(
-        scene.circuit.at(voltages or {}),
+        scene.circuit,
         force,
         keep=tuple(keep),
         until=duration,

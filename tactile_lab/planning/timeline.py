@@ -13,7 +13,7 @@ from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
 from tactile_lab.planning.current import cut
 from tactile_lab.planning.heat import heat_along
-from tactile_lab.planning.outcome import ModelOutcome, Step, joined
+from tactile_lab.planning.outcome import ModelAlong, ModelOutcome, Step, joined
 from tactile_lab.planning.way import drive_for
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
@@ -131,7 +131,8 @@ class _Driver:
     def __init__(self, scene: Scene, through_coil: bool) -> None:
         self.scene = scene
         self.through_coil = through_coil
-        self.steps: list[Step] = []
+        self.model = ModelAlong(scene)
+        self.steps = self.model.steps
         self._outcomes: list[ModelOutcome] = []
         self._limited: list[tuple[str, str]] = []
         self._time = 0.0
@@ -165,7 +166,7 @@ class _Driver:
         step = Step(trial, self._time, force, current, drive, self._voltages)
         self.steps.append(step)
         self._time += length
-        outcome = ModelOutcome(self.scene, step, len(self.steps) - 1, self.steps)
+        outcome = ModelOutcome(self.model, len(self.steps) - 1)
         self._outcomes.append(outcome)
         return outcome
 

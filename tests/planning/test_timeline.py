@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.model import kernel
 from tactile_lab.planning.timeline import timeline
 from tactile_lab.scene.load import load
 
@@ -91,6 +92,21 @@ def test_an_adaptive_protocol_gets_the_models_answer(protocol):
     drive = timeline(scene, through_coil=True)
     assert 0.09 <= drive.steps[-1].trial.level <= 0.12
     assert len(drive.steps) > 3
+
+
+def test_each_press_is_solved_once_however_many_there_are(monkeypatch):
+    solved = 0.0
+
+    def counted(*given):
+        nonlocal solved
+        solved += given[4] - given[2]  # from, force there, until
+        return run(*given)
+
+    run = kernel.run
+    monkeypatch.setattr(kernel, "run", counted)
+    scene = load("threshold_drift", {"protocol.presses": 12})
+    drive = timeline(scene, through_coil=True)
+    assert drive.duration / 2 < solved <= drive.duration
 
 
 def test_spikes_that_are_looked_at_must_be_asked_for(protocol):
