@@ -43,11 +43,14 @@ class Signals:
     Attributes:
         caught: their numbers, as they came.
         asked: reason of a stop that another program asked for; "" for none.
+        ended: exit code of an end that a task was asked for; 0 for none. The task may
+            have been complete already: what follows it is not begun all the same.
     """
 
     def __init__(self, acts: Mapping[str, Callable[[], None]] | None = None) -> None:
         self.caught: list[int] = []
         self.asked = ""
+        self.ended = 0
         self.acts = acts or {}
         self.opened = False
         self._before: dict[int, Any] = {}
@@ -71,7 +74,7 @@ class Signals:
         """128 and the signal that came, `INTERRUPTED` for a program; else 0."""
         if self.caught:
             return 128 + self.caught[0]
-        return INTERRUPTED if self.asked else 0
+        return INTERRUPTED if self.asked else self.ended
 
     def look(self) -> None:
         """Leave the program if it is to end; nothing is open yet.
@@ -132,8 +135,10 @@ def run_attended(
             if name in signals.acts:
                 signals.acts[name]()
             else:
+                signals.ended = 128 + number
                 task.stop(f"stopped by {name}", signal=number)
         if signals.asked:
+            signals.ended = INTERRUPTED
             reason, signals.asked = signals.asked, ""
             task.stop(reason)
 

@@ -117,6 +117,8 @@ def carry_out_attended(
         def play(execution: Execution) -> Executed:
             if signals is None:
                 return execution.run()
+            if signals.ending:
+                raise KeyboardInterrupt  # it came as the run before was complete
             ended.append(run_attended(execution, signals))
             signals.opened = False
             return ended[-1]

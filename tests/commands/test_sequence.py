@@ -1,15 +1,18 @@
 """Several runs in turn: planned before, kept on disk, gone on with after a fault."""
 
 import json
+import os
 import signal
 import socket
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
+from threading import Event
 
 import pytest
 
 from tactile_lab.commands.status_server import StatusServer
+from tactile_lab.engine.execution import Execution
 from tactile_lab.lab import Lab
 
 SHORT = {
@@ -135,6 +138,30 @@ def test_ctrl_c_while_a_run_is_told_of_begins_no_other(
     answer = sequence(asked({"scene": "demo", "times": 2}))
     assert answer.code == 130, answer.err
     assert "cut short" in answer.err
+    assert [status for status, _ in kept(tmp_path)] == ["complete", ""]
+
+
+def test_ctrl_c_as_a_run_is_complete_begins_no_other(
+    sequence, asked, tmp_path, monkeypatch
+):
+    """It comes when all is stored, so the run cannot be ended by it any more."""
+    run, heard = Execution.run, Event()
+
+    def run_until_late(execution):
+        done, stop = run(execution), execution.stop
+
+        def heeded(*reason, **more):
+            stop(*reason, **more)
+            heard.set()
+
+        execution.stop = heeded
+        os.kill(os.getpid(), signal.SIGINT)
+        assert heard.wait(60)
+        return done
+
+    monkeypatch.setattr(Execution, "run", run_until_late)
+    answer = sequence(asked({"scene": "demo", "times": 2}))
+    assert answer.code == 130, answer.err
     assert [status for status, _ in kept(tmp_path)] == ["complete", ""]
 
 
