@@ -126,9 +126,8 @@ runs_option: Decorator = click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=runs_folder,
-    show_default="./runs, or as lab.toml says",
     metavar="DIR",
-    help="Where run folders are put.",
+    help="Where run folders are put; else ./runs, or as lab.toml says.",
 )
 
 status_option: Decorator = click.option(
