@@ -13,6 +13,7 @@ from PySide6.QtCore import QSettings, QSize, QTimer
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gui import bindings as _first  # noqa: F401
+from gui.garbage import collected_here
 from gui.look import fonts
 from gui.look.theme import Theme
 from gui.preferences import Preferences
@@ -23,7 +24,7 @@ from tactile_lab.engine.threads import start
 
 if TYPE_CHECKING:
     from gui.window import Window
-from tactile_lab.lab import Lab
+    from tactile_lab.lab import Lab
 
 FRAME = QSize(8, 40)
 """Room for what the desktop draws around the window, px."""
@@ -85,8 +86,9 @@ def main(
     window.show()
     _close_on_signals(lambda: window.leave() if window.session.busy else window.close())
     QTimer.singleShot(0, lambda: begin(window, target or wishes.scene, None))
-    app.exec()
-    session.close()
+    with collected_here():
+        app.exec()
+        session.close()
     left = session.coil_view()
     return 4 if left is not None and left.verified_off is False else 0
 
@@ -111,7 +113,8 @@ def show_skin(path: Path, out: Path, theme: str) -> None:
     fit(window, window.screen().availableSize())
     window.show()
     _close_on_signals(window.close)
-    app.exec()
+    with collected_here():
+        app.exec()
 
 
 def fit(window: QWidget, available: QSize) -> None:

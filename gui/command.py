@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import sys
@@ -54,6 +55,7 @@ def command(
             "The window needs a display, and neither DISPLAY nor WAYLAND_DISPLAY names "
             "one. Start it on a desktop, or over ssh -X."
         )
+    gc.disable()  # modules leave no garbage; the window collects its own (gui.garbage)
     if skin is None:
         load_ahead()  # on the other core, while Qt is loaded
     try:

@@ -14,6 +14,7 @@ from served_source import Source
 
 from gui.app import application, begin
 from gui.dialogs.overlay import Overlay
+from gui.garbage import collected_here
 from gui.look.theme import Theme
 from gui.session.session import Session
 from gui.state import WindowState
@@ -130,6 +131,13 @@ class Lab:
 @pytest.fixture(scope="session")
 def app() -> QApplication:
     return application([])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def collected(app: QApplication) -> Iterator[None]:
+    """As in the program: a circle of Qt's, ended in another thread, ends the tests."""
+    with collected_here():
+        yield
 
 
 @pytest.fixture(scope="session")

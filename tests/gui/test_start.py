@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 STARTED = """
-import json, linecache, sys
+import gc, json, linecache, sys
 from pathlib import Path
 
 told = {}
@@ -20,6 +20,7 @@ def watched(window, *rest):
     def look():
         if session.state is WindowState.READY and session.plan.expectation:
             timer.stop()
+            told["collects in any thread"] = gc.isenabled()
             told["log"] = [line.text for line in window.centre.log.model.lines]
             told["sources read"] = [f for f in linecache.cache if "numpy" in f]
             window.close()
@@ -50,5 +51,6 @@ def test_the_bench_is_asked_while_the_window_is_built(tmp_path):
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["asked before it is shown"]
+    assert not told["collects in any thread"]
     assert told["log"][0].startswith("Asking the instruments of")
     assert told["sources read"] == [] and told["code"] == 0
