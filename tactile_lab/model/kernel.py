@@ -171,11 +171,15 @@ def _build(stamp: int) -> Callable[..., Any]:
         P = np.empty(2 * MOST_TERMS + 2)
         fires = np.empty(4)
         piece_fires = np.empty(4)
+        B1 = B_at(node[V_P], par)
+        y_b = equilibrium(B1, par)
         for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
                 node[V_P] += k_F * (force[k + 1] - force[k])
                 node[V_P_HIGHEST] = max(node[V_P_HIGHEST], node[V_P])
+                B1 = B_at(node[V_P], par)
+                y_b = equilibrium(B1, par)
                 continue
             t = time[k]
             V0 = node[V_P]
@@ -195,8 +199,9 @@ def _build(stamp: int) -> Callable[..., Any]:
             if not node_a:
                 continue
             y = node[Y]
-            B0, B1 = B_at(V0, par), B_at(V1, par)
-            y_a, y_b = equilibrium(B0, par), equilibrium(B1, par)
+            B0, y_a = B1, y_b
+            B1 = B_at(V1, par)
+            y_b = equilibrium(B1, par)
             low = min(y, y_a, y_b) - 1e-3 * par[V_T]
             high = max(y, y_a, y_b) + 1e-3 * par[V_T]
             s = 0.0
@@ -245,7 +250,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 biggest = max(abs(y), abs(values[ORDER]))
                 left = missing(a, biggest)
                 stays = carried(a, left)
-                B_s = B_at(V_P_at(s, V0, p, par[TAU]), par)
+                B_s = B0 if s == 0.0 else B_at(V_P_at(s, V0, p, par[TAU]), par)
                 rate = par[LAMBDA] + B_s * math.exp(-y / par[V_T]) / par[V_T]
                 rise = slope_at(B_s, y, par)
                 layer = unseen(rise, rate, h, left, a)
@@ -254,7 +259,6 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if min(W[0], NODES[0] * h * rise) > par[V_T] / 3.0:
                     closing = (rate - par[LAMBDA]) * par[V_T]
                     layer = max(layer, closing * par[V_T] / rise)
-                growth = longer(a, biggest, wanted, rate * h)
                 if left + layer > 3.0 * wanted:
                     h *= min(max(0.1, longer(a, biggest, wanted, 0.0)), 0.5)
                     counts[REJECTED] += 1
@@ -386,7 +390,9 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if not abs(y) < np.inf or not abs(S[VOLTAGE]) < np.inf:
                     status = NOT_FINITE
                     break
-                h *= min(max(growth, 0.2), 30.0)
+                if s < T:
+                    growth = longer(a, biggest, wanted, rate * h)
+                    h *= min(max(growth, 0.2), 30.0)
             node[Y] = y
             if status != DONE:
                 break

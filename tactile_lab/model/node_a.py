@@ -97,13 +97,23 @@ def eliminate(matrix: FloatArray, right: FloatArray) -> None:
 
 
 @inner
+def product(columns: FloatArray, values: FloatArray, result: FloatArray) -> None:
+    """Fill `result` with a matrix, given by its columns, times ORDER values."""
+    for n in range(0, ORDER, 4):  # four sums at once: none waits for another
+        a = b = c = d = 0.0
+        for i in range(ORDER):
+            value = values[i]
+            a += columns[i, n] * value
+            b += columns[i, n + 1] * value
+            c += columns[i, n + 2] * value
+            d += columns[i, n + 3] * value
+        result[n], result[n + 1], result[n + 2], result[n + 3] = a, b, c, d
+
+
+@inner
 def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
     """Solve (DIFFERENTIATE + r) x = right in place, by its Schur form."""
-    for i in range(ORDER):
-        total = 0.0
-        for j in range(ORDER):
-            total += SCHUR_Q_TURNED[i, j] * right[j]
-        turned[i] = total
+    product(SCHUR_Q, right, turned)
     for k in range(ORDER - 2, -1, -2):
         one, two = turned[k], turned[k + 1]
         for j in range(k + 2, ORDER):
@@ -114,11 +124,7 @@ def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
         reciprocal = 1.0 / (a * d - b * c)
         turned[k] = (d * one - b * two) * reciprocal
         turned[k + 1] = (a * two - c * one) * reciprocal
-    for i in range(ORDER):
-        total = 0.0
-        for j in range(ORDER):
-            total += SCHUR_Q[i, j] * turned[j]
-        right[i] = total
+    product(SCHUR_Q_TURNED, turned, right)
 
 
 @inner

@@ -48,6 +48,7 @@ TO_SERIES = np.ascontiguousarray(
     np.linalg.inv(chebyshev.chebvander(2 * POINTS - 1, ORDER))
 )
 """Values at POINTS to Chebyshev coefficients in x = 2u - 1."""
+TO_SERIES_TURNED = np.ascontiguousarray(TO_SERIES.T)
 
 
 def real_schur(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
