@@ -372,7 +372,7 @@ def heading(figure: Figure, title: str, subtitle: str, simulated: bool | None) -
         }  # fmt: skip
         texts.append(
             figure.text(
-                1 - 0.12 / width, top, "SIMULATED BENCH" if simulated else "MEASURED",
+                1 - 0.12 / width, top, "SIMULATED" if simulated else "MEASURED",
                 size=7.5, weight="bold", ha="right", va="top", color=mark, bbox=box,
             )
         )  # fmt: skip

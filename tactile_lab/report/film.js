@@ -5,7 +5,8 @@
   const film = JSON.parse(document.getElementById("film").textContent);
   const LONGEST = 12, LARGEST = 520, AIR = 8, FOOT = 26;
   const raw = Uint8Array.from(atob(film.counts), (c) => c.charCodeAt(0));
-  const counts = film.bytes === 1 ? raw : new Uint16Array(raw.buffer);
+  const kinds = { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array };
+  const counts = new kinds[film.bytes](raw.buffer);
   const n = film.x.length;
   const map = document.getElementById("map"), draw = map.getContext("2d");
   const when = document.getElementById("when"), now = document.getElementById("now");

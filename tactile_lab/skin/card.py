@@ -34,7 +34,7 @@ def write_card(
     folder: Path,
     data: Dataset,
     codings: Mapping[str, Coding],
-    energy: tuple[float, float],
+    energy: tuple[float | None, float],
     made: str,
 ) -> Path:
     """Write `README.md` beside the touches.
@@ -87,6 +87,12 @@ def write_card(
             f"{coding.van_rossum:.2f} |"
         )
     spent, rest = energy
+    told = (
+        "no spikes to share what the supply V_S gives:"
+        if spent is None
+        else f"{show(spent, 'J', 3)} from the supply V_S for a spike, {rest:.0%} of "
+        "which is drawn at rest as well:"
+    )
     lines += [
         "",
         "Information: what a spike tells of the answer by the taxel it comes from, "
@@ -100,8 +106,7 @@ def write_card(
         f"{show(MEMORY, 's')} (a cost of 1/{MEMORY:g} s). 1: these trains tell "
         "nothing.",
         "",
-        f"Energy: {show(spent, 'J', 3)} from the supply V_S for a spike, {rest:.0%} of "
-        "which is drawn at rest as well: V_S ((V_S - V_C1)/R1 + I_C), summed up over "
+        f"Energy: {told} V_S ((V_S - V_C1)/R1 + I_C), summed up over "
         "the first touch of each task and all taxels. Voltage followers and what the "
         "firing stage draws beside the charge of C2 are not in the model.",
         "",

@@ -158,8 +158,10 @@ def distances(trains: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def energy_per_spike(data: Dataset) -> tuple[float, float]:
+def energy_per_spike(data: Dataset) -> tuple[float | None, float]:
     """What the supply V_S gives a spike, J, and the share of it drawn at rest too.
+
+    None where there is no spike to share it.
 
     V_S ((V_S - V_C1)/R1 + I_C), summed up over the first touch of each task by all
     taxels: the current through R1 and through T1. Followers, and what the firing stage
@@ -178,4 +180,4 @@ def energy_per_spike(data: Dataset) -> tuple[float, float]:
             spent += circuit.V_S * float(np.trapezoid(current, at))
             rest += circuit.V_S * float(current[0]) * DURATION
             spikes += 0 if found.spike_times is None else found.spike_times.size
-    return spent / max(spikes, 1), rest / spent
+    return spent / spikes if spikes else None, rest / spent

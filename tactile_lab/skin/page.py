@@ -23,11 +23,10 @@ from tactile_lab.skin.events import Events
 from tactile_lab.skin.press import Pressed
 from tactile_lab.skin.receptive import receptive_plot
 from tactile_lab.skin.skin import Skin
+from tactile_lab.skin.squares import Squares, squares_of
 
-CELLS = 4_000_000
-"""Most counts in a film."""
 FRAMES = 200
-"""Frames of a film unless there are too many taxels for as many."""
+"""Of a film."""
 PAUSE = 50
 """Time for which a frame is shown, ms."""
 FADING = 0.75
@@ -105,10 +104,11 @@ def settings(skin: Skin) -> dict[str, str]:
 
 def maps(skin: Skin, events: Events, adaptation: SkinAdaptation | None) -> TaxelMaps:
     """The mean rate of each taxel, and how far it falls while the load rests."""
-    array = skin.array
+    array, squares = skin.array, squares_of(skin.array)
     dead, stuck = array.named(array.dead), array.named(array.stuck)
-    rate = np.where(stuck, np.nan, events.count / events.duration)
-    shown = [TaxelMap(label="Mean rate", unit="Hz", values=rate)]
+    left_out = stuck if squares.single else stuck | dead
+    rate = np.where(left_out, np.nan, events.count / events.duration)
+    shown = [TaxelMap(label="Mean rate", unit="Hz", values=squares.mean(rate))]
     caption = (
         "Taxels where they lie, seen from above: spikes of each over the whole "
         f"{show(events.duration, 's')}"
@@ -116,14 +116,17 @@ def maps(skin: Skin, events: Events, adaptation: SkinAdaptation | None) -> Taxel
     if adaptation is None:
         caption += ". No map of adaptation: the load never rests."
     else:
+        fall = squares.mean(np.maximum(adaptation.fall, 0.0))
+        rare = np.isnan(fall) & (squares.total(adaptation.rare) > 0)
+        silent = squares.total(adaptation.silent)
         shown.append(
             TaxelMap(
                 label="Fall of the rate",
                 unit="%",
-                values=np.maximum(adaptation.fall, 0.0),
+                values=fall,
                 most=1.0,
-                grey=("too few spikes", adaptation.rare),
-                dotted=("fell silent", adaptation.silent),
+                grey=("too few spikes", rare),
+                dotted=("fell silent", silent > 0.5 * squares.total(adaptation.known)),
             )
         )
         error = np.nanmax(100 * adaptation.error[adaptation.known], initial=0.0)
@@ -134,14 +137,30 @@ def maps(skin: Skin, events: Events, adaptation: SkinAdaptation | None) -> Taxel
             "intervals are needed. Who fell silent, twice the last interval before the "
             "end, fell further than its last interval says."
         )
+    one_each = squares.single
+    if not one_each:
+        caption += (
+            f" {gathered(squares)} Its colour is the mean of those that are neither "
+            "dead nor stuck and whose value is known; it is marked as silent where "
+            "more than half of them fell silent."
+        )
     return TaxelMaps(
         name="maps",
         caption=caption,
-        places=events.places,
-        side=array.side,
+        places=squares.places,
+        side=squares.side,
         maps=tuple(shown),
-        crossed=("dead", dead),
-        framed=("stuck", stuck),
+        crossed=("dead", squares.total(dead & one_each) > 0),
+        framed=("stuck", squares.total(stuck & one_each) > 0),
+    )
+
+
+def gathered(squares: Squares) -> str:
+    """How many taxels a square stands for, where it is several."""
+    return (
+        f"There are more taxels than squares can be seen: {squares.of_taxel.size:,} "
+        f"are drawn as {squares.places.shape[0]:,} squares of up to {squares.fullest} "
+        "taxels each."
     )
 
 
@@ -195,51 +214,59 @@ def raster(events: Events) -> Plot:
 
 def film(skin: Skin, events: Events) -> dict[str, Any]:
     """What the page plays: spikes per taxel and frame, for its script."""
-    array, size = skin.array, events.places.shape[0]
-    frames = max(1, min(FRAMES, CELLS // size))
-    counts = np.zeros((frames, size), np.int64)
-    time, taxel, step = events.time, events.taxel, 1 << 22
-    for first in range(0, time.shape[0], step):
-        when = (time[first : first + step] / events.duration * frames).astype(int)
-        at = np.minimum(when, frames - 1), taxel[first : first + step]
-        np.add.at(counts, at, 1)
-    long = events.duration / frames
+    array, squares = skin.array, squares_of(skin.array)
+    size, one_each = squares.places.shape[0], squares.single
     whole = ~array.named(array.stuck)
+    shown = whole | one_each  # among several, a stuck one would hide the others
+    counts = np.zeros((FRAMES, size), np.int64)
+    time, step = events.time, 1 << 22
+    for first in range(0, time.shape[0], step):
+        taxel = events.taxel[first : first + step]
+        when = time[first : first + step][shown[taxel]]
+        frame = (when / events.duration * FRAMES).astype(int)
+        at = np.minimum(frame, FRAMES - 1), squares.of_taxel[taxel[shown[taxel]]]
+        np.add.at(counts, at, 1)
+    long = events.duration / FRAMES
+    scaled = squares.total(whole) > 0
     faded, brightest = np.zeros(size), 0.0
     for frame in counts:
         faded = FADING * faded + frame
-        brightest = max(brightest, float(faded[whole].max(initial=0.0)))
-    most_of_all = events.count[whole].max(initial=1)
-    kind = np.dtype(np.uint8 if counts.max() < 1 << 8 else "<u2")
+        brightest = max(brightest, float(faded[scaled].max(initial=0.0)))
+    most_of_all = counts[:, scaled].sum(axis=0).max(initial=1)
+    kinds = ("<u1", "<u2", "<u4")
+    kind = next(k for k in map(np.dtype, kinds) if counts.max() < 1 << 8 * k.itemsize)
     data = {
-        "x": events.places[:, 0].tolist(),
-        "y": events.places[:, 1].tolist(),
-        "side": array.side,
-        "dead": array.dead,
-        "stuck": array.stuck,
-        "frames": frames,
+        "x": np.round(squares.places[:, 0], 9).tolist(),
+        "y": np.round(squares.places[:, 1], 9).tolist(),
+        "side": squares.side,
+        "dead": array.dead if one_each else (),
+        "stuck": array.stuck if one_each else (),
+        "frames": FRAMES,
         "pause": PAUSE,
-        "fullest": int(counts[:, whole].sum(axis=1).argmax()),
+        "fullest": int(counts[:, scaled].sum(axis=1).argmax()),
         "from": long / 2,
         "step": long,
         "fading": FADING,
         "most": brightest or 1.0,
         "most_of_all": int(most_of_all),
         "bytes": kind.itemsize,
-        "counts": base64.b64encode(
-            np.minimum(counts, np.iinfo(kind).max).astype(kind).tobytes()
-        ).decode(),
+        "counts": base64.b64encode(counts.astype(kind).tobytes()).decode(),
     }
     script = resources.files("tactile_lab.report") / "film.js"
-    broken = "" if not array.dead else " Crossed out: dead."
-    broken += "" if not array.stuck else " Framed: stuck, left out of full colour."
+    square, most = "taxel where it lies", "any taxel"
+    marked = "" if not array.dead else " Crossed out: dead."
+    marked += "" if not array.stuck else " Framed: stuck, left out of full colour."
+    if not one_each:
+        square, most = "part of the skin", "any square"
+        marked = f" {gathered(squares)}"
+        marked += "" if not array.stuck else " Stuck ones are left out."
     return {
-        "frames": frames,
+        "frames": FRAMES,
         "data": Markup(json.dumps(data).replace("<", "\\u003c")),
         "script": Markup(script.read_text(encoding="utf-8")),
-        "caption": "Each square is a taxel where it lies, seen from above, x to the "
+        "caption": f"Each square is a {square}, seen from above, x to the "
         f"right. A frame lasts {show(long, 's', 2)} and is played in {PAUSE} ms; "
         f"{100 - 100 * FADING:.0f} % of a spike's colour fades from frame to frame. "
-        f"Full colour: the most any taxel comes to, {most_of_all:,} for all spikes."
-        f"{broken}",
+        f"Full colour: the most {most} comes to, {most_of_all:,} for all spikes."
+        f"{marked}",
     }

@@ -6,9 +6,12 @@ from click.testing import CliRunner
 
 from tactile_lab.cli import cli as command_line
 from tactile_lab.errors import RunFolderError
+from tactile_lab.skin import decoder
+from tactile_lab.skin.card import write_card
 from tactile_lab.skin.dataset import LABELS, Dataset, make, touch
 from tactile_lab.skin.decoder import beyond_chance, distances, information
 from tactile_lab.skin.single import simulate_taxel
+from tactile_lab.skin.skin import load_skin
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +64,21 @@ def test_the_card_says_how_far_a_plain_decoder_gets(made):
         assert f"| {task} |" in card and f"\n{task:<12}" in told
     assert "Wilson's 95 % interval" in card and "12.5%" in card
     assert "from the supply" in card
+
+
+def test_without_a_spike_there_is_no_energy_of_one(made, tmp_path, monkeypatch):
+    _, data, _ = made
+
+    def light(seed, task, number):
+        ball = {"kind": "sphere", "force": "1 mN"}
+        few = {"duration": "0.6 s", "array": {"grid": [1, 1]}, "stimulus": [ball]}
+        return load_skin(few)
+
+    monkeypatch.setattr(decoder, "touch", light)
+    spent, rest = decoder.energy_per_spike(data)
+    assert spent is None and rest == pytest.approx(1, abs=1e-6)
+    card = write_card(tmp_path, data, {}, (spent, rest), "made").read_text()
+    assert "Energy: no spikes to share" in card
 
 
 def test_information_is_what_a_spike_tells_by_its_taxel():

@@ -12,6 +12,7 @@ from tactile_lab.skin.events import Events
 from tactile_lab.skin.page import FADING, film, maps, write_page
 from tactile_lab.skin.press import press
 from tactile_lab.skin.skin import load_skin
+from tactile_lab.skin.squares import squares_of
 
 BALL = {
     "duration": "1.5 s",
@@ -71,6 +72,8 @@ def test_who_fired_too_rarely_has_no_fall_in_the_map_but_is_marked(tmp_path):
     assert shown.framed[1][7] and shown.crossed[1][2]
     assert rate.full == np.nanmax(rate.values) and fall.full == 1
     figure = draw_maps(shown, "A ball", "12 taxels")
+    # no bench took part
+    assert "SIMULATED" in [text.get_text() for text in figure.texts]
     (squares,) = figure.axes[2].collections
     assert {tuple(c) for c in squares.get_facecolors()[rare]} == {GREY}
     assert "No map of adaptation" in maps(skin, events, None).caption
@@ -87,3 +90,43 @@ def test_a_skin_where_nothing_fires_has_its_page(tmp_path):
     assert "no taxel has two whole intervals" in text
     assert "Receptive field" not in text
     assert (tmp_path / "maps.png").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        {"grid": [120, 100]},
+        {"hexagonal": [101, 110]},
+        {"positions": [[f"{2 * k} mm", f"{k % 7} mm"] for k in range(-500, 500)]},
+    ],
+)
+def test_squares_of_many_taxels_lose_none_and_hold_about_as_many_each(where):
+    array = load_skin({**BALL, "array": where}).array
+    squares = squares_of(array, 600)
+    n = squares.places.shape[0]
+    assert 100 < n <= 660 and not squares.single
+    each = squares.total(np.ones(array.size))
+    assert each.sum() == array.size and each.max() == squares.fullest
+    assert "positions" in where or np.median(each) >= 0.8 * squares.fullest
+    apart = np.abs(array.places - squares.places[squares.of_taxel]).max()
+    assert apart <= 1.1 * squares.side
+    assert squares_of(array, array.size).single
+
+
+def test_the_page_of_more_taxels_than_can_be_seen_gathers_them_and_says_so(tmp_path):
+    array = {"grid": [100, 102], "dead": [9], "stuck": [5098], "stuck_rate": "2 kHz"}
+    skin, events = pressed(tmp_path, {**BALL, "array": array})
+    told, counts = film_of(skin, events)
+    whole = np.arange(events.count.size) != 5098
+    assert counts.shape == (200, 50 * 51) and len(told["x"]) == 50 * 51
+    assert counts.sum() == events.count[whole].sum() > 0
+    assert told["most_of_all"] == counts.sum(axis=0).max()
+    assert not told["dead"] and not told["stuck"]
+    caption = film(skin, events)["caption"]
+    assert "10,200 are drawn as 2,550 squares of up to 4 taxels each" in caption
+    assert len(film(skin, events)["data"]) < 1_000_000
+    shown = maps(skin, events, adaptation_of(skin, events))
+    assert "2,550 squares" in shown.caption
+    rate, _ = shown.maps
+    mean = events.count[whole].sum() / events.duration / 10_200
+    assert np.nanmean(rate.values) == pytest.approx(mean, rel=0.02)
