@@ -19,6 +19,11 @@ from tactile_lab.report.canvas import HEAD_HEIGHT
 from tactile_lab.report.taxel_map import TaxelMaps
 from tactile_lab.store.folder import replacing
 
+KEPT = re.compile(r"(?<=±) |(?<=\d) (?=(?:[fpnµmkM]?(?:s|Hz|V|A|N|T|K|F|Ohm)\b)|[%°])")
+"""Spaces within a number, its sign and its unit."""
+FITS = 12
+"""Letters that any column of names holds."""
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -37,9 +42,22 @@ def rendered(template: str, **names: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    kept.filters |= {"whole": _whole, "breakable": _breakable}
     style = kept.loader.get_source(kept, "page.css")[0] if kept.loader else ""
     text = kept.get_template(template).render(style=Markup(_colours() + style), **names)
     return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
+
+
+def _whole(cell: str) -> str:
+    """A cell that keeps each number, its sign and its unit on one line."""
+    return KEPT.sub("\u00a0", cell)
+
+
+def _breakable(name: str) -> Markup:
+    """The name of a setting, a long one broken behind its words where it must be."""
+    if len(name) <= FITS:
+        return escape(name)
+    return escape(name).replace("_", Markup("_<wbr>"))
 
 
 def picture(title: str, plot: Plot | TaxelMaps, svg: str) -> Picture:

@@ -6,6 +6,7 @@ on white paper. What stands where is page.html's; how it looks, page.css's.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 from tactile_lab.plot import Plot
@@ -24,6 +25,12 @@ from tactile_lab.report.twin import sentences
 
 LONG = 12
 """Rows of a table one reads before anything else; a longer one follows the figures."""
+
+UNITS = ("V", "A", "s")
+"""Behind the name of what an instrument was asked for: compliance_V."""
+LONG_NUMBER = re.compile(r"\b\d+\.\d{9,}\b")
+"""What was computed, not stated: 1.5297506925207756."""
+SPOKEN = {"True": "yes", "False": "no", "None": NONE}
 
 
 def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
@@ -108,4 +115,20 @@ def _settings(run: RunData) -> list[tuple[str, Mapping[str, str]]]:
         ("Conditions", run.conditions),
         ("Environment", run.environment),
     )
-    return [(name, values) for name, values in groups if values]
+    return [
+        (name, dict(_setting(*one) for one in values.items()))
+        for name, values in groups
+        if values
+    ]
+
+
+def _setting(name: str, value: str) -> tuple[str, str]:
+    """A setting as people write it: its unit behind its value, yes or no."""
+    plain, _, unit = name.rpartition("_")
+    if plain and unit in UNITS:
+        try:
+            return plain.replace("_", " "), show(float(value), unit, 3)
+        except ValueError:
+            return name, value
+    value = LONG_NUMBER.sub(lambda m: f"{float(m[0]):.6g}", value)
+    return name, SPOKEN.get(value, value.replace("^2", "²"))

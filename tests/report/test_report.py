@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import stimulus_onset
+from tactile_lab.report.html import rendered
 from tactile_lab.report.overview import overview
 from tactile_lab.report.splice import stretches
 from tactile_lab.report.table import trials_table
@@ -21,7 +23,7 @@ from tactile_lab.waveform import Waveform
 class Outline(HTMLParser):
     """Tags that stand open, and everything that would be fetched."""
 
-    void = ("meta", "link", "img", "br", "hr")
+    void = ("meta", "link", "img", "br", "hr", "wbr")
 
     def __init__(self):
         super().__init__()
@@ -123,6 +125,38 @@ def test_text_of_others_cannot_break_the_page(demo, tmp_path):
     outline = Outline()
     outline.feed(page)
     assert outline.open == []
+
+
+def test_settings_are_told_with_their_units_as_people_write_them(demo, tmp_path):
+    told = {"compliance_V": "14", "update_interval_s": "0.0454688", "output": ""}
+    coil = {
+        "coil": told | {"ramps": "False", "A2": "2250 mm^2", "set_by_hand_s": "by hand"}
+    }
+    coil["coil"]["k_F"] = "1.5297506925207756 V/N"
+    page = write(tmp_path, replace(demo, settings=coil)).html.read_text()
+    cells = dict(re.findall(r'<th scope="row">(.*?)</th><td>(.*?)</td>', page))
+    assert cells["compliance"] == "14 V"
+    assert cells["update interval"] == "45.5 ms"
+    assert cells["ramps"] == "no" and cells["A2"] == "2250 mm²"
+    assert cells["k_F"] == "1.52975 V/N"
+    assert cells["output"] == "–" and cells["set_<wbr>by_<wbr>hand_<wbr>s"] == "by hand"
+
+
+@pytest.mark.parametrize(
+    ("cell", "kept"),
+    [
+        ("296.39 ± 0.50 ms", "296.39 ±_0.50_ms"),
+        ("5.73 Hz", "5.73_Hz"),
+        ("8.69 s (8.66 to 8.72 s)", "8.69_s (8.66 to 8.72_s)"),
+        ("33 %", "33_%"),
+    ],
+)
+def test_a_number_stays_on_one_line_with_its_sign_and_unit(cell, kept):
+    table = Table(headings=("Value",), rows=((cell,),))
+    blank = dict.fromkeys(("title", "subtitle", "mark", "made"), "")
+    names = {**blank, "measured": True, "key": {}, "said": (), "picture": None}
+    text = rendered("chart.html", **names, tables=[table])
+    assert f"<td>{kept}</td>".replace("_", "\u00a0") in text
 
 
 def test_the_table_has_one_row_per_trial(demo):
