@@ -151,7 +151,7 @@ class Actions(QObject):
             Shortcut(
                 ("End",), "End of the run", lambda: view.set_follow(True), single=True
             ),
-            Shortcut(("N",), "Note", panels.centre.log.note.setFocus, single=True),
+            Shortcut(("N",), "Note", panels.centre.write_note, single=True),
             Shortcut(("Ctrl+O",), "Open a scene", self.screen.ask_scene),
             Shortcut(("Ctrl+Shift+O",), "Open a run", self.screen.ask_run),
             Shortcut(("Ctrl+K",), "Connect instruments", self.connect_dialog),

@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 NARROW = 1280
 """Window width, px, below which there is room for one side panel."""
 
+LEAST = 844, 440
+"""Size of the window, px, at which it fits a screen of 1280 x 720 at 150 %."""
+
 OFF_TIMEOUT = 3000
 """Milliseconds a closing window waits for the coil to be verified off."""
 
@@ -61,7 +64,7 @@ class Window(QMainWindow):
         self, session: Session, theme: Theme, settings: QSettings | None = None
     ) -> None:
         super().__init__()
-        self.setMinimumSize(1180, 720)
+        self.setMinimumSize(*LEAST)
         self.setAcceptDrops(True)
         self.session, self.theme, self._settings = session, theme, settings
         theme.dress(self)
@@ -146,6 +149,8 @@ class Window(QMainWindow):
         if not folded and self.width() < NARROW:  # there is room for one of them
             other = self.setup if side is self.review else self.review
             other.setVisible(False)
+        elif folded and side is self.review and self._folds[self.setup] is not True:
+            self.setup.setVisible(True)  # it only made room
         self._show_folds()
 
     def _show_folds(self) -> None:
@@ -238,6 +243,7 @@ class Window(QMainWindow):
         """Fold what does not fit."""
         super().resizeEvent(event)
         width = self.width()
+        self.centre.show_room(width, self.height())
         for side, limit in ((self.review, NARROW + 40), (self.setup, 0)):
             if self._folds[side] is None:
                 side.setVisible(width >= limit)
@@ -294,7 +300,7 @@ class Window(QMainWindow):
         session.run.reported.connect(self.screen_.reported)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
-        self.banner.log_asked.connect(self.centre.log.show_safety)
+        self.banner.log_asked.connect(self.centre.show_safety)
         self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
         self.centre.empty.open_asked.connect(self.screen_.ask_scene)
         self.centre.empty.connect_asked.connect(self.actions_.connect_dialog)

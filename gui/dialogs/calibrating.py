@@ -23,9 +23,6 @@ MAGNET = (
     ("B2_per_ampere", "Field of the coil"),
 )
 
-TALL, LOW = 200, 140
-"""Height of the loop while it grows and beside its findings, pixels."""
-
 
 class Calibrating(QWidget):
     """Geometry of Eq. (2); the field calibration with its loop; the force check."""
@@ -43,7 +40,6 @@ class Calibrating(QWidget):
         self.field = push("Calibrate the field", "primary")
         self.progress = label("", "muted", wrap=True)
         self.loop = SmallPlot(theme)
-        self.loop.setFixedHeight(TALL)
         self.loop.hide()
         self.findings = label("", "", wrap=True)
         self.findings.hide()
@@ -77,7 +73,6 @@ class Calibrating(QWidget):
         self.progress.setText(text)
         self.field.setEnabled(not busy)
         if busy:
-            self.loop.setFixedHeight(TALL)
             self.findings.hide()
             self.use.hide()
 
@@ -89,7 +84,6 @@ class Calibrating(QWidget):
     def show_conclusion(self, found: Concluded) -> None:
         """Show slope, loop and uncertainty, and offer the file."""
         self._file = found.calibration
-        self.loop.setFixedHeight(LOW)  # the words need the room; Results has it large
         self.findings.setText("\n".join(found.statements))
         self.findings.show()
         self.use.setVisible(found.calibration is not None)

@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QStackedWidget, QWidget
+from PySide6.QtCore import QTimer, Signal
+from PySide6.QtWidgets import QScrollArea, QStackedWidget, QWidget
 
 from gui.ask_file import ask_file
 from gui.dialogs.bench_text import save_bench, show_bench, start_choice
@@ -193,10 +193,19 @@ class Connect(Overlay):
             self.wiring.show_conclusion(found)
         elif found.protocol == self._field:
             self.calibration.show_conclusion(found)
+            # once it has its place
+            QTimer.singleShot(0, self._reveal_findings)
         if found.protocol == self._running:
             self._end(f"Kept as {folder.name}")
         if self.isVisible():
             self.open()
+
+    def _reveal_findings(self) -> None:
+        """Scroll to what was found and what can be done with it."""
+        page = self.pages.widget(2)
+        if isinstance(page, QScrollArea):
+            page.ensureWidgetVisible(self.calibration.use)
+            page.ensureWidgetVisible(self.calibration.findings)
 
     def _follow(self) -> None:
         """Say where the run is that a page asked for, or why there can be none."""
@@ -281,7 +290,7 @@ class Connect(Overlay):
         self.open()
 
     def _place(self) -> None:
-        self.pages.setFixedHeight(min(PAGE, max(self._window.height() - 330, 330)))
+        self.pages.setFixedHeight(min(PAGE, max(self._window.height() - 330, 110)))
         super()._place()
 
     def _lay_out(self) -> None:

@@ -34,6 +34,8 @@ class Room(IntEnum):
     """Lamp, short name, value."""
     BARE = 2
     """Lamp and value."""
+    LAMP = 3
+    """The lamp alone; the tool tip has the rest."""
 
 
 class Chip(QWidget):
@@ -101,12 +103,13 @@ class Chip(QWidget):
     def _arrange(self) -> None:
         view, room = self._view, self._room
         self._name.setText(view.name if room is Room.FULL else view.short)
-        self._name.setVisible(room is not Room.BARE)
+        self._name.setVisible(room < Room.BARE)
+        self.value.setVisible(room < Room.LAMP)
         self._detail.setText(view.detail)
         self._detail.setVisible(bool(view.detail) and room is Room.FULL)
         layout = self.layout()
         assert layout is not None
-        bare = room is Room.BARE
+        bare = room >= Room.BARE
         layout.setContentsMargins(*((6, 4, 7, 4) if bare else (10, 4, 11, 4)))
         layout.setSpacing(2 if bare else 9)
         layout.invalidate()

@@ -26,6 +26,13 @@ _CLOCK_COLOURS = {
 }
 
 
+ROOMS = (
+    *((room, False) for room in list(Room)[:3]),
+    (Room.BARE, True),
+    (Room.LAMP, True),
+)
+"""What is tried, the widest first: room of each chip, and whether all stands closer."""
+
 WHOLE, SHORT, LEAST = 190, 120, 40
 """Widths of the title, px: that of a run's name, a short one's, and the least."""
 
@@ -112,14 +119,17 @@ class Header(QFrame):
         """Chips at their widest that fit; where it is narrow, no minor button."""
         layout = self.layout()
         assert layout is not None
-        for room in Room:
+        for room, tight in ROOMS:
             for chip in self._chips:
                 chip.show_room(room)
-            bare = room is Room.BARE
+            bare = room >= Room.BARE
             self._buttons[0].setVisible(room is Room.FULL)
             self._buttons[2].setVisible(not bare)
             self._name.setVisible(not bare)  # six chips, and it is no news
-            least = {Room.FULL: WHOLE, Room.SHORT: SHORT, Room.BARE: LEAST}[room]
+            self._logo.setVisible(not tight)
+            self._chip_row.setSpacing(2 if tight else 6)
+            layout.setSpacing(6 if tight else 11)
+            least = {Room.FULL: WHOLE, Room.SHORT: SHORT}.get(room, LEAST)
             self._title.setMinimumWidth(least)
             self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
             layout.invalidate()
@@ -165,15 +175,17 @@ class Header(QFrame):
         self.stop.show_coil(snapshot.state, snapshot.coil)
 
     def _lay_out(self) -> None:
-        logo = QLabel()
-        logo.setPixmap(pixmap("logo", look.LAMP_BLUE, 26))
+        self._logo = QLabel()
+        self._logo.setPixmap(pixmap("logo", look.LAMP_BLUE, 26))
         self._name.font().setWeight(QFont.Weight.DemiBold)
         first = row(self._name, self.badge, STRETCH, spacing=9)
         words = lines(first, self._title, spacing=3)
         words.setContentsMargins(0, 13, 0, 11)
         clock = lines(self._state, self._clock, spacing=1)
         clock.setContentsMargins(0, 14, 0, 12)
-        whole = bar(self, (16, 0, 14, 0), 11, logo, words, 8, self._chip_row, STRETCH)
+        whole = bar(
+            self, (16, 0, 14, 0), 11, self._logo, words, 8, self._chip_row, STRETCH
+        )
         filled(whole, (*self.folds, *self._buttons, 6, clock, self.stop))
 
 

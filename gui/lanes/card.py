@@ -21,6 +21,9 @@ MARGIN, RIGHT = 12, 6
 TITLE = 26
 """Height of the title with the margin above it, px."""
 
+LOW = 40
+"""Height below which the value would lie on the title; the tag in the lane has it."""
+
 EDGE = 6
 """Height of its lower edge, which can be dragged, px."""
 
@@ -96,8 +99,9 @@ class LaneCard(QFrame):
         self._more.setVisible(bool(words) and (below or instead))
         self._beside.setText(self.lane.unit)
         self._beside.setVisible(instead)
+        told = self._flat or self.height() >= LOW
         for one in (self._value, self._unit):
-            one.setVisible(not instead)
+            one.setVisible(not instead and told)
 
     def show_runs(self, values: Values, changes: Values | None, where: str) -> None:
         """Show a line per run: its marker, its value and its change, in shown units.
@@ -123,6 +127,8 @@ class LaneCard(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Say as much as there is room for."""
         super().resizeEvent(event)
+        if self._runs is None:
+            self.show_more(self._more.text())
         self._lay_out_runs()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:

@@ -65,6 +65,11 @@ class Tools(QWidget):
         for button in self.findChildren(IconButton):
             button.set_wide(wide)
 
+    def show_less(self, less: bool) -> None:
+        """Leave out the buttons whose keys are told in the help and the menu."""
+        for button in (self.fit, self.zoom, self.export, self.help):
+            button.setVisible(not less)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Say as much of the cursors as there is room for."""
         super().resizeEvent(event)

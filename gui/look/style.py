@@ -120,6 +120,7 @@ QLineEdit, QPlainTextEdit, QComboBox, QAbstractSpinBox { background: $field;
   border: 1px solid $border_strong; border-radius: 6px; padding: 3px 8px;
   min-height: 22px; selection-background-color: $accent;
   selection-color: $on_accent; }
+QLineEdit, QPlainTextEdit { placeholder-text-color: $muted; }
 QLineEdit:focus, QPlainTextEdit:focus, QComboBox:focus, QAbstractSpinBox:focus {
   border: 2px solid $accent; padding: 2px 7px; }
 QLineEdit:disabled, QComboBox:disabled, QAbstractSpinBox:disabled {
@@ -136,7 +137,7 @@ QComboBox QAbstractItemView { background: $panel; border: 1px solid $border_stro
 QCheckBox { spacing: 8px; background: transparent; border: 2px solid transparent;
   border-radius: 6px; padding: 1px; }
 QCheckBox:focus { border-color: $accent; }
-QCheckBox::indicator { width: 16px; height: 16px; border: 1px solid $border_strong;
+QCheckBox::indicator { width: 16px; height: 16px; border: 1px solid $muted;
   border-radius: 4px; background: $field; }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent;
   image: url("$check"); }

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel, QSplitter, QWidget
 
 from gui.lanes.lane import Lane
@@ -23,6 +24,12 @@ from gui.screen.compare_bar import CompareBar
 
 LATER = 0.05
 """By how much the record may have a step begin later than was told live, s."""
+
+STRIP, LOGGED = 56, 151
+"""Heights of the progress alone, and with the log, px."""
+
+NARROW, LOW, LOWEST = 1000, 640, 500
+"""Width and heights of the window, px, below which not all of the centre is shown."""
 
 FOLLOWED = 5.0
 """Visible time of a run that begins, s."""
@@ -104,6 +111,21 @@ class EmptyCard(QFrame):
         self._picture.setPixmap(pixmap("bench", self._theme.tokens.accent, 44))
 
 
+class Record(QFrame):
+    """Progress, and the log where it has room for a line."""
+
+    def __init__(self, progress: ProgressStrip, log: LogView) -> None:
+        super().__init__()
+        self.setProperty("role", "panel")
+        self._log = log
+        column(self, progress, (log, 1), spacing=7).setContentsMargins(12, 10, 12, 10)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave the log out rather than cut it."""
+        super().resizeEvent(event)
+        self._log.setVisible(self.height() >= LOGGED - 15)
+
+
 class Centre(QWidget):
     """Lanes above, record below, a movable border between."""
 
@@ -122,23 +144,48 @@ class Centre(QWidget):
         self.monitor_bar = MonitorBar()
         bars = (self.tools, line(), self.notice, self.compare_bar, self.monitor_bar)
         column(self.lanes, *bars, (self.stack, 1), margin=1, spacing=0)
-        lower = panel()
-        below = column(lower, self.progress, (self.log, 1), spacing=7)
-        below.setContentsMargins(12, 10, 12, 10)
+        self.lower = Record(self.progress, self.log)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
         self.splitter.addWidget(self.lanes)
-        self.splitter.addWidget(lower)
+        self.splitter.addWidget(self.lower)
         self.splitter.setStretchFactor(0, 4)
         self.splitter.setStretchFactor(1, 1)
         self.splitter.setHandleWidth(8)
         self.splitter.setSizes([780, 200])
         self.splitter.setChildrenCollapsible(False)
-        self.lanes.setMinimumHeight(320)
-        lower.setMinimumHeight(151)
+        self._low = False
+        self.show_room(NARROW, LOW)
         column(self).addWidget(self.splitter)
         self.empty = EmptyCard(self.stack, theme)
         self.progress.blocks.chosen.connect(self.view.show_step)
         self.log.step_chosen.connect(self._show_step)
+
+    def show_room(self, width: int, height: int) -> None:
+        """Leave out of a small window what has a key; its width and height, px."""
+        narrow, low = width < NARROW, height < LOW
+        self.stack.navigator.setVisible(height >= LOWEST)
+        self.tools.show_less(narrow)
+        self.log.title.setVisible(not narrow)
+        self.lanes.setMinimumHeight(200 if low else 320)
+        self.lower.setMinimumHeight(STRIP if low else LOGGED)
+        if low is not self._low:
+            self._low = low
+            self.splitter.setSizes([780, STRIP if low else 200])
+
+    def open_log(self) -> None:
+        """Give the log room where it had none."""
+        if self.log.isHidden():
+            self.splitter.setSizes([self.height() - LOGGED, LOGGED])
+
+    def show_safety(self) -> None:
+        """Show the last lines about the coil."""
+        self.open_log()
+        self.log.show_safety()
+
+    def write_note(self) -> None:
+        """Put the keyboard into the field for notes."""
+        self.open_log()
+        self.log.note.setFocus()
 
     def show_source(self, source: Source, lanes: Sequence[Lane] | None) -> None:
         """Show another source, whole; `lanes`: None keeps those shown."""

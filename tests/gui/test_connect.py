@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from benches import READ_BY_HAND
 from PySide6.QtCore import Qt
@@ -21,7 +22,7 @@ from gui.dialogs.bench_text import (
 )
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import InstrumentsPage
-from gui.review.conclusion import conclusion_of
+from gui.review.conclusion import Concluded, conclusion_of
 from gui.state import FaultNotice, WindowState
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.ending import Ending
@@ -196,6 +197,25 @@ def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     session.run.take(Ended(Ending.refused("stopped at the bench")))
     session.acknowledge()
     assert not window.question.isVisible(), "a run that ended waits for nobody"
+
+
+def test_both_parts_of_the_loop_can_be_read_beside_what_was_found(lab) -> None:
+    lab.window.actions_.connect_dialog()
+    dialog = lab.window.findChild(Connect)
+    dialog.show_page(2)
+    page, current = dialog.calibration, np.linspace(-1, 1, 21)
+    page.show_loop(np.c_[current, 0.011 * current])
+    page.show_conclusion(Concluded("", ("found",) * 4, (), (), (), Path("c.csv")))
+    try:
+        lab.until(lambda: page.loop.isVisible() and len(page.loop.panels) == 2)
+        lab.app.processEvents()
+        assert all(panel.box.height() >= 80 for panel in page.loop.panels)
+    finally:
+        page.show_progress("", busy=True)  # without findings, as it was
+        page.show_progress("", busy=False)
+        page.loop.hide()
+        dialog.show_page(0)
+        dialog.hide()
 
 
 def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:

@@ -12,6 +12,7 @@ from gui.state import InstrumentView, Lamp, Snapshot, WindowState
 VIEWS = (
     InstrumentView("Coil source", Lamp.ACTIVE, "output on · ≤ 2 A", "798 mA"),
     InstrumentView("Oscilloscope", Lamp.ACTIVE, "4 channels · 8 bit", "1 MS/s"),
+    InstrumentView("Thermometer", Lamp.ACTIVE, "LSCI MODEL335", "296.15 K"),
     InstrumentView("Teslameter", Lamp.ACTIVE, "LSCI MODEL425", "8.78 mT"),
     InstrumentView("Model", Lamp.WARNING, "beside the run", "NRMSE 12.3 %"),
 )
@@ -33,8 +34,8 @@ def header(lab) -> Iterator[Header]:
     host.close()
 
 
-@pytest.mark.parametrize("width", [1180, 1280, 1400, 1600, 1720])
-@pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("width", [844, 1024, 1280, 1450, 1720])
+@pytest.mark.parametrize("count", [2, 4, 6, 7])
 def test_no_chip_is_cut_at_any_width(
     app: QApplication, header: Header, width: int, count: int
 ) -> None:
@@ -45,14 +46,16 @@ def test_no_chip_is_cut_at_any_width(
     assert header.minimumSizeHint().width() <= width
     for chip in header.chips:
         assert chip.width() >= chip.minimumSizeHint().width(), chip.accessibleName()
-        assert chip.value.width() >= chip.value.sizeHint().width()
+        if not chip.value.isHidden():
+            assert chip.value.width() >= chip.value.sizeHint().width()
 
 
 def test_wide_chips_say_more(app: QApplication, header: Header) -> None:
     widths = []
+    four = (*VIEWS[:2], *VIEWS[3:])
     for width in (1180, 1450, 1720):
         header.resize(width, 68)
-        header.render_snapshot(replace(SHOWN, instruments=VIEWS))
+        header.render_snapshot(replace(SHOWN, instruments=four))
         app.processEvents()
         widths.append(sum(chip.width() for chip in header.chips))
     assert widths == sorted(widths) and len(set(widths)) == 3

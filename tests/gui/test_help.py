@@ -32,6 +32,9 @@ def test_narrow_window_has_room_for_one_side_only(lab) -> None:
     window.resize(1180, 720)
     window.fold(window.review, False)
     assert window.review.isVisible() and not window.setup.isVisible()
+    window.fold(window.review, True)
+    assert window.setup.isVisible(), "it only made room"
+    window.fold(window.review, False)
     window.fold(window.setup, False)
     assert window.setup.isVisible() and not window.review.isVisible()
     window.resize(1720, 1080)

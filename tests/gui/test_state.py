@@ -1,6 +1,5 @@
 import pytest
 
-from gui.look.tokens import DARK, LIGHT, Tokens
 from gui.state import (
     STALE,
     CoilKnowledge,
@@ -14,22 +13,6 @@ from gui.state import (
     stop_text,
     truth,
 )
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance of "#rrggbb", 0 to 1 (WCAG 2)."""
-    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    linear = [
-        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts
-    ]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-
-def contrast(one: str, other: str) -> float:
-    """Contrast ratio of two colours, 1 to 21 (WCAG 2)."""
-    high, low = sorted((luminance(one), luminance(other)), reverse=True)
-    return (high + 0.05) / (low + 0.05)
-
 
 LIVE = CoilView(True, 0.374, 0.374, limit=2.0)
 
@@ -109,32 +92,3 @@ def test_durations() -> None:
 def test_clock_shows_elapsed_and_expected() -> None:
     running = Snapshot(state=WindowState.RUNNING, elapsed=23.4, expected=41.0)
     assert clock_text(running) == ("RUNNING", "00:23.4 / 00:41")
-
-
-TEXTS = ("text", "muted", "red", "green", "amber", "selected_text")
-TRACES = ("force", "V_C1", "V_C2", "V_K", "rate", "twin", "residual", "current")
-
-
-@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
-def test_text_and_traces_have_contrast(tokens: Tokens) -> None:
-    for name in TEXTS:
-        for ground in ("panel", "sunken"):
-            ratio = contrast(getattr(tokens, name), getattr(tokens, ground))
-            assert ratio >= 4.5, (name, ground, ratio)
-    for name in TRACES:
-        ratio = contrast(getattr(tokens, name), tokens.plot)
-        assert ratio >= 4.5, (name, ratio)
-
-
-@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
-def test_buttons_and_pills_have_contrast(tokens: Tokens) -> None:
-    for ink, ground in (
-        ("on_accent", "accent"),
-        ("red", "red_soft"),
-        ("amber", "amber_soft"),
-        ("green", "green_soft"),
-        ("selected_text", "selected"),
-        ("header_muted", "header_chip"),
-    ):
-        ratio = contrast(getattr(tokens, ink), getattr(tokens, ground))
-        assert ratio >= 4.5, (ink, ground, ratio)

@@ -73,10 +73,16 @@ def too_small(window) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "screen", [(1188, 760), (1280, 800), (1366, 768), (1720, 1080)], ids=str
+    "screen",
+    [(853, 480), (960, 540), (1024, 576), (1280, 720), (1366, 768), (1720, 1080)],
+    ids=str,
 )
 def test_fits_its_screen_and_elides_no_button(lab, screen: tuple[int, int]) -> None:
-    """The last is 3440 x 2160 at 200 %, too: the window counts px of its own."""
+    """The window counts px of its own.
+
+    The first is 1280 x 720 at 150 %, then 1920 x 1080 at 200 % and 1280 x 720 at 125 %;
+    the last is 3440 x 2160 at 200 %, too.
+    """
     window, room = lab.window, QSize(*screen)
     fit(window, room)
     assert window.size() == room - FRAME, "as large as there is room for it"
