@@ -32,7 +32,6 @@ class CoilPanel:
         plant: the physics behind its terminals.
         clock: the bench's time.
         rating: largest current A and voltage V.
-        output_on: whether the output is on when first connected.
         analogue: A/V and bandwidth, Hz, of its analogue input.
     """
 
@@ -41,7 +40,6 @@ class CoilPanel:
         plant: DrivenCoil,
         clock: Clock,
         rating: tuple[float, float],
-        output_on: bool = False,
         analogue: tuple[float, float] | None = None,
     ) -> None:
         self.analogue = analogue
@@ -61,8 +59,6 @@ class CoilPanel:
         """Rest it wants before a line, s."""
         self.errors: deque[tuple[int, str]] = deque()
         self.list = ListPlayer(clock, self.drive)
-        if output_on:
-            self.switch(True)
 
     def set_current(self, current: float) -> None:
         """Set-point from the panel or the wire, A."""

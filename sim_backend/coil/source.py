@@ -40,22 +40,19 @@ class SimCoilSource(CoilPanel):
         plant: the physics behind its terminals.
         model: name in `MODELS`.
         clock: the bench's time.
-        output_on: whether the output is on when first connected.
 
     Raises:
         SceneError: nobody simulates that model.
     """
 
-    def __init__(
-        self, plant: DrivenCoil, model: str, clock: Clock, *, output_on: bool = False
-    ) -> None:
+    def __init__(self, plant: DrivenCoil, model: str, clock: Clock) -> None:
         if model not in MODELS:
             raise SceneError(
                 f'There is no simulated source for the dialect "{model}"; there is one '
                 f"for {', '.join(MODELS)}."
             )
         known = MODELS[model]
-        super().__init__(plant, clock, known.rating, output_on, known.analogue)
+        super().__init__(plant, clock, known.rating, known.analogue)
         self.reply_end = known.reply_end
         self.clearing = known.clearing
         self._rewrite = known.rewrite
@@ -88,7 +85,7 @@ class RowCoil(CoilPanel):
         mode = row.analogue
         analogue = None if mode is None else (mode.gain, mode.bandwidth)
         rating = row.current, row.voltage
-        super().__init__(plant, clock, rating, analogue=analogue)
+        super().__init__(plant, clock, rating, analogue)
         self._row = row
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")

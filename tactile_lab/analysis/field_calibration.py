@@ -27,6 +27,8 @@ WARMING = 30.0
 READ_BACK_NOISE = 2e-4
 """Current by which an end may differ from the whole mA it was asked to be, A. The field
 is known no better than to what it makes of that."""
+VALID = datetime.timedelta(days=180)
+"""From the measurement until it has expired."""
 HEADER = "current_A,field_T"
 
 
@@ -195,7 +197,6 @@ def calibration_text(
     coil: str,
     date: datetime.date,
     temperature: str = "not known",
-    valid_days: int = 180,
 ) -> str:
     """The file a bench's ``[magnet] calibration`` names: head, hash and table.
 
@@ -204,7 +205,6 @@ def calibration_text(
         coil: the coil or source it belongs to, as the bench names it.
         date: day of the measurement.
         temperature: of the room meanwhile, and who says so.
-        valid_days: after so many days it has expired.
     """
     rows = "\n".join(
         f"{i:.6g},{b:.9g}"
@@ -214,7 +214,7 @@ def calibration_text(
     head = {
         COIL: coil,
         "date": date.isoformat(),
-        VALID_UNTIL: (date + datetime.timedelta(days=valid_days)).isoformat(),
+        VALID_UNTIL: (date + VALID).isoformat(),
         "slope T/A": f"{calibration.slope.value:.6g} ({calibration.slope.low:.6g} to "
         f"{calibration.slope.high:.6g})",
         "loop half-width T": f"{calibration.half_width:.3g}",

@@ -208,25 +208,17 @@ def detect(codes: Codes, detection: Detection, *, first: int = 0) -> Spikes:
     return np.concatenate([detector.feed(first, codes), detector.flush()])
 
 
-def estimate(
-    codes: Codes,
-    *,
-    step: int = 1,
-    factor: float = DEVIATIONS,
-    polarity: Literal[1, -1] = 1,
-) -> tuple[int, int]:
-    """(threshold, hysteresis) in codes from the noise of a record.
+def estimate(codes: Codes, *, step: int = 1) -> tuple[int, int]:
+    """(threshold, hysteresis) in codes, for spikes that rise from a record's noise.
 
-    Median plus `factor` standard deviations, the deviation taken from the distance of
-    the quartiles, which rare spikes do not move. Each code stands for all values of
+    Median plus `DEVIATIONS` standard deviations, the deviation taken from the distance
+    of the quartiles, which rare spikes do not move. Each code stands for all values of
     its step, so noise of about one step is measured, not rounded. A signal that rests
     on one code is taken to have half a step of noise.
 
     Args:
         codes: shape (n,), a stretch of the channel, quiet most of the time.
         step: distance of neighbouring codes (256 for left-justified 8 bit).
-        factor: standard deviations.
-        polarity: +1 or -1.
 
     Raises:
         ParameterError: no samples, or the threshold lies beyond the codes.
@@ -235,8 +227,8 @@ def estimate(
         raise ParameterError("A threshold cannot be estimated from no samples.")
     low, baseline, high = _quartiles(codes, step)
     deviation = (high - low) / QUARTILES_APART
-    distance = factor * max(deviation, step / 2)
-    threshold = round(baseline + polarity * distance)
+    distance = DEVIATIONS * max(deviation, step / 2)
+    threshold = round(baseline + distance)
     if not -32768 <= threshold <= 32767:
         raise ParameterError(
             f"The noise of {deviation:.0f} codes puts the threshold at {threshold}, "
