@@ -34,9 +34,17 @@ def python(*arguments, folder):
     return done.stdout
 
 
-def tactile_lab(*arguments, folder):
-    start = "import sys; from tactile_lab.cli import main; sys.exit(main())"
-    return python("-c", start, *arguments, folder=folder)
+@pytest.fixture
+def tactile_lab(tmp_path, monkeypatch):
+    """A verb as typed in a folder of the test's own; what it prints."""
+    monkeypatch.chdir(tmp_path)
+
+    def typed(*words):
+        done = CliRunner().invoke(cli, words)
+        assert done.exit_code == 0, done.output
+        return done.stdout
+
+    return typed
 
 
 def test_the_tutorial_ends_with_a_fitted_time_constant(tmp_path):
@@ -51,14 +59,13 @@ def test_the_tutorial_ends_with_a_fitted_time_constant(tmp_path):
     assert (folder / "report.html").exists()
 
 
-def test_a_protocol_of_ones_own_runs_as_the_how_to_says(tmp_path):
+def test_a_protocol_of_ones_own_runs_as_the_how_to_says(tmp_path, tactile_lab):
     (source,) = blocks("how-to/write-a-protocol.md", "python")
     (tmp_path / "tap.py").write_text(source, encoding="utf-8")
-    assert "tap" in tactile_lab("plan", "tap.py", folder=tmp_path)
+    assert "tap" in tactile_lab("plan", "tap.py")
     said = tactile_lab(
-        "run", "tap.py", "--set", 'protocol.step="10 mN"', "--json", "--out", "runs",
-        folder=tmp_path,
-    )  # fmt: skip
+        "run", "tap.py", "--set", 'protocol.step="10 mN"', "--json", "--out", "runs"
+    )
     result = json.loads(said)
     assert result["status"] == "complete"
     trials = json.loads((tmp_path / result["run"] / "results.json").read_text())[
@@ -78,12 +85,12 @@ def test_a_protocol_of_ones_own_runs_as_the_how_to_says(tmp_path):
     assert (tmp_path / result["run"] / "summary.png").exists()
 
 
-def test_the_scene_of_the_how_to_is_one(tmp_path):
+def test_the_scene_of_the_how_to_is_one(tmp_path, tactile_lab):
     (source,) = blocks("how-to/write-a-protocol.md", "python")
     (tmp_path / "tap.py").write_text(source, encoding="utf-8")
     (scene,) = blocks("how-to/write-a-protocol.md", "toml")
     (tmp_path / "taps.toml").write_text(scene, encoding="utf-8")
-    assert "tap" in tactile_lab("plan", "taps.toml", folder=tmp_path)
+    assert "tap" in tactile_lab("plan", "taps.toml")
 
 
 SCRIPTING = "how-to/script-in-python.md"
@@ -151,10 +158,10 @@ def test_the_page_of_the_architecture_draws_the_layers_that_are_checked() -> Non
     assert "\n".join(layers) in page
 
 
-def test_the_skin_of_its_page_is_pressed_and_its_python_runs(tmp_path):
+def test_the_skin_of_its_page_is_pressed_and_its_python_runs(tmp_path, tactile_lab):
     (toml,) = blocks("skin.md", "toml")
     (tmp_path / "ball.toml").write_text(toml, encoding="utf-8")
-    assert "256 taxels" in tactile_lab("skin", "ball.toml", "--plan", folder=tmp_path)
+    assert "256 taxels" in tactile_lab("skin", "ball.toml", "--plan")
     (source,) = blocks("skin.md", "python")
     (tmp_path / "press.py").write_text(source, encoding="utf-8")
     python("press.py", folder=tmp_path)

@@ -11,6 +11,7 @@ from tactile_lab.cli import cli
 SHORT = (
     "run", "demo", "--set", "protocol.levels=[\"200 mN\"]",
     "--set", "protocol.hold=200 ms", "--set", "protocol.rest=100 ms",
+    "--set", "record.sample_rate=20 kS/s",
 )  # fmt: skip
 
 
