@@ -117,6 +117,13 @@ def config_file() -> Path:
     return user_config_path("tactile-lab", appauthor=False) / "lab.toml"
 
 
+def state_folder() -> Path:
+    """Where programs on this computer keep what the next one must know of the bench."""
+    state = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
+    folder = Path(state) if state else Path.home() / ".local" / "state"
+    return folder / "tactile-lab"
+
+
 def lab() -> Lab:
     """What the lab's file and the environment say.
 

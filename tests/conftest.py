@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from xdist.scheduler import LoadFileScheduling
 
 # what the program keeps for its user, and what its user told it, is no test's
-for _name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+for _name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"):
     os.environ[_name] = tempfile.mkdtemp(prefix="tactile-lab-test-")
 
 # A busy machine is no failure, and one commit gives one verdict: examples are drawn

@@ -28,9 +28,10 @@ from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
+from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.task import Task
-from tactile_lab.errors import SceneError, TactileLabError
+from tactile_lab.errors import LimitError, SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.plan import plan
 from tactile_lab.planning.way import drive_for
@@ -51,9 +52,6 @@ STATUS: dict[events.RunState, Status] = {
 
 LOOK = 0.05
 """Time between two looks whether a wait is over, s."""
-
-_COLD_FROM: dict[str, float] = {}
-"""When the coil of a real bench counts as cold, by the bench's name; monotonic, s."""
 
 
 class Execution(Task[Executed]):
@@ -76,7 +74,8 @@ class Execution(Task[Executed]):
         folder: of the run; it exists from now on.
 
     Raises:
-        SceneError, LimitError: the scene cannot be run on its bench.
+        SceneError, LimitError: the scene cannot be run on its bench, or how warm its
+            coil is cannot be told.
         RecordingError: the folder cannot be written.
     """
 
@@ -101,6 +100,9 @@ class Execution(Task[Executed]):
         self._ask = ask
         self._asked_field = asked_field
         self._check_somebody_is_there()
+        self._heat = self._coil_heat()
+        if self._heat is not None:
+            self._heat.left()  # what cannot be told is refused here
         self._search = SpikeSearch.of(scene, self.needs.detect_on)
         self._recorder: Recorder | None = None
         self._runner: Runner | None = None
@@ -148,6 +150,7 @@ class Execution(Task[Executed]):
 
         Raises:
             RecordingError: the run could not be begun in its folder.
+            LimitError: how warm the coil is cannot be told or kept.
         """
         keep_scene(self.folder, self.scene)
         self._let_cool()
@@ -161,11 +164,7 @@ class Execution(Task[Executed]):
             self._emit,
             *self._others,
         )
-        ending = runner.run()
-        if not self.bench.simulated:
-            cold = time.monotonic() + self.plan.estimate.cool_down
-            before = _COLD_FROM.get(self.bench.name, cold)
-            _COLD_FROM[self.bench.name] = max(before, cold)
+        ending = self._driven(runner)
         took = time.monotonic() - began
         proof: Certificate | None = None
         try:
@@ -184,21 +183,47 @@ class Execution(Task[Executed]):
             took=took,
         )
 
-    def _let_cool(self) -> None:
-        """Wait until a coil that a run before has heated is as cold as plans take it.
+    def _coil_heat(self) -> CoilHeat | None:
+        """What is kept of the coil's heat; simulated coils are new with each run."""
+        coil = self.scene.bench.coil
+        if self.bench.simulated or not self.needs.coil or coil is None:
+            return None
+        return CoilHeat(coil.port, coil.limits)
 
-        Simulated coils are new, and so cold, with each run. Who asks to stop ends it.
+    def _let_cool(self) -> None:
+        """Wait until a coil that was heated before is as cold as plans take it to be.
+
+        Who asks to stop ends it.
         """
-        cold = _COLD_FROM.get(self.bench.name, 0.0) if self.needs.coil else 0.0
+        cold = time.monotonic() + (self._heat.left() if self._heat else 0.0)
         if (left := cold - time.monotonic()) > 0:
             text = (
-                f"The coil is still warm from the run before: this one begins in "
+                f"The coil is still warm from a run before: this one begins in "
                 f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
                 "Stop ends the waiting."
             )
             self._emit(events.Message("info", text))
         while cold > time.monotonic() and not self.stop.requested:
             time.sleep(LOOK)
+
+    def _driven(self, runner: Runner) -> Ending:
+        """Run, and keep for whoever comes next how warm the coil is left."""
+        if self._heat is None or self.stop.requested:
+            return runner.run()
+        with self._heat.heating() as alone:
+            ending = runner.run()
+            if not alone:  # its port was taken, too
+                return ending
+            left, cost = 0.0, self.plan.estimate
+            if ending.state is events.RunState.COMPLETE:
+                left = cost.cool_down
+            elif self.coil_state.setpoint is not None:  # it was switched on
+                left = self._heat.after(cost.heat)
+            try:
+                self._heat.keep(left)
+            except LimitError as reason:  # the coil's state comes first
+                self._emit(events.Message("warning", str(reason)))
+        return ending
 
     def _begin_record(self, stream: Stream | None) -> Recorder:
         """Start the record; codes can be scaled from now on."""

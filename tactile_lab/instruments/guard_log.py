@@ -6,12 +6,12 @@ has outlived its owner reads there whether the output is off.
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from pathlib import Path
 
 from tactile_lab.bench import OffReport
+from tactile_lab.lab import state_folder
 
 WAIT = 1.0
 """How long a guard's word is waited for, s; it takes some 20 ms."""
@@ -22,9 +22,7 @@ LOOK = 0.02
 
 def default_log() -> Path:
     """Where guards write what they did."""
-    state = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
-    folder = Path(state) if state else Path.home() / ".local" / "state"
-    return folder / "tactile-lab" / "guard.log"
+    return state_folder() / "guard.log"
 
 
 def left_by_guard(owner: int, log: Path | None = None) -> OffReport | None:

@@ -1,16 +1,22 @@
 """Runs one after another on a real bench: each begins with a coil that is cold."""
 
 import json
+import math
 import os
+import re
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 from served_source import Source
 
-from tactile_lab.acquisition.events import Event, Message, RunState
-from tactile_lab.engine import execution
+from tactile_lab.acquisition.events import CoilCurrent, Event, Message, RunState
+from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import LimitError
 from tactile_lab.scene.load import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs a pseudo-terminal")
@@ -33,7 +39,6 @@ SHORT = {
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    monkeypatch.setattr(execution, "_COLD_FROM", {})
     made = Source(tmp_path)
     made.bench.write_text(made.bench.read_text() + LIMITS)
     yield made
@@ -49,14 +54,9 @@ def test_the_next_run_waits_until_the_coil_is_cold(source: Source, tmp_path: Pat
         assert one.run().state is RunState.COMPLETE
     wait = one.plan.estimate.cool_down
     assert wait > 0.1
-    switched = [
-        (entry["monotonic_s"], entry["value"])
-        for entry in map(json.loads, source.log.read_text().splitlines())
-        if entry["what"] == "output"
-    ]
-    began = [at for at, on in switched if on]
+    began = switched_on(source)
     assert len(began) == 2
-    ended = min(at for at, on in switched if not on and at > began[0])
+    ended = min(at for at in switched_on(source, to=False) if at > began[0])
     assert began[1] - ended >= wait
     warm = [t for t in told if isinstance(t, Message) and "still warm" in t.text]
     assert len(warm) == 1
@@ -64,8 +64,120 @@ def test_the_next_run_waits_until_the_coil_is_cold(source: Source, tmp_path: Pat
 
 def test_a_stop_ends_the_waiting(source: Source, tmp_path: Path):
     one = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
-    cold = execution._COLD_FROM[one.bench.name] = time.monotonic() + 1e6
+    heat = heat_of(source)
+    heat.keep(0.9)
     one.stop("not today")
+    kept = heat.path.read_text()
     assert one.run().state is RunState.ABORTED
-    assert execution._COLD_FROM[one.bench.name] == cold, "it is warm all the same"
+    assert heat.path.read_text() == kept, "it is warm all the same"
     assert not source.log.exists() or '"value": true' not in source.log.read_text()
+
+
+def switched_on(source: Source, to: bool = True) -> list[float]:
+    """When its output was switched on, or off, monotonic s."""
+    return [
+        entry["monotonic_s"]
+        for entry in map(json.loads, source.log.read_text().splitlines())
+        if entry["what"] == "output" and bool(entry["value"]) is to
+    ]
+
+
+def heat_of(source: Source) -> CoilHeat:
+    coil = load("demo", SHORT, str(source.bench)).bench.coil
+    return CoilHeat(coil.port, coil.limits)
+
+
+def begun(source: Source, tmp_path: Path) -> "subprocess.Popen[str]":
+    """A run in a program of its own."""
+    changes = [f"--set={key}={json.dumps(value)}" for key, value in SHORT.items()]
+    return subprocess.Popen(
+        [sys.executable, "-m", "tactile_lab", "run", "demo", "--no-report",
+         "--bench", str(source.bench), "--out", str(tmp_path / "runs"), *changes],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+
+
+def test_another_program_waits_too_until_it_is_stopped(source: Source, tmp_path: Path):
+    source.bench.write_text(source.bench.read_text().replace("200 ms", "600 s"))
+    one = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
+    assert one.run().state is RunState.COMPLETE
+    left = heat_of(source).left()
+    assert left > 60.0, "the other program starts meanwhile"
+    other = begun(source, tmp_path)
+    assert other.stdout is not None
+    with other.stdout as lines:
+        said = next((line for line in lines if "still warm" in line), "")
+        seconds = re.search(r"begins in (\d+) s", said)
+        assert seconds and left - 60.0 < int(seconds[1]) <= left
+        other.send_signal(signal.SIGINT)
+        lines.read()
+    assert other.wait() == 130
+    assert len(switched_on(source)) == 1, "the first program's"
+
+
+@pytest.mark.parametrize("stopped", [True, False])
+def test_a_run_that_was_stopped_hot_leaves_it_hot(
+    source: Source, tmp_path: Path, stopped: bool
+):
+    """What the plan expects of its end, where it cools already, does not hold."""
+    rest = {**SHORT, "protocol.rest": "2 s"}
+
+    def heard(event: Event) -> None:
+        if stopped and isinstance(event, CoilCurrent) and event.setpoint > 0.1:
+            one.stop("hot enough")
+
+    one = Execution(
+        load("demo", rest, str(source.bench)), tmp_path / "runs", emit=heard
+    )
+    assert one.run().state is (RunState.ABORTED if stopped else RunState.COMPLETE)
+    assert (heat_of(source).left() > 0) == stopped
+
+
+def test_a_program_that_was_killed_counts_as_having_spent_the_budget(source: Source):
+    heat = heat_of(source)
+    with heat.heating():
+        assert heat.left() == 0.0, "whoever drives it has its port"
+    assert heat.left() == pytest.approx(0.2 * math.log(100))
+    assert 0.0 < heat.left() <= 0.2 * math.log(100), "counted once, from then on"
+
+
+def test_after_a_restart_or_a_clock_set_back_it_waits_no_longer_than_it_takes(
+    source: Source,
+):
+    heat = heat_of(source)
+    heat.keep(0.0)
+    kept = json.loads(heat.path.read_text())
+    for boot, wall, least, most in (
+        ("another", time.time() + 1e6, 0.9, 0.93),
+        ("another", time.time() - 1.0, 0.0, 0.0),
+        (kept["boot"], time.time() + 1e6, 0.0, 0.0 if kept["boot"] else 0.93),
+    ):
+        changed = {**kept, "boot": boot, "cold_wall_s": wall}
+        heat.path.write_text(json.dumps(changed))
+        assert least <= heat.left() <= most
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"heating": false}', "\0"])
+def test_a_broken_file_is_refused_before_a_run_is_made(
+    source: Source, tmp_path: Path, text: str
+):
+    heat = heat_of(source)
+    heat.keep(0.0)
+    heat.path.write_text(text)
+    with pytest.raises(LimitError, match=r"delete the file"):
+        Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_run_that_never_reached_its_coil_leaves_it_cold(
+    source: Source, tmp_path: Path
+):
+    one = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
+    source.served.close()
+    assert one.run().state is RunState.FAULTED
+    assert heat_of(source).left() == 0.0
+
+
+def test_simulated_coils_are_new_with_each_run(source: Source, tmp_path: Path):
+    assert Execution(load("demo", SHORT), tmp_path / "runs").run().off.verified
+    assert not heat_of(source).path.parent.exists()

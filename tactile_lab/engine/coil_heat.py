@@ -1,0 +1,136 @@
+"""When a real coil counts as cold, kept where every program on this computer finds it.
+
+One small file for each coil, by its port as the bench file writes it, in the state
+folder. A program that was killed while it heated the coil leaves a file that says so.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+from tactile_lab.bench import CoilLimits
+from tactile_lab.errors import LimitError
+from tactile_lab.lab import state_folder
+from tactile_lab.planning.heat import cool_down
+from tactile_lab.store.folder import lock, replacing
+
+BOOT = Path("/proc/sys/kernel/random/boot_id")
+"""Where Linux tells one start of the computer from another."""
+
+
+class CoilHeat:
+    """How long one coil takes to cool down, over programs and restarts.
+
+    Times are counted by the clock that nobody sets; after a restart of the computer,
+    or where that cannot be told, by the wall clock, and at most as long as a coil that
+    has spent its whole heat budget takes.
+
+    Args:
+        port: of its source, as the bench file writes it.
+        limits: its heat budget and recovery.
+    """
+
+    def __init__(self, port: str, limits: CoilLimits) -> None:
+        self._limits = limits
+        self._longest = self.after(limits.heat)
+        self.path = state_folder() / "coils" / f"{quote(port, safe='')}.json"
+
+    def after(self, heat: float) -> float:
+        """Time until it counts as cold with that heat, A^2 s, in s."""
+        return cool_down(heat, self._limits)
+
+    def left(self) -> float:
+        """Time until it counts as cold, s; 0 where it does.
+
+        A program that was killed with the coil in its hands could not say how hot it
+        left it: the whole heat budget is counted, from now on.
+
+        Raises:
+            LimitError: the file is not one that this program writes.
+        """
+        try:
+            kept = json.loads(self.path.read_bytes())
+            heating, boot = kept["heating"] is True, kept["boot"]
+            steady, wall = float(kept["cold_steady_s"]), float(kept["cold_wall_s"])
+            if not math.isfinite(steady + wall):
+                raise ValueError("a time that is no number")
+        except FileNotFoundError:
+            return 0.0
+        except (OSError, ValueError, TypeError, KeyError) as reason:
+            raise LimitError(
+                f"How warm the coil is cannot be told: {self.path} cannot be read "
+                f"({type(reason).__name__}: {reason}). Once no program has driven the "
+                f"coil for {self._longest:.0f} s, delete the file."
+            ) from reason
+        if heating:
+            with self._held() as free:
+                if not free:
+                    return 0.0  # its port is taken as well, which says more
+                self.keep(self._longest)
+            return self._longest
+        same = boot and boot == _boot()
+        left = steady - time.monotonic() if same else wall - time.time()
+        return min(max(left, 0.0), self._longest)
+
+    @contextmanager
+    def heating(self) -> Iterator[bool]:
+        """While the coil is driven; `keep` says before the end how it is left.
+
+        Gives whether no other program drives it.
+
+        Raises:
+            LimitError: the file cannot be written.
+        """
+        with self._held() as alone:
+            if alone:
+                self.keep(self._longest, heating=True)
+            yield alone
+
+    def keep(self, left: float, *, heating: bool = False) -> None:
+        """Keep that it counts as cold in `left` s.
+
+        Raises:
+            LimitError: the file cannot be written.
+        """
+        told = {
+            "heating": heating,
+            "cold_steady_s": time.monotonic() + left,
+            "cold_wall_s": time.time() + left,
+            "boot": _boot(),
+        }
+        try:
+            with replacing(self.path) as part:
+                part.write_text(json.dumps(told), encoding="utf-8")
+        except OSError as reason:
+            raise LimitError(
+                f"How warm the coil is left cannot be kept for the next program: "
+                f"{self.path} cannot be written ({reason}). Let XDG_STATE_HOME name a "
+                "folder that can."
+            ) from reason
+
+    @contextmanager
+    def _held(self) -> Iterator[bool]:
+        """The coil's lock; False where another program has it."""
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            file = self.path.with_suffix(".lock").open("a")
+        except OSError as reason:
+            raise LimitError(
+                f"{self.path.parent}, where how warm coils are is kept, cannot be "
+                f"written: {reason.strerror}. Let XDG_STATE_HOME name a folder that "
+                "can."
+            ) from reason
+        with file:
+            yield lock(file)
+
+
+def _boot() -> str:
+    """Which start of the computer this is; "" where it does not tell."""
+    return BOOT.read_text().strip() if sys.platform == "linux" else ""
