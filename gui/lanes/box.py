@@ -75,16 +75,18 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
     """Numbers and grid of a lane; a drag moves its range, the wheel zooms it."""
 
     def __init__(self, stage: Stage, box: LaneBox) -> None:
-        self._stage, self._box = stage, box
+        self._stage = stage
+        # which it holds weakly: a circle would be left to Python's collector
         super().__init__("left", linkView=box)
         self.setZValue(-200)
 
     @guarded
     def paint(self, painter: QPainter, *__: Any) -> None:
         """Grid, numbers and axis, from texts that are laid out once."""
-        if not self._box.valued:
+        box = self.linkedView()
+        if box is None or not box.valued:
             return
-        tokens, box = self._stage.tokens, self._box
+        tokens = self._stage.tokens
         width, height = box.width(), box.height()
         found = heights_of(*box.shown, height)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)

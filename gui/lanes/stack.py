@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, QPointF, Signal
+from PySide6.QtCore import QPoint, QPointF, Qt, Signal
 from PySide6.QtWidgets import QFrame, QMenu
 
 from gui.lanes.arrangement import Arrangement
@@ -220,6 +220,7 @@ class LaneStack(QFrame):
         """The menu of a lane, at a place in it."""
         time, value = self.scene.time_at(here.x()), box.value_at(here.y())
         menu, view, lane = QMenu(self), self.view, box.lane
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.setAccessibleName(lane.plain)
 
         def lock(on: bool) -> None:

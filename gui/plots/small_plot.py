@@ -110,6 +110,7 @@ class Box(pg.ViewBox):  # type: ignore[misc]
         elif event.button() is Qt.MouseButton.RightButton:
             view = self.getViewWidget()
             menu = QMenu(view)
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.addAction("Show all", self.show_all)
             copy = QGuiApplication.clipboard().setPixmap
             menu.addAction("Copy picture", lambda: copy(view.grab()))
