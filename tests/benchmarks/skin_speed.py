@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -37,14 +38,17 @@ RIVALS = 64
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 STEPS = (1e-4, 2e-5, 5e-6)
 SIMULATORS = Path(sys.prefix) / "simulators"
-LOADS = (
-    (25, "plate"), (50, "plate"), (100, "plate"), (100, "grating slides"),
-    (100, "texture slides"), (100, "ball"), (200, "ball"), (1000, "ball"),
-)  # fmt: skip
-"""Taxels in a row, and what presses."""
+ACTIVE = ((25, 40), (100, 100), (250, 400))
+"""Rows and columns of arrays whose every taxel fires."""
+SILENT = ((100, 100), (250, 400), (1000, 1000))
+"""Rows and columns of arrays under a ball that makes a few taxels fire."""
+LONG, MANY = 10, (100, 100)
+"""s, and rows and columns: the figure of the issue."""
+SLIDING = ("plate", "grating slides", "texture slides")
+"""What presses in it."""
 GROWN = (
     "load", "taxels", "solved", "fired", "spikes", "CPU time", "a taxel", "a spike",
-    "wall time", "times real time", "machine's load",
+    "wall time", "times real time", "most memory", "machine's load",
 )  # fmt: skip
 HEADS = ("method", "setting", "spikes", "largest error of a time", "CPU time", "ratio")
 
@@ -162,22 +166,45 @@ def rivals(seconds: int) -> tuple[list[str], int]:
     return rows, count
 
 
-def growth(seconds: int) -> list[str]:
-    """CPU time of arrays of several sizes."""
-    rows = []
-    for side, how in LOADS:
-        skin = plate(side, side, seconds, how)
-        events, cpu, wall = pressed(skin)
-        active = int((events.role <= kernel.SILENT).sum())
-        fired, spikes = int((events.count > 0).sum()), int(events.count.sum())
-        rows.append(
-            f"| {how} | {side * side:,} | {active:,} | {fired:,} | {spikes:,} | "
-            f"{cpu:.2f} s | {cpu / skin.array.size * 1e6:,.1f} µs | "
-            f"{cpu / max(spikes, 1) * 1e6:.2f} µs | "
-            f"{wall:.2f} s | {skin.duration / wall:.1f} | {os.getloadavg()[0]:.1f} |"
-        )
-        print(rows[-1], flush=True)
-    return rows
+def in_its_own_process(size: tuple[int, int], seconds: int, how: str) -> str:
+    """A row of GROWN, computed by a process whose memory is its own."""
+    words = [sys.executable, __file__, "--row", *map(str, size), str(seconds), how]
+    row = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout
+    print(row, end="", flush=True)
+    return row.strip()
+
+
+def grown(rows: int, columns: int, seconds: int, how: str) -> str:
+    """A row of GROWN; what is compiled was, before."""
+    pressed(plate(2, 2, 1, how))
+    events, cpu, wall = pressed(plate(rows, columns, seconds, how))
+    size = rows * columns
+    active = int((events.role <= kernel.SILENT).sum())
+    fired, spikes = int((events.count > 0).sum()), int(events.count.sum())
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return (
+        f"| {how} | {size:,} | {active:,} | {fired:,} | {spikes:,} | "
+        f"{cpu:.2f} s | {cpu / size * 1e6:,.1f} µs | "
+        f"{cpu / max(spikes, 1) * 1e6:,.2f} µs | "
+        f"{wall:.2f} s | {seconds / wall:.2f} | {memory:,.0f} MiB | "
+        f"{os.getloadavg()[0]:.1f} |"
+    )
+
+
+def first_time() -> tuple[float, float]:
+    """Wall time of a small array in a process with nothing compiled, and again, s."""
+    code = (
+        "import sys, time; from skin_speed import plate, pressed;"
+        "skin = plate(2, 2, 1);"
+        "print(pressed(skin)[2], pressed(skin)[2])"
+    )
+    with tempfile.TemporaryDirectory() as empty:
+        told = subprocess.run(
+            [sys.executable, "-c", code], check=True, stdout=subprocess.PIPE, text=True,
+            cwd=Path(__file__).parent, env={**os.environ, "NUMBA_CACHE_DIR": empty},
+        ).stdout  # fmt: skip
+    first, warm = map(float, told.split())
+    return first, warm
 
 
 def equal(seconds: int, count: int, seed: int) -> int:
@@ -199,10 +226,18 @@ def main() -> None:
     parser.add_argument("--taxels", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--row", nargs=4, help="rows, columns, seconds and a load")
     asked = parser.parse_args()
+    if asked.row:
+        high, wide, seconds = map(int, asked.row[:3])
+        print(grown(high, wide, seconds, asked.row[3]))
+        return
+    first, warm = first_time()
     simulate(Circuit(), force_of(plate(2, 2, 1), 0), until=1.0)
     rows, count = rivals(asked.seconds)
-    grown = growth(asked.seconds)
+    of_issue = [in_its_own_process(MANY, LONG, how) for how in SLIDING]
+    active = [in_its_own_process(size, asked.seconds, "plate") for size in ACTIVE]
+    silent = [in_its_own_process(size, asked.seconds, "ball") for size in SILENT]
     same = equal(asked.seconds, asked.taxels, asked.seed)
     text = f"""# An array's kernel beside others, and how its time grows
 
@@ -225,16 +260,30 @@ spike's place inside its step. Ratios of one run on one machine, load
 {"|---" * len(HEADS)}|
 {chr(10).join(rows)}
 
-## Growth
+## 10,000 taxels, 10 s
 
 "Solved" are the taxels that could come to threshold, "fired" those of them that did.
 The plate is pressed once a second; grating and texture slide at 40 mm/s all the time.
-The last three rows are sensors of preset table1 under a ball on one spot, where nearly
-all taxels are left out. CPU times hold forces, events and the file.
+Each row is a process of its own; times hold forces, events and the file, and no
+compiling: the first time ever, 4 taxels take {first:.0f} s, and then {warm:.3f} s.
 
 | {" | ".join(GROWN)} |
 {"|---" * len(GROWN)}|
-{chr(10).join(grown)}
+{chr(10).join(of_issue)}
+
+## Growth
+
+Of active taxels, under the plate for {asked.seconds} s:
+
+| {" | ".join(GROWN)} |
+{"|---" * len(GROWN)}|
+{chr(10).join(active)}
+
+Of silent ones: sensors of preset table1 under a ball on one spot for {asked.seconds} s.
+
+| {" | ".join(GROWN)} |
+{"|---" * len(GROWN)}|
+{chr(10).join(silent)}
 
 ## To the last bit
 
