@@ -93,6 +93,9 @@ class Session:
         )  # fmt: skip
         self._started.append(self.program)
         threading.Thread(target=self._listen, daemon=True).start()
+
+    def enter(self) -> None:
+        """Wait for the window and its bench."""
         self.wait(lambda: self.now["state"] == "ready", 180, "ready")
         self.main = self.tool("search", "--onlyvisible", "--name", ".*Tactile Lab")
         self.main = self.main.split()[0]
@@ -303,8 +306,9 @@ def drive(seed: int, seconds: float) -> tuple[str, bool]:
     """One session; its row, and whether nothing was wrong."""
     with tempfile.TemporaryDirectory() as folder:
         session = Session(seed, Path(folder))
-        end = time.monotonic() + seconds
         try:
+            session.enter()
+            end = time.monotonic() + seconds
             while time.monotonic() < end:
                 session.round()
         except LostError as lost:
