@@ -85,10 +85,11 @@ CHANGING = ('record.signals=["coil_current", "field"]', "record.sample_rate=20 k
 def test_the_field_of_a_force_that_changes_is_compared_by_its_mean(
     run_scene, scene, factor, told
 ):
-    few = (
-        "protocol.presentations_each=1" if scene == "vibration" else "protocol.passes=1"
-    )
-    ran = run_scene(*CHANGING, few, scene=scene, bench=with_field(factor))
+    few = {
+        "vibration": ("protocol.presentations_each=1", "protocol.count=2"),
+        "texture": ("protocol.passes=1",),
+    }
+    ran = run_scene(*CHANGING, *few[scene], scene=scene, bench=with_field(factor))
     said = [text for text in warnings(ran) if "the teslameter reads" in text]
     assert len(said) == told
 
