@@ -48,7 +48,14 @@ class Frames(SceneTable):
         """
         try:
             found = np.load(Path(self.file), mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError) as reason:
+        except FileNotFoundError as reason:
+            raise SceneError(f"{self.file} does not exist.") from reason
+        except ValueError as reason:
+            raise SceneError(
+                f"{self.file} is no .npy file of plain numbers; write one with "
+                "numpy.save (what a .mat file holds, scipy.io.loadmat reads)."
+            ) from reason
+        except (OSError, EOFError) as reason:
             raise SceneError(f"{self.file} is no .npy file: {reason}.") from reason
         if not isinstance(found, np.ndarray):
             raise SceneError(f"{self.file} is an archive; give one array as .npy.")

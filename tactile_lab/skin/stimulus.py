@@ -166,7 +166,22 @@ class Sphere(ForceStimulus):
     radius: Length = 5e-3
 
     def loads(self, array: Array) -> FloatArray:
-        """One ball."""
+        """One ball.
+
+        Raises:
+            SceneError: Hertz's contact would be wider than the ball itself.
+        """
+        force = self.force * (1 + self.vibration)
+        contact_radius = (0.75 * force * self.radius / array.modulus) ** (1 / 3)
+        if contact_radius > self.radius:
+            raise SceneError(
+                f"a ball of radius {show(self.radius, 'm')} pressed with "
+                f"{show(force, 'N')} would touch the layer within "
+                f"{show(contact_radius, 'm')}: Hertz's contact is far narrower than "
+                f"the ball. Press with less than "
+                f"{show(array.modulus * self.radius**2 / 0.75, 'N')}, or make radius "
+                "or modulus larger"
+            )
         return _rows(contact.SPHERE, 0.0, 0.0, self.radius / array.modulus)
 
 

@@ -164,6 +164,9 @@ def test_what_no_model_describes_is_refused_beforehand(pressed):
     strong = {"kind": "punch", "force": "1 MN", "radius": "1 mm"}
     with pytest.raises(ParameterError, match="Press less"):
         highest(load_skin({**SLIDE, "stimulus": [strong]}))
+    wide = {"kind": "sphere", "force": "40 N", "radius": "5 mm"}  # 1 MPa
+    with pytest.raises(SceneError, match=r"40 N would touch .* less than 33.33 N"):
+        highest(load_skin({**SLIDE, "stimulus": [wide]}))
     firm = {"kind": "punch", "force": "20 N", "radius": "1 mm"}
     assert "exponential law" in highest(load_skin({**SLIDE, "stimulus": [firm]}))[1][0]
     assert highest(pressed[0])[1] == ()
@@ -250,8 +253,14 @@ def test_a_run_that_was_killed_is_told_and_its_remains_are_removed(tmp_path):
         assert left not in there and len(there) == 2
 
 
-def test_an_empty_file_of_frames_is_refused_by_name(tmp_path):
+def test_what_is_no_file_of_frames_is_refused_by_name(tmp_path):
     (tmp_path / "f.npy").touch()
     file = {"kind": "frames", "file": "f.npy"}
     with pytest.raises(SceneError, match=r"f\.npy is no \.npy file: No data left"):
+        load_skin({**SLIDE, "stimulus": [file]}, folder=tmp_path)
+    (tmp_path / "f.npy").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
+    with pytest.raises(SceneError, match=r"numbers; write one with numpy\.save \(what"):
+        load_skin({**SLIDE, "stimulus": [file]}, folder=tmp_path)
+    (tmp_path / "f.npy").unlink()
+    with pytest.raises(SceneError, match=r"f\.npy does not exist\.$"):
         load_skin({**SLIDE, "stimulus": [file]}, folder=tmp_path)
