@@ -149,22 +149,23 @@ def test_lamps_and_words_of_the_header_can_be_seen() -> None:
 # --- as it is drawn
 
 
-def shades(widget: QWidget, where: QRect) -> np.ndarray:
-    """Luminances of a part of a widget as it is on screen, shape (n,)."""
-    whole = widget.window()
-    area = QRect(widget.mapTo(whole, where.topLeft()), where.size())
-    image = whole.grab(area.intersected(whole.rect())).toImage()
-    image = image.convertToFormat(QImage.Format.Format_RGB32)
+def seen(window: QWidget) -> np.ndarray:
+    """Luminances of a window as it is on screen, shape (height, width)."""
+    image = window.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     row = image.bytesPerLine() // 4
     raw = np.frombuffer(image.constBits(), np.uint32).reshape(image.height(), row)
-    raw = raw[:, : image.width()].ravel()
-    parts = np.stack([raw >> 16 & 255, raw >> 8 & 255, raw & 255]) / 255
-    return XYZ[1] @ linear(parts)
+    raw = raw[:, : image.width()]
+    light = linear(np.arange(256) / 255)
+    return sum(
+        share * light[raw >> shift & 255]
+        for share, shift in zip(XYZ[1], (16, 8, 0), strict=True)
+    )
 
 
-def drawn_contrast(widget: QWidget, where: QRect) -> float:
-    """Contrast of the ink in it and what most of it is filled with."""
-    found = shades(widget, where)
+def drawn_contrast(picture: np.ndarray, widget: QWidget, where: QRect) -> float:
+    """Contrast of the ink in a part of a widget and what most of it is filled with."""
+    at = widget.mapTo(widget.window(), where.topLeft())
+    found = picture[at.y() : at.y() + where.height(), at.x() : at.x() + where.width()]
     values, counts = np.unique(found.round(4), return_counts=True)
     ground = values[counts.argmax()]
     low, high = np.minimum(found, ground), np.maximum(found, ground)
@@ -187,8 +188,9 @@ def test_stop_can_be_read_in_every_state(app, state: str, down: bool) -> None:
     stop = StopButton()
     stop.show_coil(*STATES[state])
     stop.setDown(down)
+    picture = seen(stop)
     for top in (10, 28):  # its two lines
-        assert drawn_contrast(stop, QRect(54, top, 120, 16)) >= TEXT
+        assert drawn_contrast(picture, stop, QRect(54, top, 120, 16)) >= TEXT
     stop.deleteLater()
 
 
@@ -200,6 +202,7 @@ def test_all_words_on_screen_can_be_read(lab, theme: str) -> None:
         for tab in range(4):
             window.review.show_tab(tab)
             lab.app.processEvents()
+            picture = seen(window)
             root = window if tab == 0 else window.review
             for one in root.findChildren(QWidget):
                 text = isinstance(one, (QLabel, QAbstractButton)) and one.text()
@@ -207,9 +210,9 @@ def test_all_words_on_screen_can_be_read(lab, theme: str) -> None:
                     continue
                 if isinstance(one, StopButton) or one.property("alone"):
                     continue  # above; an icon without its words
-                seen = drawn_contrast(one, one.rect())
-                if seen < (TEXT if one.isEnabled() else DISABLED):
-                    faint.append((type(one).__name__, one.text(), round(seen, 2)))
+                ratio = drawn_contrast(picture, one, one.rect())
+                if ratio < (TEXT if one.isEnabled() else DISABLED):
+                    faint.append((type(one).__name__, one.text(), round(ratio, 2)))
         assert not faint
     finally:
         window.theme.choose("light")
@@ -223,6 +226,9 @@ def test_what_an_empty_field_means_can_be_read(lab, theme: str) -> None:
         lab.window.page.setFocus()
         note = lab.window.centre.log.note
         assert note.placeholderText() and not note.text()
-        assert drawn_contrast(note, note.rect().adjusted(6, 6, -6, -6)) >= TEXT
+        assert (
+            drawn_contrast(seen(lab.window), note, note.rect().adjusted(6, 6, -6, -6))
+            >= TEXT
+        )
     finally:
         lab.window.theme.choose("light")
