@@ -73,7 +73,7 @@ def extremes() -> Iterator[Callable[[], Extreme]]:
     )
     fast = Circuit(C2=1e-15, V_GS=2.0)
     yield partial(
-        _case, "C2 = 1 fF (1.3e7 /s)", fast, Waveform.constant(0), 0.8, "formula", True
+        _case, "C2 = 1 fF (1.3e7 /s)", fast, Waveform.constant(0), 0.7, "formula", True
     )
     for tau in (1e-9, 1e-6, 1e-3, 1e3, 1e12):
         slow = Waveform.through([(0, 0), (0.1, 0), (0.11, 0.2)])
@@ -82,10 +82,9 @@ def extremes() -> Iterator[Callable[[], Extreme]]:
     yield partial(_case, "1e6 s of silence", table, Waveform.constant(0), 1e6, "finite")
     after = Waveform.pulse(0.2, ramp=0.01, hold=0.3, rest=1.0)
     yield partial(_case, "spikes, then 1e6 s", table, after, 1e6, "finite")
-    firing = Circuit(V_GS=1.6)
-    yield partial(
-        _case, "1e6 s of firing", firing, Waveform.constant(0), 1e6, "formula", True
-    )
+    firing, rest = Circuit(V_GS=1.6), Waveform.constant(0)
+    yield partial(_case, "8e5 s of firing", firing, rest, 8e5, "formula", True)
+    yield partial(_case, "1e6 s of firing", firing, rest, 1e6, "limit", True)
     for gap in (1e-3, 1e-6, 1e-9, 1e-12, -1e-12, -1e-9):
         yield partial(grazing, gap)
     yield partial(near_double)

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.errors import ParameterError, TactileLabError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
-from tactile_lab.model.solver import MOST_COUPLED
+from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.quantity import show
 from tactile_lab.validation.contest import Method, Row, Truth, judge, methods, truth
 from tactile_lab.validation.extremes import Extreme, extremes, formula
@@ -72,8 +72,9 @@ def report(
             'of a spike time. Truth: "reference" is 40-digit arithmetic, "formula" '
             'Eq. (15) at constant current, "refuse" a case that has no answer and must '
             'be refused with a clear error, "limit" a case that has one, but with more '
-            f"spikes than the {MOST_COUPLED:.0e} that a slice counts where T1 "
-            'saturates: refused, an answer is owed, "finite" a case too long for the '
+            f"spikes than the {MOST_SPIKES:.0e} that a simulation counts, or the "
+            f"{MOST_COUPLED:.0e} of a slice where T1 saturates: refused, an answer is "
+            'owed, "finite" a case too long for the '
             "reference, where ours is compared with itself at tolerance 1e-12.\n",
             markdown([*heads, *(RIVALS if rivals else ())], lines),
             "",

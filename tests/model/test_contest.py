@@ -5,12 +5,13 @@ import pytest
 
 from tactile_lab.errors import SolverError
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.solver import MOST_SPIKES
 from tactile_lab.model.state import Start
 from tactile_lab.validation import general, rivals, spice, sweeps
 from tactile_lab.validation.accuracy import fastest, order, table, write_csv
 from tactile_lab.validation.contest import COMPILED, Method, Row, Truth, judge, ours
 from tactile_lab.validation.exact_firing import exact_firing
-from tactile_lab.validation.extremes import formula, grazing
+from tactile_lab.validation.extremes import _case, extremes, formula, grazing
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem
 from tactile_lab.waveform import Waveform
 
@@ -171,3 +172,14 @@ def test_a_sweep_tells_who_is_right(tmp_path, monkeypatch):
     assert verdicts["spikes", "tactile_lab"] == verdicts["spikes", "Rodas5P"] == "right"
     sweeps.write(points, 5.0, tmp_path)
     assert "| Rodas5P | tol 1e-09 |" in (tmp_path / "sweeps.md").read_text()
+
+
+def test_no_extreme_case_that_owes_an_answer_has_more_spikes_than_are_counted():
+    """Two of them were refused from when the most was lowered to 1e7."""
+    counted = [
+        (case.problem.name, formula(case.problem)[0])
+        for made in extremes()
+        if made.func is _case and (case := made()).truth == "formula"
+    ]
+    assert len(counted) == 2
+    assert all(1e6 < count < MOST_SPIKES for _, count in counted)
