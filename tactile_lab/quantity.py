@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tactile_lab.errors import QuantityError
 
@@ -171,6 +171,16 @@ def plus_minus(value: float, half: float, unit: str = "", digits: int = 2) -> st
     places = max(-last, 0)
     text = f"{number:.{places}f} ± {known:.{places}f} {prefix}{unit}"
     return printed(text).rstrip()
+
+
+def rounded(value: float, sign: Literal["-", "+"] = "-") -> str:
+    """Two significant digits, written out: "260" and "−0.044", not "2.6e+02".
+
+    Args:
+        value: in the unit that stands behind it.
+        sign: "+" puts one before what is positive, too.
+    """
+    return printed(f"{float(f'{value:.2g}'):{sign}g}")
 
 
 def exact(value: float, unit: str) -> str:

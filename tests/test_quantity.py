@@ -15,6 +15,7 @@ from tactile_lab.quantity import (
     Unit,
     parse,
     plus_minus,
+    rounded,
     show,
 )
 
@@ -184,3 +185,18 @@ def test_a_number_without_unit_is_answered_with_what_it_may_mean(text, unit, hin
 )
 def test_a_value_is_told_as_far_as_it_is_known(value, half, unit, told):
     assert plus_minus(value, half, unit) == told
+
+
+@pytest.mark.parametrize(
+    ("value", "sign", "told"),
+    [
+        (263.7, "-", "260"),
+        (-0.0437, "+", "−0.044"),
+        (7.61, "+", "+7.6"),
+        (0.0, "-", "0"),
+        (6.64e-5, "-", "6.6e−05"),
+    ],
+)
+def test_two_digits_are_written_out(value, sign, told):
+    """The largest offset of a run stood as 2.6e+02 ms in its report."""
+    assert rounded(value, sign) == told

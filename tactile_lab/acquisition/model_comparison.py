@@ -9,7 +9,7 @@ from tactile_lab.acquisition.events import CoilCurrent
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.errors import TactileLabError
-from tactile_lab.quantity import printed
+from tactile_lab.quantity import rounded
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome
 
@@ -65,8 +65,8 @@ class ModelComparison:
                 predicted = out.sample("V_C1", time[inside])
                 off = trace[inside, 1] - predicted
                 told.append(
-                    f"V_C1 {_signed(1e3 * float(off.mean()))} mV "
-                    f"({1e3 * float(np.sqrt(np.mean(off**2))):.2g} mV rms)"
+                    f"V_C1 {rounded(1e3 * float(off.mean()), '+')} mV "
+                    f"({rounded(1e3 * float(np.sqrt(np.mean(off**2))))} mV rms)"
                 )
         except TactileLabError as reason:
             self._model = None
@@ -83,12 +83,10 @@ class ModelComparison:
         text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
         offsets = match(outcome.spike_times, mine).offsets
         if offsets.size:
-            text += f", {_signed(1e3 * float(np.median(offsets)))} ms (median"
+            text += f", {rounded(1e3 * float(np.median(offsets)), '+')} ms (median"
             if self._doubt > 0:
-                text += f"; the coil's steps are known to ±{1e3 * self._doubt:.2g} ms"
+                text += (
+                    f"; the coil's steps are known to ±{rounded(1e3 * self._doubt)} ms"
+                )
             text += ")"
         return text
-
-
-def _signed(value: float) -> str:
-    return printed(f"{value:+.2g}")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.belief import PART
-from tactile_lab.quantity import printed
+from tactile_lab.quantity import rounded
 
 FloatArray = NDArray[np.float64]
 
@@ -75,11 +75,11 @@ class Matched:
         if self.missed:
             text += f", {self.missed} predicted ones missing"
         if self.offsets.size:
-            middle = printed(f"{np.median(self.offsets) * 1e3:.2g}")
-            largest = np.max(np.abs(self.offsets)) * 1e3
-            text += f", offset {middle} ms (median), {largest:.2g} ms at most"
+            middle = rounded(np.median(self.offsets) * 1e3)
+            largest = rounded(np.max(np.abs(self.offsets)) * 1e3)
+            text += f", offset {middle} ms (median), {largest} ms at most"
         if self.rate_error.size:
-            middle = printed(f"{np.median(self.rate_error) * 100:.2g}")
+            middle = rounded(np.median(self.rate_error) * 100)
             text += f", rate error {middle} % (median)"
         return text
 

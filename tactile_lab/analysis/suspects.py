@@ -22,7 +22,7 @@ from tactile_lab.analysis.spike_pairs import irregularity
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import Deviation, DrivenCircuit
 from tactile_lab.errors import TactileLabError
-from tactile_lab.quantity import show
+from tactile_lab.quantity import rounded, show
 
 SUSPECTS: Mapping[str, float] = {
     "input_bias": 30e-12,
@@ -116,27 +116,29 @@ class Explanation:
             names = ", ".join(TITLES[s.name][0] for s in self.suspects)
             return (
                 f"What explains it cannot be told: of {names}, the best, "
-                f"{best.text}, leaves {best.misfit:.2g} times the noise"
+                f"{best.text}, leaves {rounded(best.misfit)} times the noise"
                 + "".join(
-                    f" and {TITLES[o.name][0]} {o.misfit:.2g} times" for o in others[:1]
+                    f" and {TITLES[o.name][0]} {rounded(o.misfit)} times"
+                    for o in others[:1]
                 )
                 + ". Something else, or more than one thing, is other than believed."
             )
         if self.cause is None:
             each = "".join(
-                f"; {s.text} leaves {s.misfit:.2g} times" for s in self.candidates[1:]
+                f"; {s.text} leaves {rounded(s.misfit)} times"
+                for s in self.candidates[1:]
             )
             return (
                 f"Each of {len(self.candidates)} causes would explain it alone, and "
                 f"this run cannot tell them apart: {best.text} leaves "
-                f"{best.misfit:.2g} {noise}{each}."
+                f"{rounded(best.misfit)} {noise}{each}."
             )
         next_best = "".join(
-            f"; the next best, {TITLES[o.name][0]}, leaves {o.misfit:.2g} times"
+            f"; the next best, {TITLES[o.name][0]}, leaves {rounded(o.misfit)} times"
             for o in others[:1]
         )
         return (
-            f"One cause explains it: {best.text}. That leaves {best.misfit:.2g} "
+            f"One cause explains it: {best.text}. That leaves {rounded(best.misfit)} "
             f"{noise}{next_best}."
         )
 

@@ -19,7 +19,7 @@ from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
 from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
-from tactile_lab.quantity import printed
+from tactile_lab.quantity import printed, rounded
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
 
@@ -168,7 +168,7 @@ def sentences(beside: BesideModel) -> tuple[str, ...]:
             open_ = np.nanmedian(found.spikes.tolerance) * 1e3
             text += (
                 f"; {100 * found.spikes.within:.0f} % of the offsets lie within the "
-                f"tolerance of {open_:.2g} ms (median)"
+                f"tolerance of {rounded(open_)} ms (median)"
             )
         said.append(f"{text}.")
     return tuple(said)

@@ -8,6 +8,7 @@ from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.acquisition.model_comparison import ModelComparison
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
+from tactile_lab.quantity import typed
 from tactile_lab.scene.load import load
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
@@ -53,7 +54,7 @@ def test_a_trial_like_the_model_s_has_nothing_to_tell_but_that():
     follow(beside)
     told = beside.ended(outcome(Circuit()))
     assert re.match(r"150 mN: measured less model: (\d+) spikes \(model \1\)", told)
-    assert float(re.search(r"\(([\d.e-]+) mV rms", told)[1]) < 0.01
+    assert float(typed(re.search(r"\(([\d.e−]+) mV rms", told)[1])) < 0.01
 
 
 def test_a_sensor_that_differs_shows_at_once():
