@@ -26,6 +26,7 @@ from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gui.app import application, begin
+from gui.garbage import collected_here
 from gui.lanes.expected import Stretch
 from gui.lanes.source import LiveSource
 from gui.look.theme import Theme
@@ -59,6 +60,8 @@ class Bench:
         self.window = Window(self.session, theme)
         self.window.resize(1720, 1080)
         self.window.show()
+        self._collected = collected_here()
+        self._collected.__enter__()  # as in the program, to the end of this process
         self.frames: list[float] = []
         self.used: list[float] = []
         self.gaps: list[float] = []
