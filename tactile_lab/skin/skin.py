@@ -130,8 +130,7 @@ def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
         return origin
 
     table = validated(SkinFile, tuples(data), (), blame, None)
-    given = with_preset(table.sensor, {})
-    sensor = validated(Sensor, given, ("sensor",), blame)
+    sensor = validated(Sensor, with_preset(table.sensor, {}), ("sensor",), blame)
     if sensor.start != "equilibrium":
         raise SceneError(f"{origin}: [sensor] start: taxels start at equilibrium.")
     try:
@@ -158,8 +157,9 @@ def _skin(data: dict[str, Any], name: str, folder: Path, origin: str) -> Skin:
         elif kind in KINDS:
             stimuli.append(validated(KINDS[kind], keys, at, blame))
         else:
-            told = choices(str(kind), [*KINDS, Frames.kind], "Kinds")
-            raise SceneError(f'{origin}: [{".".join(at)}] kind = "{kind}": {told}')
+            told = choices(str(kind or ""), [*KINDS, Frames.kind], "Kinds")
+            given = "is missing" if kind is None else f'= "{kind}"'
+            raise SceneError(f"{origin}: [{'.'.join(at)}] kind {given}: {told}")
     return Skin(
         name=name,
         title=table.title or name,

@@ -43,7 +43,8 @@ class Squares:
     def total(self, values: FloatArray | NDArray[np.bool_]) -> FloatArray:
         """The sum over the taxels of each, shape (squares,)."""
         weights = values.astype(np.float64)
-        return np.bincount(self.of_taxel, weights, self.places.shape[0])
+        count = self.places.shape[0]
+        return np.bincount(self.of_taxel, weights, count).astype(np.float64)
 
     def mean(self, values: FloatArray) -> FloatArray:
         """The mean over the taxels of each whose value is known, NaN without any."""

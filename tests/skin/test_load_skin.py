@@ -58,6 +58,7 @@ def test_an_array_that_cannot_be_is_refused(array, why):
         ({"kind": "braille", "text": "  "}, "raises no dot"),
         ({"kind": "sphere", "speed": "1 km/s", "hold": "1000 s"}, "points of force"),
         ({"kind": "frames", "file": "nowhere.npy"}, "does not exist"),
+        ({"force": "1 N"}, "kind is missing: Kinds: sphere"),
     ],
 )
 def test_a_stimulus_that_cannot_be_is_refused(stimulus, why):
