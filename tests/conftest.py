@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 # PySide6's import hook, which pytest-qt brings, reads the source of modules that are
@@ -19,6 +21,16 @@ if TYPE_CHECKING:
 # what the program keeps for its user, and what its user told it, is no test's
 for _name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"):
     os.environ[_name] = tempfile.mkdtemp(prefix="tactile-lab-test-")
+
+COILS = Path(os.environ["XDG_STATE_HOME"], "tactile-lab", "coils")
+
+
+@pytest.fixture(autouse=True)
+def _cold_coils() -> None:
+    """No test finds the heat of another whose port had the same name."""
+    if COILS.exists():
+        shutil.rmtree(COILS)
+
 
 # A busy machine is no failure, and one commit gives one verdict: examples are drawn
 # from each test's own seed. `make search` draws new ones, and many more.
