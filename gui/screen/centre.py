@@ -47,7 +47,7 @@ class EmptyCard(QFrame):
         super().__init__(parent)
         self.setProperty("role", "dialog")
         self.setAccessibleName("No bench connected")
-        self._theme = theme
+        self._below, self._theme = parent, theme
         self._picture = QLabel()
         title = label("No bench connected", "big")
         text = label(
@@ -82,7 +82,7 @@ class EmptyCard(QFrame):
 
     def place(self) -> None:
         """Lie in the middle, as large as it needs to be and has room for."""
-        below = self.parentWidget()
+        below = self._below
         self.setFixedWidth(min(520, below.width() - 40))
         self.adjustSize()
         height = min(self.sizeHint().height() + 12, below.height() - 16)
@@ -144,10 +144,10 @@ class Centre(QWidget):
         self.monitor_bar = MonitorBar()
         bars = (self.tools, line(), self.notice, self.compare_bar, self.monitor_bar)
         column(self.lanes, *bars, (self.stack, 1), margin=1, spacing=0)
-        self.lower = Record(self.progress, self.log)
+        self.record = Record(self.progress, self.log)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
         self.splitter.addWidget(self.lanes)
-        self.splitter.addWidget(self.lower)
+        self.splitter.addWidget(self.record)
         self.splitter.setStretchFactor(0, 4)
         self.splitter.setStretchFactor(1, 1)
         self.splitter.setHandleWidth(8)
@@ -167,7 +167,7 @@ class Centre(QWidget):
         self.tools.show_less(narrow)
         self.log.title.setVisible(not narrow)
         self.lanes.setMinimumHeight(200 if low else 320)
-        self.lower.setMinimumHeight(STRIP if low else LOGGED)
+        self.record.setMinimumHeight(STRIP if low else LOGGED)
         if low is not self._low:
             self._low = low
             self.splitter.setSizes([780, STRIP if low else 200])
