@@ -230,8 +230,8 @@ scatter by the irregularity given. Circuit runs: {FORCE.end:g} s, two holds, V_C
 3 mV of noise a bin; where spikes are used, V_fire scatters from spike
 to spike. The decay of I_DS: 30 s, 1 nA of noise whatever the current, as V_C1's noise
 makes it; with 2 % of the current instead, the interval held tau in 88.1 % of 1000.
-"Refused" counts fits that ended as not identifiable. "Each" is time by the clock, on a
-busy computer here.
+"Refused" counts fits that ended as not identifiable. "Each" is time by the clock, which
+a busy computer lengthens.
 
 {minute}
 """,
