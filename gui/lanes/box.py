@@ -88,7 +88,8 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
             return
         tokens = self._stage.tokens
         width, height = box.width(), box.height()
-        found = heights_of(*box.shown, height)
+        low, high = box.shown
+        found = heights_of(low, high, height)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.setPen(paint.pen(tokens.grid))
         painter.drawLines([QLineF(AXIS, y, AXIS + width, y) for _, y, _ in found])
