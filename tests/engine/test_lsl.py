@@ -128,8 +128,8 @@ def test_a_run_of_the_window_is_published_where_that_is_asked(tmp_path):
             begin_run, Request("demo", FEW), tmp_path, {}, publish=True
         ):
             pass
-        lines = lines_until(events, "clock")
-        assert lines[0]["event"] == "begun"
+        lines_until(events, "begun")  # after what the run before still had to tell
+        lines_until(events, "clock")
     streams.close()
     kept_open.cache_clear()
 
