@@ -26,6 +26,8 @@ V_GS = "1.405 V"
 sourced = ["V_GS"]
 """
 SOURCE = """
+[coil.limits]
+recovery = "0.1 s"
 [voltage_source.V_GS]
 dialect = "{dialect}"
 port = "{port}"

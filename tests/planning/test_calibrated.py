@@ -92,7 +92,8 @@ def test_a_calibrated_run_states_what_it_knows(calibrated, tmp_path):
     assert 6e-3 < trial["level_uncertainty_N_95"] < 8e-3
     assert 0 < trial["latency_uncertainty_s"] < 0.02
     assert found["calibration"]["Coil"] == KEPCO
-    assert re.search(r"120\.\d+ ± \d\.\d+ mN", report.html.read_text(encoding="utf-8"))
+    page = report.html.read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert re.search(r"120\.\d+ ± \d\.\d+ mN", page)
 
 
 def test_another_coil_is_refused_before_it_is_switched_on(calibrated, tmp_path):

@@ -425,7 +425,7 @@ def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
     assert last["level_uncertainty_N_95"] == pytest.approx(np.hypot(3e-3, 8e-3))
     assert last["latency_uncertainty_s"] == 2e-3
     assert first["latency_uncertainty_s"] is None, "it was silent"
-    page = report.html.read_text(encoding="utf-8")
+    page = report.html.read_text(encoding="utf-8").replace("\u00a0", " ")
     assert "200.0 ± 8.5 mN" in page
     assert "± 2.0 ms" in page
     (answer,) = report.findings.answers

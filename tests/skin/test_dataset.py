@@ -76,7 +76,7 @@ def test_without_a_spike_there_is_no_energy_of_one(made, tmp_path, monkeypatch):
 
     monkeypatch.setattr(decoder, "touch", light)
     spent, rest = decoder.energy_per_spike(data)
-    assert spent is None and rest == pytest.approx(1, abs=1e-6)
+    assert spent is None and 0.99 < rest < 1, "1 mN is not quite rest"
     card = write_card(tmp_path, data, {}, (spent, rest), "made").read_text()
     assert "Energy: no spikes to share" in card
 
