@@ -300,6 +300,7 @@ def test_a_stopped_guard_stops_a_current_that_only_stands(served, guarded):
             coil.read_current()
             time.sleep(0.01)
     assert not source.output_on
+    os.kill(guard.pid, signal.SIGKILL)  # stopped, it would outlive the tests
 
 
 def test_a_port_that_cannot_be_made_safe_is_handed_over(served, guarded, tmp_path):
