@@ -10,7 +10,7 @@ import math
 
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import inner
-from tactile_lab.model.node_a import V_T
+from tactile_lab.model.node_a import V_T, matrix_times
 from tactile_lab.model.tableau import ORDER, TO_SERIES_TURNED
 
 DIRECT, V_S, T1_LOG, T1_DROP, T1_SCALE, T1_SHIFT = range(6, 12)
@@ -73,15 +73,7 @@ def Q_gain(Q: float, par: FloatArray) -> float:
 @inner
 def to_series(values: FloatArray, series: FloatArray) -> None:
     """Chebyshev coefficients of the polynomial through values at POINTS."""
-    for n in range(0, ORDER, 4):  # four sums at once: none waits for another
-        a = b = c = d = 0.0
-        for i in range(ORDER + 1):
-            value = values[i]
-            a += TO_SERIES_TURNED[i, n] * value
-            b += TO_SERIES_TURNED[i, n + 1] * value
-            c += TO_SERIES_TURNED[i, n + 2] * value
-            d += TO_SERIES_TURNED[i, n + 3] * value
-        series[n], series[n + 1], series[n + 2], series[n + 3] = a, b, c, d
+    matrix_times(TO_SERIES_TURNED, values, series)
     total = 0.0
     for i in range(ORDER + 1):
         total += TO_SERIES_TURNED[i, ORDER] * values[i]

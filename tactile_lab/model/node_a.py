@@ -97,11 +97,11 @@ def eliminate(matrix: FloatArray, right: FloatArray) -> None:
 
 
 @inner
-def product(columns: FloatArray, values: FloatArray, result: FloatArray) -> None:
-    """Fill `result` with a matrix, given by its columns, times ORDER values."""
+def matrix_times(columns: FloatArray, values: FloatArray, result: FloatArray) -> None:
+    """Fill ORDER of `result` with a matrix, given by its columns, times `values`."""
     for n in range(0, ORDER, 4):  # four sums at once: none waits for another
         a = b = c = d = 0.0
-        for i in range(ORDER):
+        for i in range(columns.shape[0]):
             value = values[i]
             a += columns[i, n] * value
             b += columns[i, n + 1] * value
@@ -113,7 +113,7 @@ def product(columns: FloatArray, values: FloatArray, result: FloatArray) -> None
 @inner
 def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
     """Solve (DIFFERENTIATE + r) x = right in place, by its Schur form."""
-    product(SCHUR_Q, right, turned)
+    matrix_times(SCHUR_Q, right, turned)
     for k in range(ORDER - 2, -1, -2):
         one, two = turned[k], turned[k + 1]
         for j in range(k + 2, ORDER):
@@ -124,7 +124,7 @@ def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
         reciprocal = 1.0 / (a * d - b * c)
         turned[k] = (d * one - b * two) * reciprocal
         turned[k + 1] = (a * two - c * one) * reciprocal
-    product(SCHUR_Q_TURNED, turned, right)
+    matrix_times(SCHUR_Q_TURNED, turned, right)
 
 
 @inner
