@@ -22,6 +22,8 @@ PREFIXES = {
 _NUMBER = re.compile(
     r"\s*([-+−]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+−]?[0-9]+)?)\s*(\S.*?)?\s*$"
 )
+_UNIT = r"[fpnµmkMG]?(?:Hz/m?N|Hz|N|V|A|s|T|K|F|Ohm|B|S/s)(?!\w)|[%°]"
+_BETWEEN = re.compile(rf"(?<=[\d?]) (?={_UNIT})|(?<=±) ")
 _FACTOR = re.compile(r"^(?P<symbol>[^\^/ ]+?)(?:\^(?P<power>\d+)|(?P<square>²))?$")
 
 
@@ -181,6 +183,11 @@ def rounded(value: float, sign: Literal["-", "+"] = "-") -> str:
         sign: "+" puts one before what is positive, too.
     """
     return printed(f"{float(f'{value:.2g}'):{sign}g}")
+
+
+def unbroken(text: str) -> str:
+    """Text in which no line ends between a number, its sign and its unit."""
+    return _BETWEEN.sub("\u00a0", text)
 
 
 def exact(value: float, unit: str) -> str:

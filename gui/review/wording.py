@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
+from tactile_lab import quantity
 
-_UNIT = r"(?:[pnµmkMG]?(?:Hz/m?N|Hz|N|V|A|s|T|B|S/s)|%)"
-_BETWEEN = re.compile(rf"(?<=[\d?]) (?={_UNIT}(?:\W|$))|(?<=±) ")
-SPACE, JOINER = "\u00a0", "\u2060"
+JOINER = "\u2060"
 
 
 def unbroken(text: str) -> str:
     """Text in which no line ends between a number and its unit, or inside a unit."""
-    return _BETWEEN.sub(SPACE, text).replace("/", f"{JOINER}/{JOINER}")
+    return quantity.unbroken(text).replace("/", f"{JOINER}/{JOINER}")

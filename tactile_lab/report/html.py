@@ -14,13 +14,12 @@ from markupsafe import Markup, escape
 
 from tactile_lab.conclusion import Table
 from tactile_lab.plot import Plot
+from tactile_lab.quantity import unbroken
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT
 from tactile_lab.report.taxel_map import TaxelMaps
 from tactile_lab.store.folder import replacing
 
-KEPT = re.compile(r"(?<=±) |(?<=\d) (?=(?:[fpnµmkM]?(?:s|Hz|V|A|N|T|K|F|Ohm)\b)|[%°])")
-"""Spaces within a number, its sign and its unit."""
 FITS = 12
 """Letters that any column of names holds."""
 
@@ -42,15 +41,10 @@ def rendered(template: str, **names: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    kept.filters |= {"whole": _whole, "breakable": _breakable}
+    kept.filters |= {"unbroken": unbroken, "breakable": _breakable}
     style = kept.loader.get_source(kept, "page.css")[0] if kept.loader else ""
     text = kept.get_template(template).render(style=Markup(_colours() + style), **names)
     return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
-
-
-def _whole(cell: str) -> str:
-    """A cell that keeps each number, its sign and its unit on one line."""
-    return KEPT.sub("\u00a0", cell)
 
 
 def _breakable(name: str) -> Markup:
