@@ -195,14 +195,16 @@ class Execution(Task[Executed]):
 
         Who asks to stop ends it.
         """
-        cold = time.monotonic() + (self._heat.left() if self._heat else 0.0)
-        if (left := cold - time.monotonic()) > 0:
-            text = (
-                f"The coil is still warm from a run before: this one begins in "
-                f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
-                "Stop ends the waiting."
-            )
-            self._emit(events.Message("info", text))
+        left = self._heat.left() if self._heat else 0.0
+        if not left:
+            return
+        cold = time.monotonic() + left
+        text = (
+            f"The coil is still warm from a run before: this one begins in "
+            f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
+            "Stop ends the waiting."
+        )
+        self._emit(events.Message("info", text))
         while cold > time.monotonic() and not self.stop.requested:
             time.sleep(LOOK)
 
