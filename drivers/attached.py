@@ -16,6 +16,7 @@ from drivers.picoscope.sdk import load
 from drivers.picoscope.sdk_calls import LibraryCalls
 from drivers.picoscope.unit import units
 from drivers.serial_line.link import SerialLink
+from drivers.serial_line.port_names import lasting_name
 from drivers.teslameter import Teslameter
 from drivers.thermometer import Thermometer
 from drivers.usb_presence import present
@@ -36,9 +37,6 @@ from tactile_lab.voltage_source import VoltageLimits
 
 NO_USB = "usb"
 """Address that stands for all of USB where it cannot be looked at."""
-
-BY_ID = Path("/dev/serial/by-id")
-"""Where Linux names serial ports by their adapters."""
 
 DIALOUT = (
     "join the group that owns it: sudo usermod -aG dialout $USER, then log in anew"
@@ -139,15 +137,6 @@ def try_out(
         return found
     finally:
         device.close()
-
-
-def lasting_name(port: str, folder: Path = BY_ID) -> str | None:
-    """Name of a port by the serial number of its adapter, where the system has one."""
-    if not folder.is_dir():
-        return None
-    real = os.path.realpath(port)
-    names = (one for one in sorted(folder.iterdir()) if os.path.realpath(one) == real)
-    return next(map(str, names), None)
 
 
 def ask_name(address: str) -> tuple[str | None, str | None]:

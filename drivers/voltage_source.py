@@ -170,7 +170,8 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
             try:
                 for _ in self._ramp(self.limits.rest):
                     self._clock.sleep_until(self._clock.now() + STEP_EVERY)
-                return RestReport(True, self._at_rest())
+                told = f"{self._at_rest()} {self._wire.link.moved}".strip()
+                return RestReport(True, told)
             except TactileLabError as reason:
                 trouble.append(str(reason))
                 if isinstance(reason, LinkLostError):

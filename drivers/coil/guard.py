@@ -49,7 +49,7 @@ class Guard:
         self, port: str, row: CoilDialect, wire: SerialSettings, log: Path | None = None
     ) -> None:
         self._log = log or default_log()
-        self._settings = guard_settings(port, row, wire, self._log)
+        self._told = port, row, wire
         self._process: subprocess.Popen[bytes] | None = None
         self._armed = False
         self._lost: str | None = None
@@ -70,8 +70,14 @@ class Guard:
                 self._lost = f"it ended with code {code}; see {self._log}"
         return self._lost
 
-    def start(self) -> None:
+    def start(self, ports: tuple[str, ...] = (), identity: str | None = None) -> None:
         """Start the process and wait until it is ready.
+
+        Args:
+            ports: where the source is, and other names that it may get; as it was
+                named unless given.
+            identity: what it answered there; under another name, or at another port of
+                the same, nothing is switched that answers otherwise.
 
         Raises:
             InstrumentError: it does not start.
@@ -92,7 +98,9 @@ class Guard:
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps(self._settings).encode() + b"\n")
+        port, row, wire = self._told
+        settings = guard_settings(ports or (port,), identity, row, wire, self._log)
+        self._process.stdin.write(json.dumps(settings).encode() + b"\n")
         answer = self._process.stdout.readline()
         if answer.strip() != b"ready":
             self._process.kill()
@@ -167,7 +175,11 @@ def _is_stopped(pid: int) -> bool:
 
 
 def guard_settings(
-    port: str, row: CoilDialect, wire: SerialSettings, log: Path
+    ports: tuple[str, ...],
+    identity: str | None,
+    row: CoilDialect,
+    wire: SerialSettings,
+    log: Path,
 ) -> dict[str, object]:
     """Everything the guard process needs to know, as plain data."""
     end = wire.send_end
@@ -177,8 +189,11 @@ def guard_settings(
     return {
         "owner": os.getpid(),
         "silence": SILENCE,
-        "port": port,
-        "settings": port_settings(port, wire),
+        "ports": ports,
+        "node": guard_process.node(ports[0]),
+        "settings": port_settings(ports[0], wire),
+        "ask_name": wire.preamble + end + row.identify + end,
+        "identity": identity,
         "send": wire.preamble + end + end.join(lines) + end,
         "again": wire.preamble + end + end.join(again) + end,
         "query": row.on_query + end,

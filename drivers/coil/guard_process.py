@@ -115,12 +115,27 @@ def kill_hung(owner: int) -> bool:
     return True
 
 
-def prepared(told: dict[str, Any]) -> serial.SerialBase:
-    """The source's port, not opened: what opening needs is imported by then."""
-    port: serial.SerialBase = serial.serial_for_url(
-        told["port"], do_not_open=True, **told["settings"]
-    )
-    return port
+def node(port: str) -> list[int] | None:
+    """Which device a port's name stands for now; None for an address of a network.
+
+    A cable that is pulled and put back is another device, also under its old name.
+    """
+    try:
+        now = os.stat(port)
+    except (OSError, ValueError):
+        return None
+    return [now.st_dev, now.st_ino, now.st_rdev]
+
+
+def prepared(told: dict[str, Any]) -> list[serial.SerialBase]:
+    """The source's port by all its names, not opened.
+
+    What opening needs is imported by then.
+    """
+    return [
+        serial.serial_for_url(name, do_not_open=True, **told["settings"])
+        for name in told["ports"]
+    ]
 
 
 def send_on(port: serial.SerialBase) -> None:
@@ -131,38 +146,66 @@ def send_on(port: serial.SerialBase) -> None:
         switch(True)
 
 
-def switch_off(told: dict[str, Any], port: serial.SerialBase, log: GuardLog) -> bool:
-    """Send and verify output-off, again and again while patience lasts."""
+def switch_off(
+    told: dict[str, Any], ports: list[serial.SerialBase], log: GuardLog
+) -> str | None:
+    """Send and verify output-off, again and again while patience lasts.
+
+    Where the port is another device than the owner had, or has another name, whoever
+    answers there is asked for its name first: a stranger is told nothing.
+
+    Returns:
+        Port at which the output was verified off, None if at none.
+    """
     begun = time.monotonic()
     reasons: set[str] = set()
     lines = "send"
     while (spent := time.monotonic() - begun) < PATIENCE:
         if spent > TERMINAL:
             log.leave_terminal(f"{UNKNOWN}; it is tried for {PATIENCE:g} s")
-        try:
-            with port:
-                send_on(port)
-                port.write(told[lines].encode("ascii"))
-                port.write(told["query"].encode("ascii"))
-                answers = []
-                for _ in range(MOST_LINES):
-                    answer = port.read_until(told["reply_end"].encode("ascii"))
-                    if not answer:
-                        break
-                    text = answer.decode("ascii", "replace").strip("\r\n\x11\x13\x00 ")
-                    if re.search(told["off_match"], text):
-                        log.write(f"output verified off ({text!r})")
-                        return True
-                    answers.append(text)
-                raise OSError(f"not verified off, it answers {answers}")
-        except Exception as reason:  # whatever it is, the output may still be on
-            lines = "again"
-            if str(reason) not in reasons:
-                reasons.add(str(reason))
-                log.write(f"trying again: {reason}")
-            time.sleep(RETRY)
+        for name, port in zip(told["ports"], ports, strict=True):
+            if port is not ports[0] and node(name) == node(told["ports"][0]):
+                continue  # it has not moved
+            try:
+                with port:
+                    send_on(port)
+                    if told["identity"] is not None and node(name) != told["node"]:
+                        port.write(told["ask_name"].encode("ascii"))
+                        wanted = re.escape(told["identity"])
+                        _heard(port, told, f"^{wanted}$", "another instrument")
+                    port.write(told[lines].encode("ascii"))
+                    port.write(told["query"].encode("ascii"))
+                    text = _heard(port, told, told["off_match"], "not verified off")
+                    log.write(f"output verified off ({text!r}) at {name}")
+                    return str(name)
+            except Exception as reason:  # whatever it is, the output may still be on
+                if str(reason) not in reasons:
+                    reasons.add(str(reason))
+                    log.write(f"trying again: {reason}")
+        lines = "again"
+        time.sleep(RETRY)
     log.write(UNKNOWN)
-    return False
+    return None
+
+
+def _heard(
+    port: serial.SerialBase, told: dict[str, Any], pattern: str, otherwise: str
+) -> str:
+    """The first answer that matches `pattern`.
+
+    Raises:
+        OSError: none does.
+    """
+    answers = []
+    for _ in range(MOST_LINES):
+        answer = port.read_until(told["reply_end"].encode("ascii"))
+        if not answer:
+            break
+        text = answer.decode("ascii", "replace").strip("\r\n\x11\x13\x00 ")
+        if re.search(pattern, text):
+            return text
+        answers.append(text)
+    raise OSError(f"{otherwise}, it answers {answers} at {port.port}")
 
 
 class GuardLog:
@@ -213,7 +256,7 @@ def main() -> int:
             os.nice(FIRST)
     told = json.loads(_first_line())
     log = GuardLog(told["log"])
-    port = prepared(told)
+    ports = prepared(told)
     owner = OwnerPipe()
     threading.Thread(target=owner.listen, daemon=True).start()
     os.write(1, b"ready\n")
@@ -222,10 +265,10 @@ def main() -> int:
         return 0
     begun = time.monotonic()
     killed = "silent" in reason and kill_hung(told["owner"])
-    off = switch_off(told, port, log)
+    off = switch_off(told, ports, log)
     log.write(
         f"{reason}{'; it was killed' if killed else ''}; "
-        f"owner {told['owner']}, port {told['port']}, "
+        f"owner {told['owner']}, port {off or told['ports'][0]}, "
         f"{'off' if off else 'NOT verified off'} after {time.monotonic() - begun:.3f} s"
     )
     return 0 if off else 1

@@ -131,7 +131,8 @@ class CoilSource(SerialInstrument[CoilWire]):
             wire.set_up("it might regulate a voltage instead of the current")
             self._interval = wire.measured_interval()
             if self._guard is not None:
-                self._guard.start()
+                link = wire.link
+                self._guard.start(link.names.every(link.port), link.identity)
         except BaseException:
             wire.link.close()
             raise

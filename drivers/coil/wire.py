@@ -144,7 +144,8 @@ class CoilWire(SourceWire[CoilDialect]):
                 if left and not taken:
                     continue  # off, but the set-point may be another than 0 A
                 text = f"Output off, {show(current, 'A')} read back."
-                return OffReport(True, current, text + ("" if taken else DOUBT))
+                text += "" if taken else DOUBT
+                return OffReport(True, current, f"{text} {self.link.moved}".strip())
             disobeys, state = True, "on" if on else "off"
             trouble.append(f"read-back: output {state}, {show(current, 'A')}")
         return OffReport(False, current, UNKNOWN + " | ".join(dict.fromkeys(trouble)))

@@ -23,6 +23,9 @@ D = TypeVar("D", bound=SerialDialect)
 RETRY = 0.1
 """Time between two attempts to open a lost port again, s."""
 
+EXCHANGED = 5.0
+"""How long to try a port at which another of our instruments is looked for, s."""
+
 TRIES = 3
 """Attempts to have an instrument say its name when it is opened."""
 
@@ -64,10 +67,35 @@ class Conversation(Generic[D]):
     def meet(self) -> None:
         """Open the link, with more than one try; the instrument only says its name.
 
+        Where it is not at its port, it is looked for at the name that its adapter
+        keeps.
+
         Raises:
             NotFoundError, NoReplyError, LinkLostError: the port or what is behind it.
             BadReplyError: another instrument answers, or none that can be understood.
         """
+        link = self.link
+        link.port = link.names.named
+        try:
+            self._meet()
+        except InstrumentError:
+            if not self._met_elsewhere():
+                raise
+        link.names.learn(link.port, link.identity or "")
+
+    def _met_elsewhere(self) -> bool:
+        """Whether the same instrument as before answers at its adapter's own name."""
+        link = self.link
+        link.close()
+        if link.names.elsewhere is None:
+            return False
+        link.identity = link.names.identity
+        if self.reconnected([], EXCHANGED):
+            return True
+        link.identity = None
+        return False
+
+    def _meet(self) -> None:
         for left in reversed(range(TRIES)):
             try:
                 self.link.open()
@@ -260,20 +288,28 @@ class Conversation(Generic[D]):
         """Whether the link is open, after trying to open it for `patience` s."""
         if self.link.is_open:
             return True
-        known, until = self.link.identity, self.link.now + patience
+        link = self.link
+        known, until = link.identity, link.now + patience
         while True:
-            try:
-                self.link.open()
-                self.recognise()
-                self._same_as(known)
-                return True
-            except InstrumentError as reason:
-                self.link.close()  # a stranger is not to be told anything
-                self.link.identity = known
-                if self.link.now + RETRY > until:
-                    trouble.append(f"reconnect: {reason}")
-                    return False
-            self.link.pause(RETRY)
+            failed = []
+            for name in (link.names.named, link.names.elsewhere):
+                if name is None:
+                    continue
+                link.port = name
+                try:
+                    link.open()
+                    self.recognise()
+                    self._same_as(known)
+                    return True
+                except InstrumentError as reason:
+                    link.close()  # a stranger is not to be told anything
+                    link.identity = known
+                    failed.append(f"reconnect: {reason}")
+            link.port = link.names.named
+            if link.now + RETRY > until:
+                trouble += failed
+                return False
+            link.pause(RETRY)
 
     def _same_as(self, known: str | None) -> None:
         if known is not None and known != (found := self.link.identity):

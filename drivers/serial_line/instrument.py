@@ -43,12 +43,13 @@ class SerialInstrument(Generic[W]):
     def _known(self) -> dict[str, str]:
         """Who it is and how it is reached, with which its settings begin."""
         link, dialect = self._wire.link, self._wire.dialect
-        return {
+        known = {
             "identity": self.identity,
             "dialect": dialect.id,
             "port": link.port,
             "baud": str(link.wire.baud),
         }
+        return known | ({"moved": link.moved} if link.moved else {})
 
     @contextmanager
     def _met(self) -> Iterator[W]:

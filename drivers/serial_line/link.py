@@ -6,6 +6,7 @@ Any address pyserial opens will do: `/dev/ttyUSB0`, `COM3`, `socket://host:port`
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import serial
 
 from drivers.serial_line.port import PORT_ERRORS, open_port, release, send_on
+from drivers.serial_line.port_names import PortNames
 from drivers.serial_line.transcript import Transcript
 from tactile_lab.clock import Clock
 from tactile_lab.errors import (
@@ -51,6 +53,10 @@ class SerialLink:
         identify: harmless query whose answer never changes.
         spy: told of every byte, or None.
         beat: called while talking and waiting: the thread is alive.
+
+    Attributes:
+        port: where it is, or is looked for next.
+        names: by which it may be found.
     """
 
     def __init__(
@@ -65,6 +71,7 @@ class SerialLink:
         beat: Callable[[], None] = lambda: None,
     ) -> None:
         self.port = port
+        self.names = PortNames(port)
         self.wire = wire
         self.identity: str | None = None
         self._clock = clock
@@ -108,6 +115,17 @@ class SerialLink:
             self.close()
             raise
         self.identity = answer
+
+    @property
+    def moved(self) -> str:
+        """That it is at another name than the bench file's, and what to write there."""
+        if self.port == self.names.named:
+            return ""
+        return (
+            f"The {self._what} is at {os.path.realpath(self.port)} now, no longer at "
+            f'{self.names.named}: cables were pulled. Write port = "{self.port}" into '
+            "the bench file, a name that stays."
+        )
 
     def close(self) -> None:
         """Let go of the port; idempotent, also after the link was lost."""

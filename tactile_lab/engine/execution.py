@@ -328,9 +328,9 @@ class Execution(Task[Executed]):
 
     def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
         scope = settings.get("scope", {})
-        found: tuple[str, ...] = ()
+        found = tuple(one["moved"] for one in settings.values() if "moved" in one)
         if others := scope.get("others"):
-            found = (
+            found += (
                 f"Several oscilloscopes are attached and the bench file names none: "
                 f"{scope.get('serial', 'the first')} was taken, not {others}. Write "
                 'serial = "..." into [scope].',

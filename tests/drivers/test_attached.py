@@ -6,7 +6,7 @@ from importlib import resources
 import pytest
 from replay import read_transcript
 
-from drivers.attached import ask_name, attached, fitting, lasting_name, try_out
+from drivers.attached import ask_name, attached, fitting, try_out
 from drivers.diagnosis import diagnose, disk
 from drivers.picoscope.sdk import bind
 from sim_backend.picoscope.scope import Make
@@ -82,15 +82,6 @@ def test_a_disk_that_is_too_slow_or_not_there(tmp_path):
     slow = disk(tmp_path / "not" / "yet", 1e15)
     assert slow.state == "problem" and "faster disk" in slow.remedy
     assert disk(tmp_path, 1.0).state == "ok"
-
-
-def test_a_port_is_named_so_that_the_name_stays(served, tmp_path):
-    """Two adapters pulled and put back get each other's /dev/ttyUSB."""
-    (tmp_path / "usb-FTDI_AB12-if00").symlink_to(served["coil"])
-    found = lasting_name(served["coil"], tmp_path)
-    assert found == str(tmp_path / "usb-FTDI_AB12-if00")
-    assert lasting_name("/dev/null", tmp_path) is None
-    assert lasting_name("/dev/null", tmp_path / "no such") is None
 
 
 def test_a_port_that_is_gone_tells_those_there_are(monkeypatch):
