@@ -71,7 +71,8 @@ class Session:
         screen = "x".join(map(str, (*SIZE, 24)))
         self._started = [
             subprocess.Popen(
-                ["Xvfb", "-displayfd", str(write), "-screen", "0", screen],
+                # one that resets refuses who comes as the last client leaves
+                ["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0", screen],
                 pass_fds=(write,), stderr=subprocess.DEVNULL,
             )
         ]  # fmt: skip

@@ -121,8 +121,8 @@ def until(done: Callable[[], object], otherwise: str) -> None:
 def on_screen(tmp_path: Path, source: Source) -> Iterator[OnScreen]:
     """The window on a screen, its coil source at a port of its own."""
     read, write = os.pipe()
-    screen = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24"],
+    screen = subprocess.Popen(  # one that resets refuses who comes as the last leaves
+        ["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0", "1280x800x24"],
         pass_fds=(write,), stderr=subprocess.DEVNULL,
     )  # fmt: skip
     started: list[subprocess.Popen[bytes]] = [screen]
