@@ -1,10 +1,13 @@
 """How soon an engine is there, and answers who is on a bench."""
 
 import os
+import re
 import sys
 import threading
+from pathlib import Path
 from typing import cast
 
+import numpy as np
 import pytest
 from engine_answers import answered, pid_of
 
@@ -14,6 +17,7 @@ from tactile_lab.engine import process
 from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.jobs import check
 from tactile_lab.engine.link import Link
+from tactile_lab.engine.memory import forget_code
 
 forks = pytest.mark.skipif(not process.FORKS, reason="engines are forked on Linux only")
 
@@ -47,6 +51,33 @@ def test_an_engine_is_asked_in_the_environment_of_who_asks(monkeypatch):
     monkeypatch.setenv("A_WORD", "said later")
     with Link() as link:
         assert answered(link, word).value == "said later"
+
+
+def resident(pid: int | str | None, library: str, kind: str = "Rss") -> int:
+    """Memory of a kind in a process's libraries of that name, kB."""
+    maps = Path(f"/proc/{pid}/smaps").read_text()
+    sizes = re.findall(rf"{library}.*\n(?:(?!{kind}).*\n)+{kind}: +(\d+)", maps)
+    assert sizes
+    return sum(map(int, sizes))
+
+
+@forks
+def test_what_engines_are_forked_from_keeps_no_code_that_it_will_not_run():
+    """Of the compiler, used once to load what it had compiled, 70 MB stayed."""
+    with Link() as link:
+        assert resident(answered(link, parent_of).value, "libllvmlite") < 30_000
+
+
+@forks
+def test_only_what_is_in_a_library_as_in_its_file_is_forgotten():
+    """What was written into it as it was loaded, such as addresses, cannot be read."""
+    libraries = "self", r"[.]so"
+    written = resident(*libraries, "Anonymous")
+    whole = resident(*libraries)
+    forget_code()
+    assert resident(*libraries, "Anonymous") >= written
+    assert resident(*libraries) < whole
+    assert np.linalg.eigvalsh(np.eye(3)).tolist() == [1, 1, 1]
 
 
 def test_an_engine_that_cannot_be_started_is_lost(monkeypatch):
