@@ -37,12 +37,14 @@ class Shortcut:
         words: what it does, for the list.
         act: does it.
         single: a key without Ctrl: text fields and buttons come first.
+        repeats: acts again and again while it is held down.
     """
 
     keys: tuple[str, ...]
     words: str
     act: Callable[[], object]
     single: bool = False
+    repeats: bool = False
 
 
 class Actions(QObject):
@@ -76,7 +78,14 @@ class Actions(QObject):
         self.runs, self.preferences = runs, preferences
         self.keys = self._all()
         self.bind(window)
-        StopAnywhere(window, panels.stops, closing, panels.session)
+        once = frozenset(
+            QKeySequence(keys).toString()
+            for key in self.keys
+            for keys in key.keys
+            if not key.single and not key.repeats
+        )
+        stop = StopAnywhere(window, panels.stops, closing, panels.session, once)
+        self._is_held = stop.keys.is_held
         panels.header.help_asked.connect(lambda: self.show_help())
         for button, topic in (
             (panels.setup.help, "Protocol"),
@@ -110,7 +119,8 @@ class Actions(QObject):
         pressed = _written(event)
         for key in self.keys:
             if key.single and pressed in key.keys:
-                key.act()
+                if key.repeats or not self._is_held(event):
+                    key.act()
                 return True
         return False
 
@@ -127,26 +137,52 @@ class Actions(QObject):
             Shortcut(
                 ("Ctrl+Shift+Return",), "Start the queue", panels.session.queue.resume
             ),
-            Shortcut(
-                ("Space",), "Freeze the display", tools.freeze.toggle, single=True
-            ),
+            Shortcut(("Space",), "Freeze the display", tools.freeze.click, single=True),
             Shortcut(("F",), "Follow", tools.follow.click, single=True),
             Shortcut(("A",), "Fit the whole run", view.show_all, single=True),
-            Shortcut(("Z",), "Zoom to a box", tools.zoom.toggle, single=True),
+            Shortcut(("Z",), "Zoom to a box", tools.zoom.click, single=True),
             Shortcut(("C",), "Cursors", tools.cursors.click, single=True),
             Shortcut(("1",), "Grab cursor A", lambda: tools.bring(0), single=True),
             Shortcut(("2",), "Grab cursor B", lambda: tools.bring(1), single=True),
-            Shortcut(("M",), "Model", tools.twin.toggle, single=True),
-            Shortcut(("Shift+M",), "Residual", tools.residual.toggle, single=True),
-            Shortcut(("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True),
-            Shortcut(("-",), "Zoom out", lambda: view.zoom(1 / 1.5), single=True),
-            Shortcut(("Backspace",), "The view before", view.back, single=True),
-            Shortcut(("Shift+Backspace",), "Forward again", view.forward, single=True),
+            Shortcut(("M",), "Model", tools.twin.click, single=True),
+            Shortcut(("Shift+M",), "Residual", tools.residual.click, single=True),
+            Shortcut(
+                ("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True, repeats=True
+            ),
+            Shortcut(
+                ("-",),
+                "Zoom out",
+                lambda: view.zoom(1 / 1.5),
+                single=True,
+                repeats=True,
+            ),
+            Shortcut(
+                ("Backspace",), "The view before", view.back, single=True, repeats=True
+            ),
+            Shortcut(
+                ("Shift+Backspace",),
+                "Forward again",
+                view.forward,
+                single=True,
+                repeats=True,
+            ),
             Shortcut(("X",), "Crosshair", cross, single=True),
-            Shortcut(("Left",), "Earlier", lambda: self._nudge(-1), single=True),
-            Shortcut(("Right",), "Later", lambda: self._nudge(1), single=True),
-            Shortcut((".",), "Next spike", lambda: stepped(1), single=True),
-            Shortcut((",",), "The spike before", lambda: stepped(-1), single=True),
+            Shortcut(
+                ("Left",), "Earlier", lambda: self._nudge(-1), single=True, repeats=True
+            ),
+            Shortcut(
+                ("Right",), "Later", lambda: self._nudge(1), single=True, repeats=True
+            ),
+            Shortcut(
+                (".",), "Next spike", lambda: stepped(1), single=True, repeats=True
+            ),
+            Shortcut(
+                (",",),
+                "The spike before",
+                lambda: stepped(-1),
+                single=True,
+                repeats=True,
+            ),
             Shortcut(("Home",), "Start of the run", self._home, single=True),
             Shortcut(
                 ("End",), "End of the run", lambda: view.set_follow(True), single=True
@@ -166,8 +202,13 @@ class Actions(QObject):
             Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
             Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),
             Shortcut(("Ctrl+4",), "Spikes", lambda: self._tab(3)),
-            Shortcut(("Ctrl+Z",), "Undo in the form", form.edits.undo),
-            Shortcut(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo in the form", form.edits.redo),
+            Shortcut(("Ctrl+Z",), "Undo in the form", form.edits.undo, repeats=True),
+            Shortcut(
+                ("Ctrl+Y", "Ctrl+Shift+Z"),
+                "Redo in the form",
+                form.edits.redo,
+                repeats=True,
+            ),
             Shortcut(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
             Shortcut(
                 ("F8",), "Fold the right panel", lambda: self._fold(panels.review)

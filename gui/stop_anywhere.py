@@ -1,17 +1,23 @@
-"""STOP from anywhere: its buttons and its keys act whatever else is open."""
+"""STOP from anywhere: its buttons and its keys act whatever else is open.
+
+It sees every key first, so it also keeps those that are held down from acting again.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.header.stop import StopButton
+from gui.held_keys import HeldKeys
 from gui.session.session import Session
+
+STOP_KEYS = (Qt.Key.Key_F12, Qt.Key.Key_Escape)
 
 
 class StopAnywhere(QObject):
@@ -20,6 +26,7 @@ class StopAnywhere(QObject):
     - F12 is STOP.
     - Esc is STOP while anything drives the coil. In the question asked on closing it
       keeps running. Else it closes what is open; where nothing is, it is STOP.
+    - A key that acts once acts once, however long it is held down.
     - A press on a button STOP acts, also where it would only close a menu.
     - No dialog is modal, whoever opens it: Qt keeps from a covered window every click,
       and does so with its own questions within a file dialog, too.
@@ -29,6 +36,10 @@ class StopAnywhere(QObject):
         stops: every such button there is now; a window with one is not "open".
         closing: the question in which Esc is not STOP.
         session: is stopped.
+        once: keys, as `QKeySequence` writes them, that act once while they are down.
+
+    Attributes:
+        keys: tells which are held down.
     """
 
     def __init__(
@@ -37,8 +48,10 @@ class StopAnywhere(QObject):
         stops: Sequence[StopButton],
         closing: Closing,
         session: Session,
+        once: frozenset[str],
     ) -> None:
         super().__init__(window)
+        self.keys, self._once = HeldKeys(), once
         self._window, self._stops = window, stops
         self._closing, self._session = closing, session
         application = QApplication.instance()
@@ -51,17 +64,22 @@ class StopAnywhere(QObject):
         if isinstance(watched, QDialog) and event.type() == QEvent.Type.Polish:
             watched.setWindowModality(Qt.WindowModality.NonModal)
             return False
-        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
-            if event.key() not in (Qt.Key.Key_F12, Qt.Key.Key_Escape):
-                return False
-            if event.isAutoRepeat():
-                return True  # held down; what it first meant was done
-            if event.key() == Qt.Key.Key_F12:
-                return self._act("STOP by F12")
-            return self._escape()
+        if isinstance(event, QKeyEvent):
+            return self._take_key(event)
         if isinstance(event, QMouseEvent) and self._meant_for_stop(event):
             return self._act("STOP in the window")
         return False
+
+    def _take_key(self, event: QKeyEvent) -> bool:
+        held, stops = self.keys.is_held(event), event.key() in STOP_KEYS
+        if held and (stops or _written(event) in self._once):
+            event.accept()  # and so it is not asked for as a shortcut either
+            return True  # what it first meant was done
+        if not stops or event.type() != QEvent.Type.KeyPress:
+            return False
+        if event.key() == Qt.Key.Key_F12:
+            return self._act("STOP by F12")
+        return self._escape()
 
     def _act(self, reason: str) -> bool:
         self._session.stop(reason)
@@ -92,3 +110,7 @@ class StopAnywhere(QObject):
             return False
         at = event.globalPosition().toPoint()
         return any(s.rect().contains(s.mapFromGlobal(at)) for s in self._stops)
+
+
+def _written(event: QKeyEvent) -> str:
+    return QKeySequence(event.keyCombination()).toString()
