@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QTimer, QUrl, Signal
-from PySide6.QtGui import QDesktopServices, QHideEvent
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.overlay import Overlay
@@ -68,7 +68,7 @@ class StudiesCard(Overlay):
         column(self.card, head, self._area, foot, margin=22, spacing=14)
         self.choice.currentIndexChanged.connect(self._show)
         self._timer = QTimer(self)
-        self._timer.timeout.connect(self.refresh)
+        self._timer.timeout.connect(self._look_again)
 
     def show_studies(self, roots: tuple[Path, ...]) -> None:
         """Show the studies in these folders."""
@@ -93,10 +93,12 @@ class StudiesCard(Overlay):
             self._stamp = ()
         self._show()
 
-    def hideEvent(self, event: QHideEvent) -> None:
-        """Nobody looks: the files are left alone."""
-        self._timer.stop()
-        super().hideEvent(event)
+    def _look_again(self) -> None:
+        """Look while somebody else does; the files are left alone after."""
+        if self.isVisible():
+            self.refresh()
+        else:
+            self._timer.stop()
 
     @property
     def _chosen(self) -> Path | None:

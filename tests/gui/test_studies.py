@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.studies import StudiesCard
 from gui.look.theme import Theme
@@ -89,6 +90,16 @@ def test_a_click_on_a_cell_puts_its_scene_into_the_form(lab, tmp_path: Path) -> 
     lab.window.screen_.open_point(file)
     assert lab.window.setup.subject.path == str(file)
     card.deleteLater()
+
+
+def test_it_can_be_made_over_a_window_that_was_closed(app, tmp_path: Path) -> None:
+    window = QWidget()
+    window.show()
+    window.close()
+    card = StudiesCard(window, Theme("light"))
+    card.show_studies((tmp_path,))
+    assert "No studies yet" in card.text.text()
+    window.deleteLater()
 
 
 def test_one_that_was_killed_says_how_to_go_on(tmp_path: Path) -> None:
