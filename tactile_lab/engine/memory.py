@@ -45,7 +45,7 @@ def give_back() -> None:
 
 
 def trim() -> None:
-    """Return what is free already, and library code; takes some 20 ms."""
+    """Return what is free already, and library code; takes some 40 ms."""
     malloc_trim = getattr(GLIBC, "malloc_trim", None)
     if malloc_trim is not None:
         malloc_trim(0)
@@ -56,12 +56,15 @@ def forget_code() -> None:
     """Unmap the code of libraries; what runs again comes from the system's file cache.
 
     To load is most of what a compiler's or a toolkit's code is ever used for, and it
-    would stay mapped for days. What differs from its file is left alone.
+    would stay mapped for days. What differs from its file is left alone, and so is what
+    another thread is just loading, which looks alike until it is put into its place.
     """
     maps = Path("/proc/self/smaps")
     if GLIBC is None or not maps.exists():
         return
-    for mapped in UNCHANGED.finditer(maps.read_text()):
-        start, end = (int(one, 16) for one in mapped.groups())
+    before = set(UNCHANGED.findall(maps.read_text()))
+    ctypes.CDLL(None)  # waits until no other thread is loading
+    for mapped in before.intersection(UNCHANGED.findall(maps.read_text())):
+        start, end = (int(one, 16) for one in mapped)
         size = ctypes.c_size_t(end - start)
         GLIBC.madvise(ctypes.c_void_p(start), size, mmap.MADV_DONTNEED)
