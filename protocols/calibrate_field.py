@@ -17,6 +17,7 @@ from tactile_lab.analysis.field_calibration import (
 )
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.magnetics import ROUGH
 from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Pause, plus_minus, printed, show
@@ -118,6 +119,7 @@ class CalibrateField(Protocol):
             f"The loop is {loop} or {show(found.half_width_current, 'A', 3)} to either "
             f"side; one field value is known to ±{show(found.uncertainty, 'T', 3)} "
             "(95 %).",
+            *_unlike_the_bench(found.slope.value, run.field_per_ampere),
             *_steady(found),
             *(f"{warning[0].upper()}{warning[1:]}." for warning in found.warnings),
         )
@@ -193,6 +195,27 @@ def _steps(run: Measurement) -> list[FieldStep]:
             FieldStep(branch=branch, current=applied, field=field, error=error)
         )
     return steps
+
+
+def _unlike_the_bench(slope: float, believed: float | None) -> Iterator[str]:
+    """What to look at where the slope, T/A, is not what the bench file supposes."""
+    if not believed or not slope:
+        return
+    ratio = slope / believed
+    said = (
+        f"That is {printed(f'{ratio:.2g}')} times what the bench file had until now: "
+    )
+    if ratio < 0:
+        yield (
+            f"{said}the coil's leads or the probe are the other way round than it "
+            "says. Turn what is wrong and calibrate again: with a probe that lies, "
+            "each force would have the other sign."
+        )
+    elif not 1 / ROUGH <= ratio <= ROUGH:
+        yield (
+            f"{said}check the probe's place, the meter's unit and range, and both "
+            "windings of the coil before it is used."
+        )
 
 
 def _steady(found: FieldCalibration) -> Iterator[str]:

@@ -137,7 +137,9 @@ def _band(run: Measurement, trial: MeasuredTrial, force: float | None) -> float 
     scatter = 0.0
     for part in ((start + end) / 2, end), (trial.start - 1.0, trial.start):
         read = run.field_between(*part)
-        one = float(read.std(ddof=1)) if read.size > 1 else HALF_A_DIGIT
+        # readings that are all alike tell no more than their last digit
+        scatters = read.size > 1 and np.ptp(read) > 0
+        one = float(read.std(ddof=1)) if scatters else HALF_A_DIGIT
         scatter = math.hypot(scatter, student_95(read.size - 1) * one / read.size**0.5)
     stated = run.uncertain(force) or 0.0
     return math.hypot(stated, scatter * run.newtons_per_tesla)

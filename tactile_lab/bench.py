@@ -23,6 +23,17 @@ from tactile_lab.voltage_source import VoltageSource
 COPPER = 0.00393
 """Temperature coefficient of copper's resistance at 20 C, 1/K."""
 
+SHUNT = 0.05
+"""Part of the current by which the shunt may differ from the source's read-back."""
+
+SHUNT_NOTABLE = 0.02
+"""The least difference of them that is remarked on, A."""
+
+
+def shunt_agrees(seen: float, amperes: float) -> bool:
+    """Whether what a shunt shows, A, is the current that the source reads back, A."""
+    return abs(seen - amperes) <= SHUNT * abs(amperes) + SHUNT_NOTABLE
+
 
 @dataclass(frozen=True, kw_only=True)
 class CoilLimits(SceneTable):

@@ -25,6 +25,8 @@ MU_0 = 1.25663706127e-6
 """Permeability of vacuum, T m/A (CODATA 2022)."""
 A2_PRINTED = 2.25e-3
 """A2 as Table 1 prints it, m^2; a 15 mm x 15 mm core has a tenth of it."""
+ROUGH = 1.3
+"""A field that was not calibrated may be so many times what is supposed, or less."""
 
 
 @dataclass(frozen=True)

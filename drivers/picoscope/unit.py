@@ -13,7 +13,7 @@ from drivers.picoscope import status
 from drivers.picoscope.sdk import ENUMERATE, INFORMATION, INPUTS, bind, load
 from drivers.picoscope.sdk_calls import LibraryCalls
 from tactile_lab.bench import Channel
-from tactile_lab.errors import LimitError, RefusedError
+from tactile_lab.errors import LimitError, NotFoundError, RefusedError
 
 _MOST_ACKNOWLEDGEMENTS = 4
 
@@ -87,6 +87,11 @@ class ScopeUnit:
             self.information = {name: self._read(name) for name in INFORMATION}
             if self._serial is None:
                 self._tell_others()
+            elif (opened := self.information["serial"]) != self._serial:
+                raise NotFoundError(
+                    f"Asked for scope {self._serial}, the library opened {opened}. "
+                    "Correct serial in [scope] of the bench file, or unplug the other."
+                )
             most = ctypes.c_int16()
             self.do("Reading full scale", "ps3000aMaximumValue", ctypes.byref(most))
             self.full_scale = most.value

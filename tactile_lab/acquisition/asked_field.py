@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from tactile_lab.acquisition.person import Question
 from tactile_lab.errors import QuantityError, RefusedError
+from tactile_lab.magnetics import ROUGH
 from tactile_lab.quantity import parse, show
 
 MOST = 3.0
@@ -13,9 +14,6 @@ MOST = 3.0
 
 NOTABLE = 1e-3
 """Difference from what is expected that is never remarked on, T."""
-
-FACTOR = 1.3
-"""A reading so many times what is expected, or so many times less, is remarked on."""
 
 
 class AskedField:
@@ -66,7 +64,7 @@ class AskedField:
 
     def _doubt(self, field: float, current: float) -> str | None:
         expected = self._learnt * self._expected(current)
-        low, high = sorted((expected / FACTOR, expected * FACTOR))
+        low, high = sorted((expected / ROUGH, expected * ROUGH))
         if low - NOTABLE <= field <= high + NOTABLE:
             return None
         return (

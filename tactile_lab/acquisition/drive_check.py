@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.asked_field import FACTOR, NOTABLE
-from tactile_lab.bench import Reading
+from tactile_lab.acquisition.asked_field import NOTABLE
+from tactile_lab.bench import Reading, shunt_agrees
+from tactile_lab.magnetics import ROUGH
 from tactile_lab.quantity import show
 from tactile_lab.trial import Trial
 
@@ -36,12 +37,6 @@ NOTHING = 5e-3
 
 GRID = 200
 """Times at which a current is looked at for its mean over a hold."""
-
-SHUNT = 0.05
-"""Part of the current by which the shunt may differ from the source's read-back."""
-
-SHUNT_NOTABLE = 0.02
-"""The least difference of them that is remarked on, A."""
 
 
 class DriveCheck:
@@ -75,8 +70,8 @@ class DriveCheck:
                 trial, s; None where it has none.
             readings: of the field, times from the trial's start.
         """
-        if trial.hold is None or trial.current is not None:
-            return []  # what calibrates the field is not compared with it
+        if trial.hold is None:
+            return []
         begin, end = trial.hold[0] + SETTLING, trial.hold[1]
         held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
         steady = held.size and np.ptp(held[:, 1]) <= STEADY * np.abs(held[:, 1]).max()
@@ -95,7 +90,8 @@ class DriveCheck:
         if not steady:
             self._changing += pairs
             pairs = self._changing
-        if pairs:
+        # what calibrates the field is not compared with it
+        if pairs and trial.current is None:
             found.append(("field", self._field(pairs)))
         seen = shunt(begin, end)
         if seen is not None:
@@ -111,7 +107,7 @@ class DriveCheck:
         tesla = float(np.mean([value for _, value in pairs]))
         nearest = int(np.argmin(np.abs(believed - tesla)))
         expected, amperes = float(believed[nearest]), float(flowed[:, nearest].mean())
-        part = CALIBRATED if self._calibrated else FACTOR - 1
+        part = CALIBRATED if self._calibrated else ROUGH - 1
         if abs(tesla - expected) <= part * abs(expected) + NOTABLE:
             return ""
         by = "calibration" if self._calibrated else "bench file's [magnet]"
@@ -132,7 +128,7 @@ def _moving(current: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _shunt(amperes: float, seen: float) -> str:
-    if abs(seen - amperes) <= SHUNT * abs(amperes) + SHUNT_NOTABLE:
+    if shunt_agrees(seen, amperes):
         return ""
     return (
         f"the shunt shows {show(seen, 'A')} where the source reads back "

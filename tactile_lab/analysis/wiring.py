@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_lab.analysis.estimate import Z95, Estimate
+from tactile_lab.bench import shunt_agrees
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.magnetics import ROUGH
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import plus_minus, show
 
@@ -238,9 +240,21 @@ def _drive(signal: str, found: SignalLevels, expected: SignalLevels) -> ChannelV
         )  # fmt: skip
     says = f"{_signed(change, unit)} by the push, {_signed(wanted, unit)} expected"
     ratio = change / wanted if wanted else math.nan
-    # a shunt read by 8 bits and an uncalibrated field are rough
-    if 0.5 < ratio < 2:
+    if signal == "coil_current" and shunt_agrees(change, wanted):
         return ChannelVerdict(signal, True, says)
+    if 0.5 < ratio < 2:
+        says += f", {ratio:.2g} times"
+        if signal == "coil_current":
+            return ChannelVerdict(
+                signal, False, f"{says}: check the shunt and its resistance in the "
+                "bench file",
+            )  # fmt: skip
+        if 1 / ROUGH <= ratio <= ROUGH:
+            return ChannelVerdict(signal, True, says)
+        return ChannelVerdict(
+            signal, True, f"{says}: its sign is right, its size is not what the bench "
+            "file's [magnet] has; calibrate_field measures it",
+        )  # fmt: skip
     if abs(ratio) < DEAD * 5:
         return ChannelVerdict(
             signal, False, f"{says}: not connected, or no current flows"

@@ -313,9 +313,7 @@ class Execution(Task[Executed]):
         force_for = partial(scene.bench.magnet.force_for, beyond="hold")
         return Drift(scene.circuit, force_for, scene.protocol.drift_limit)
 
-    def _drive_check(self) -> DriveCheck | None:
-        if not self.plan.timeline.asks_force or self.needs.asked_field:
-            return None  # what a person types is doubted as it is typed
+    def _drive_check(self) -> DriveCheck:
         magnet = self.scene.bench.magnet
         used = magnet.calibration
 

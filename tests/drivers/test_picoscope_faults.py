@@ -321,6 +321,13 @@ def test_another_serial_number_is_asked_for() -> None:
     Rig(serial="SIM04/0001").works()
 
 
+def test_a_library_that_opens_another_scope_than_asked_for_is_noticed() -> None:
+    rig = Rig(serial="AB999/999")
+    open_any = rig.library.device.open
+    rig.library.device.open = lambda _: open_any(None)  # type: ignore[method-assign]
+    rig.fails(NotFoundError, "Asked for scope AB999/999, the library opened SIM04/0001")
+
+
 def test_hub_reset_brings_the_same_scope_back() -> None:
     rig = Rig(ScopeFault(kind="reset", time=0.4))
     rig.fails(LinkLostError, "unplugged")

@@ -42,6 +42,7 @@ def test_zero_and_noise(meter: Teslameter) -> None:
         time.sleep(meter.interval)
     fact("mean of 30 readings, T", statistics.mean(readings))
     fact("their standard deviation, T", statistics.stdev(readings))
+    fact("different readings among them", len(set(readings)))
 
 
 def test_latency(meter: Teslameter) -> None:

@@ -1,16 +1,24 @@
 """A field calibration from the current source to a file that a bench then uses."""
 
 import json
+from dataclasses import replace
 
 import pytest
+from short_runs import run_scene
 
-from tactile_lab.acquisition.events import RunState
+from sim_backend.bench import open_bench, options
+from tactile_lab.acquisition.events import Message, RunState
+from tactile_lab.bench import Reading
 from tactile_lab.calibration import read_calibration
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError
+from tactile_lab.planning.needs import needs
+from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
+
+__all__ = ["run_scene"]
 
 SHORT = (
     "protocol.points=5",
@@ -52,6 +60,28 @@ def test_the_file_tells_its_origin_and_covers_what_was_measured(calibrated):
     assert used.at(0.3) == pytest.approx(0.3 * 0.011, abs=1e-5)
     with pytest.raises(LimitError, match="outside the calibration"):
         used.at(0.6)
+
+
+def test_a_field_and_a_shunt_that_lie_are_told(run_scene):
+    """They gave a calibration without a word."""
+
+    def lying(scene):
+        world = replace(options(scene), attenuation={"D": 2.0})
+        made = open_bench(scene, needs(scene), world=world)
+        read_field = made.field_meter.read
+
+        def other():
+            reading = read_field()
+            return Reading(reading.time, -0.5 * reading.value)
+
+        made.field_meter.read = other
+        return made
+
+    ran = run_scene(*SHORT, scene="calibrate_field", bench=lying)
+    sentences = find(read(ran.folder)).conclusion.sentences
+    assert any("−0.5 times" in s and "the other way round" in s for s in sentences)
+    told = [one.text for one in ran.told if isinstance(one, Message)]
+    assert any("the shunt shows" in text for text in told)
 
 
 def test_neither_a_value_nor_the_date_can_be_changed_unnoticed(calibrated, tmp_path):

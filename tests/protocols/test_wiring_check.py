@@ -64,6 +64,7 @@ def test_a_right_bench_passes_and_tells_its_v_gs(tmp_path):
         ({"attenuation": {"A": 10.0}}, {"V_C1": "10 times too little"}),
         ({"attenuation": {"B": 0.1}}, {"V_C2": "times too much"}),
         ({"attenuation": {"D": 10.0}}, {"coil_current": "10 times too little"}),
+        ({"attenuation": {"D": 1.9}}, {"coil_current": "times: check the shunt"}),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )  # fmt: skip

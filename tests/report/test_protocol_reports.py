@@ -327,6 +327,9 @@ def test_calibrate_field_reads_both_branches(tmp_path):
     assert not (tmp_path / "calibration.csv").stat().st_mode & 0o222
     without = find(replace(run, field=None)).conclusion
     assert "no teslameter readings" in without.sentences[0]
+    for believed, unlike in ((0.011, False), (0.013, False), (0.022, True)):
+        told = find(replace(run, field_per_ampere=believed)).conclusion.sentences
+        assert any("check the probe's place" in one for one in told) == unlike
 
 
 def test_force_check_finds_the_slip_in_table_1():
@@ -340,6 +343,17 @@ def test_force_check_finds_the_slip_in_table_1():
     known = replace(read, force_uncertainty=ForceUncertainty(0.0, 0.1))
     values = find(known).conclusion.values
     assert values["eq2_uncertainty_95"] == pytest.approx(0.1 * values["read_over_eq2"])
+
+
+def test_a_teslameter_that_hangs_is_no_exact_one():
+    """Its force stood as "0 N" without an uncertainty."""
+    run = modelled("force_check", [pulse(0.05)])
+    at = np.arange(-1.0, run.duration, 0.2)
+    hangs = np.column_stack([at, np.full(at.size, 3e-3)])
+    found = find(replace(run, field=hangs, newtons_per_tesla=18.0)).conclusion
+    (band,) = found.values["F_minus_F0_uncertainty_N_95"]
+    assert found.values["F_minus_F0_by_field_N"] == [pytest.approx(0, abs=1e-9)]
+    assert band is not None and 20e-6 < band < 1e-3
 
 
 def test_monitor_tells_the_distance_to_threshold():
