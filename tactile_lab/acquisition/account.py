@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.alignment import (
     CLUSTER,
+    Clocks,
     Edge,
     align,
     find_edges,
@@ -90,6 +91,7 @@ class Account:
         self._rate = Rate()
         self._waiting: list[tuple[str, str]] = []
         self.edges: list[Edge] = []
+        self._clocks = Clocks()
         self._steps: list[Applied] = []
         self._applied = array("d")  # clock time, A; read back for hours, it stays small
         self._unwritten: list[Applied] = []
@@ -234,7 +236,9 @@ class Account:
     def note_edges(self, shunt: Trace) -> None:
         """Find the newest set-points' edges in the binned coil current."""
         if self._origin is not None:
-            found = find_edges(self._steps, self._origin, shunt)
+            found = find_edges(self._steps, self._origin, shunt, self._clocks)
+            for edge in found:
+                self._clocks = self._clocks.seen(edge)
             # the first and the newest fix the clocks; those between add nothing
             del self.edges[CLUSTER:-CLUSTER]
             self.edges.extend(found)
@@ -285,7 +289,7 @@ class Account:
             self.journal.align(
                 offset=told.offset, drift=told.drift, uncertainty=told.uncertainty
             )
-        self.edges = []
+        self.edges, self._clocks = [], Clocks(stop)
 
     def fields_since(self, start: float) -> list[Reading]:
         """Readings of the field since run time `start` s, with times after it."""

@@ -30,7 +30,7 @@ STEEPEST = 5e-4
 """Drift up to which edges of one end are still compared with each other, s/s."""
 
 SEARCH = 0.02
-"""How far beyond its host times an edge is looked for, s."""
+"""How far beyond its host times an edge is looked for, where clocks agree, s."""
 
 SHIFT = 5e-4
 """Step in which the place of a list is looked for, s."""
@@ -68,7 +68,31 @@ class Alignment:
     uncertainty: float
 
 
-def find_edges(applied: Sequence[Applied], zero: float, shunt: Trace) -> list[Edge]:
+@dataclass(frozen=True)
+class Clocks:
+    """How the two clocks stood to each other when that was last seen.
+
+    Attributes:
+        at: run time of that, s.
+        late: what a sample's time then lacked to be host time, s.
+    """
+
+    at: float = 0.0
+    late: float = 0.0
+
+    def seen(self, edge: Edge) -> Clocks:
+        """After an edge: changed by no more than it asks for."""
+        least, most = edge.earliest - edge.sampled, edge.latest - edge.sampled
+        return Clocks(edge.earliest, min(max(self.late, least), most))
+
+    def part(self, time: float) -> float:
+        """How far they may have parted since by run time `time` s, s."""
+        return CLOCK_ERROR * max(0.0, time - self.at)
+
+
+def find_edges(
+    applied: Sequence[Applied], zero: float, shunt: Trace, clocks: Clocks | None = None
+) -> list[Edge]:
     """Edges of the set-points in `applied`, as the binned coil current shows them.
 
     The points of a list are too near each other for that: see `find_list`.
@@ -76,21 +100,26 @@ def find_edges(applied: Sequence[Applied], zero: float, shunt: Trace) -> list[Ed
     Args:
         applied: consecutive set-points, clock times in s.
         zero: clock time of run time 0, s.
-        shunt: coil current, A, on the run's axis.
+        shunt: coil current, A, by the sample clock on the run's axis.
+        clocks: how they stood before; in step unless given.
     """
     found = []
+    clocks = clocks or Clocks()
     middle = shunt.time + shunt.width / 2
     before: float | None = None
     for one in applied:
         step = 0.0 if before is None else one.setpoint - before
         if before is not None and abs(step) >= SMALLEST and not one.listed:
             earliest, latest = one.asked - zero, one.time - zero + COIL_LAG
-            low, high = np.searchsorted(middle, [earliest - SEARCH, latest + SEARCH])
+            reach = SEARCH + clocks.part(earliest)
+            around = earliest - clocks.late - reach, latest - clocks.late + reach
+            low, high = np.searchsorted(middle, around)
             # how far the current has come from the old level to the new one
             done = (shunt.mean[low:high].astype(np.float64) - before) / step
             at = _crossing(middle[low:high], done)
             if at is not None:
                 found.append(Edge(at, earliest, latest))
+                clocks = clocks.seen(found[-1])
         before = one.setpoint
     return found
 
@@ -201,8 +230,14 @@ def align(
         both = max(begin[0], end[0]), min(begin[1], end[1])
         drift, at_begin = 0.0, _middle(both)
         left = max(abs(bound - at_begin) for bound in (*begin, *end))
-        if left >= unaided.uncertainty:
-            return unaided
+    # before the first edges and after the last, the clocks may part further
+    steep = CLOCK_ERROR
+    if apart > 0:
+        parted = end[1] - begin[0] - drift * apart, begin[1] - end[0] + drift * apart
+        steep = min(steep, max(parted) / apart)
+    left += steep * max(_mean_time(first) - start, stop - _mean_time(last), 0.0)
+    if drift == 0.0 and left >= unaided.uncertainty:
+        return unaided
     return Alignment(at_begin - drift * (_mean_time(first) - start), drift, left)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.acquisition.alignment import CLOCK_ERROR
 from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
@@ -17,6 +18,10 @@ from tactile_lab.signals import AVERAGED
 
 if TYPE_CHECKING:  # compiled code, which a run without spikes does not load
     from tactile_lab.spikes.detector import Detector, ResetDetector
+
+LAG_WINDOW = 1.0
+"""Time over which the least lag of the samples behind this computer's clock is taken:
+how long transfer takes differs from block to block, s."""
 
 
 class FoundSpikes(NamedTuple):
@@ -40,6 +45,9 @@ class Intake:
     Attributes:
         spikes: number of spikes so far.
         produced: samples per channel the scope delivered.
+        late: by how much more the samples' times lag behind this computer's clock than
+            when the stream began, as the scope's clock is another one, s; never more
+            than two clocks part.
     """
 
     def __init__(self, live: Live) -> None:
@@ -55,6 +63,10 @@ class Intake:
         self.spikes = 0
         self._spike_times: list[float] = []
         self.produced = 0
+        self.late = 0.0
+        self._lags: list[float] = []
+        self._lag_at_begin: float | None = None
+        self._lags_since = 0.0
         self.overrange: dict[str, float] = {}
         """By signal that left its channel's range: until when at the latest, s."""
 
@@ -68,6 +80,14 @@ class Intake:
         """Run time just past the newest sample, s."""
         interval = self._stream.interval if self._stream else 0.0
         return self._start + self._expected * interval
+
+    def sampled(self, time: float) -> float:
+        """What the samples' clock shows at run time `time` s, about now, s."""
+        return time - self.late
+
+    def lacks(self, time: float) -> float:
+        """How much is still to come of the samples up to run time `time` s, s."""
+        return self.sampled(time) - self.reached
 
     def begin(
         self,
@@ -91,6 +111,8 @@ class Intake:
         self._row, self._scale = row, scale
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._journal = detector, journal
+        self.late, self._lags, self._lag_at_begin = 0.0, [], None
+        self._lags_since = start
         self._means = {
             channel.signal: ChannelMean(stream, start, channel.signal)
             for channel in stream.channels
@@ -116,6 +138,8 @@ class Intake:
             )
         self._expected = block.first + block.samples
         self.produced += block.samples
+        if self._stream.gapless:
+            self._note_lag(block.received - self._stream.started, self._stream.interval)
         for channel, over in zip(self._stream.channels, block.overrange, strict=True):
             if over:
                 self.overrange[channel.signal] = self.reached
@@ -156,6 +180,21 @@ class Intake:
             found = self._keep(self._detector.flush())
         self._stream, self._detector = None, None
         return found
+
+    def _note_lag(self, elapsed: float, interval: float) -> None:
+        """Follow the scope's clock: the newest samples came `elapsed` s after it began.
+
+        Records with gaps are dated one by one, so that nothing adds up.
+        """
+        streamed = self._expected * interval
+        self._lags.append(elapsed - streamed)
+        if self.reached - self._lags_since < LAG_WINDOW:
+            return
+        least, self._lags, self._lags_since = min(self._lags), [], self.reached
+        if self._lag_at_begin is None:
+            self._lag_at_begin = least
+        most = CLOCK_ERROR * streamed
+        self.late = min(max(least - self._lag_at_begin, -most), most)
 
     def _keep(self, found: NDArray[np.void]) -> FoundSpikes:
         if found.size == 0 or self._stream is None or self._journal is None:

@@ -185,6 +185,7 @@ class Runner:
         if coil is not None and drive is not None and drive.points is not None:
             self._start(coil, drive.points, drive.way)
         begin, start = self._begin(index, trial)
+        shown = self.intake.sampled(start)  # by the clock of the samples
         end = begin + trial.length
         # a current that waits for a person is watched as long as that takes
         skipped = self._play_current(drive, begin, math.inf if asked else end)
@@ -193,38 +194,39 @@ class Runner:
             self._pump.rest_until(end)
         else:
             scope.poll_at(end)
-            target = start + trial.length - 2 * self._program.interval
+            last = start + trial.length - 2 * self._program.interval
             grace = GRACE + 2 * self._record
-            self._pump.until(lambda: self.intake.reached >= target, end + grace)
-            if self.intake.reached < target:
+            self._pump.until(lambda: self.intake.lacks(last) <= 0, end + grace)
+            if (behind := self.intake.lacks(last)) > 0:
                 raise InstrumentError(
-                    f"The scope is {target - self.intake.reached:.3g} s of samples "
-                    f"behind at the end of a trial (limit {grace:g} s). Lower the "
-                    "sample rate or use a faster USB port."
+                    f"The scope is {behind:.3g} s of samples behind at the end of a "
+                    f"trial (limit {grace:g} s). Lower the sample rate or use a faster "
+                    "USB port."
                 )
         if asked is not None:
             self._ask_field(asked, trial, start)
         if coil is not None:  # its last point is 0 A and may outlast the trial
             self._pump.until(lambda: not coil.plays_list)
-        self._note_edges(start)
+        self._note_edges(shown)
         current = self._account.applied_since(begin)
-        self._compare(trial, start, current)
-        spikes = self.intake.spikes_between(start, start + trial.length)
+        self._compare(trial, start, shown, current)
+        ended = self.intake.sampled(start + trial.length)
+        spikes = self.intake.spikes_between(shown, ended)
         return Outcome(
             trial=trial,
             index=index,
             start=start,
-            spike_times=spikes - start,
+            spike_times=spikes - shown,
             current=current,
             rest=rest,
-            traces=self._live.traces(start, start + trial.length),
+            traces=self._live.traces(shown, ended),
             skipped=0 if coil is None else coil.skipped - skipped,
             codes=self._codes(),
             drift=drift,
         )
 
     def _compare(
-        self, trial: Trial, start: float, current: NDArray[np.float64]
+        self, trial: Trial, start: float, shown: float, current: NDArray[np.float64]
     ) -> None:
         """Warn where current, shunt and field of the trial do not fit together."""
         readings = self._account.fields_since(start)
@@ -235,7 +237,7 @@ class Runner:
             readings = []  # what a person types is doubted as it is typed
 
         def shunt(begin: float, end: float) -> float | None:
-            return self._live.levels(start + begin, start + end).get("coil_current")
+            return self._live.levels(shown + begin, shown + end).get("coil_current")
 
         for text in check.doubts(trial, current, shunt, readings):
             self._account.warn(text)
@@ -345,7 +347,7 @@ class Runner:
         if coil is not None and coil.plays_list and coil.list is not None:
             begin = coil.list.began
         start = self._account.axis(begin)
-        self.intake.forget_spikes_before(start)
+        self.intake.forget_spikes_before(self.intake.sampled(start))
         self._account.begun(index, trial, start)
         return begin, start
 
@@ -397,7 +399,7 @@ class Runner:
             self._account.note("warning", text)
 
     def _note_edges(self, start: float) -> None:
-        """Let the trial that began at `start` s of run time tell where clocks lie."""
+        """Let the trial, in the samples from `start` s on, tell where clocks lie."""
         shunt = None
         if "coil_current" in self._live.signals and not self._record:
             shunt = self._live.between(

@@ -46,6 +46,25 @@ def test_the_corrected_time_is_right_within_the_stated_uncertainty(
         assert abs(corrected - at) <= told.uncertainty + 2e-3
 
 
+@given(
+    drift=st.floats(-CLOCK_ERROR, CLOCK_ERROR),
+    seed=st.integers(0, 1000),
+    known=st.floats(1, 100),
+)
+def test_far_from_the_edges_that_tell_it_a_time_is_as_uncertain_as_clocks_are(
+    drift, seed, known
+):
+    """With all edges at its begin, an hour was said to be known as they are."""
+    rng = np.random.default_rng(seed)
+    times = np.sort(rng.uniform(0, known, 30))
+    before, after = rng.uniform(0, 0.02, (2, times.size))
+    told = align(edges(times, 0.0, drift, before, after), 0.0, 3600.0, 0.02)
+    for at in (0.0, 3600.0):
+        corrected = told.offset + at * (1 + drift) * (1 + told.drift)
+        assert abs(corrected - at) <= told.uncertainty + 1e-3
+    assert told.uncertainty <= 0.02 + CLOCK_ERROR * 3600
+
+
 def test_edges_that_contradict_each_other_are_not_believed():
     torn = [Edge(1.0, 0.99, 1.0), Edge(9.0, 9.2, 9.21), Edge(9.001, 9.0, 9.001)]
     told = align(torn, 0.0, 10.0, 0.003)
@@ -87,6 +106,21 @@ def test_an_edge_is_found_where_the_shunt_shows_it():
     assert edge.sampled == pytest.approx(0.5, abs=1e-3)
     assert edge.earliest == pytest.approx(0.488)
     assert edge.latest == pytest.approx(0.507)
+
+
+def test_edges_are_found_however_far_the_clocks_have_parted():
+    """At 50 ppm none was, after 400 s of one stream; here they part by 180 ms."""
+    drift, steps = 9e-5, 100.0 * np.arange(1, 21)
+    time = np.concatenate([s + np.arange(-1.0, 1.0, 1e-3) for s in steps])
+    level = np.searchsorted(steps, time / (1 + drift)) % 2 * 0.3
+    current = level.astype(np.float32)
+    bins = Trace.bins(time, current, current, current, 1e-3)
+    applied = [Applied(0.0, 0.01, 0.0, None)]
+    for number, at in enumerate(steps, 1):
+        applied.append(Applied(at - 0.03, at + 0.02, number % 2 * 0.3, None))
+    found = find_edges(applied, 0.0, bins)
+    shown = [edge.sampled for edge in found]
+    assert shown == pytest.approx(steps * (1 + drift), abs=2e-3)
 
 
 def test_a_drifting_sample_clock_stays_within_the_stored_uncertainty(run_scene):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benches import WITH_GAPS
 
-from tactile_lab.acquisition import events
+from tactile_lab.acquisition import events, runner
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.ring import Ring
 from tactile_lab.bench import Block, Channel, Stream
@@ -76,6 +76,28 @@ def test_watching_stops_when_asked_and_stores_nothing_of_itself(tmp_path, monkey
     assert ending.reason == "enough"
     assert monitor.sensor.distance == pytest.approx(0.37, abs=0.02)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scope_whose_clock_is_slow_is_watched_on(monkeypatch):
+    """At 50 ppm its samples were 2 s late after 11 hours, and that ended the run."""
+    monkeypatch.setattr(runner, "GRACE", 0.005)
+    overrides = (
+        "protocol.duration=180 s",
+        "protocol.part=60 s",
+        "record.sample_rate=1 kS/s",
+        "simulated.clock_error=8e-5",
+    )
+    trials = []
+
+    def emit(event):
+        if isinstance(event, events.TrialEnded):
+            trials.append(event.outcome)
+
+    monitor = Monitor(load("monitor", overrides), emit=emit)
+    ending = monitor.run()
+    assert ending.state is RunState.COMPLETE, ending.reason
+    spans = [one.traces["V_C1"][[0, -1], 0] for one in trials]
+    assert np.ravel(spans) == pytest.approx([0.0, 60.0] * 3, abs=0.03)
 
 
 def test_what_pushes_is_not_watched():
