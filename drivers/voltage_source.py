@@ -33,6 +33,9 @@ CATCH_UP = 0.1
 STEADY = 0.2
 """Time after a change of the set-point from which read-back must agree, s."""
 
+SAME_RANGE = 0.1
+"""Part of a range by which its name may differ from what it reaches: 2 V from 2.1 V."""
+
 DEVIATING_READINGS = 3
 """Readings in a row that must differ before it counts."""
 
@@ -98,8 +101,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
                 self._take_over()
             else:
                 wire.set_up(f"{self.name} might be no voltage, or another one")
-            for line in self.dialect.range_lines(self.limits.largest):
-                wire.command(line)
+            self._choose_range()
             if not self._on:
                 self._set(0.0)
             self._limit_current()
@@ -195,6 +197,29 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
                 "panel."
             )
         self._setpoint = held
+
+    def _choose_range(self) -> None:
+        """The finest range that reaches the limits, read back where the row says how.
+
+        Raises:
+            RefusedError: it stays in another.
+        """
+        row, wire = self.dialect, self._wire
+        full, found = row.range_for(self.limits).full, 0.0
+        for _ in range(2):  # a line may have been lost on the way
+            for line in row.range_lines(full):
+                wire.command(line)
+            if row.range_query is None:
+                return
+            found = wire.number(row.range_query)
+            if abs(found - full) <= SAME_RANGE * full:
+                return
+        raise RefusedError(
+            f"The source of {self.name} stays in its range of {show(found, 'V')} where "
+            f"that of {show(full, 'V')} was chosen: its steps and its error would not "
+            "be those of this run. Choose that range at its front panel, or correct "
+            "[[ranges]] of its row."
+        )
 
     def _limit_current(self) -> None:
         wire, most = self._wire, self.limits.compliance

@@ -169,6 +169,7 @@ class Keithley2400(VoltagePanel):
             "SOURce:VOLTage:MODE": one_of(keep("source"), "FIXed", "LIST", "SWEep"),
             "SOURce:VOLTage:MODE?": lambda _: self._modes["source"],
             "SOURce:VOLTage:RANGe": numeric(self._choose, -210.0, 210.0),
+            "SOURce:VOLTage:RANGe?": lambda _: f"{self._range:+.6E}",
             "SOURce:VOLTage[:LEVel]": numeric(self._level, -210.0, 210.0),
             "SOURce:VOLTage[:LEVel]?": lambda _: f"{self.setpoint:+.6E}",
             **Sensing().commands,
@@ -218,6 +219,7 @@ class RowVoltageSource(VoltagePanel):
         self.clearing = row.serial.preamble.encode("ascii")
         self._levels = (reader(row.set), self.set), (reader(row.limit), self.limit)
         self._chosen = reader(row.range or row.set)
+        self._range = row.ranges[-1].full
         self._told: deque[str] = deque()
         self._talk = RowParser(row, self._queries(), self._act, self._told)
 
@@ -233,6 +235,8 @@ class RowVoltageSource(VoltagePanel):
             row.limit_query: lambda: invented(one, f"{self.compliance:.9f}"),
             row.on_query: lambda: invented(on[0] if self.output_on else on[1]),
         }
+        if row.range_query is not None:
+            found[row.range_query] = lambda: invented(one, f"{self._range:.3f}")
         if row.measure_current == row.measure_voltage:
             # the order that both patterns of the rows that ship have
             return found | {row.measure_current: lambda: self._both("{:.6f},{:.9f}")}
@@ -252,7 +256,10 @@ class RowVoltageSource(VoltagePanel):
         if text in self._row.on or text in self._row.off:
             self.switch(text in self._row.on)
             return True
-        return self._row.range is not None and self._chosen(text) is not None
+        if self._row.range is None or (volts := self._chosen(text)) is None:
+            return False
+        self._range = next(one.full for one in self._row.ranges if volts <= one.full)
+        return True
 
 
 def voltage_far_end(

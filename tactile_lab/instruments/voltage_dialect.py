@@ -34,7 +34,9 @@ class VoltageDialect(SourceDialect):
     Attributes:
         current: largest compliance the model takes, A.
         ranges: its ranges, ascending.
-        range: line that chooses one by the largest voltage wanted; None: by itself.
+        range: line that chooses one by the largest voltage it sets; None: by itself.
+        range_query: asks for that voltage, or the range's name in volts; None where
+            nobody can.
     """
 
     role: Literal["voltage source"]
@@ -43,6 +45,7 @@ class VoltageDialect(SourceDialect):
         min_length=1
     )
     range: str | None = None
+    range_query: str | None = None
 
     def try_templates(self, where: str) -> None:
         """Fill in every template with extremes.
@@ -71,7 +74,7 @@ class VoltageDialect(SourceDialect):
         return self.limit.format(i=current)
 
     def range_lines(self, volts: float) -> tuple[str, ...]:
-        """Lines that choose the range for `volts`, V."""
+        """Lines that choose the range that reaches `volts`, V."""
         return () if self.range is None else (self.range.format(v=volts),)
 
     def range_for(self, limits: VoltageLimits) -> VoltageRange:

@@ -8,6 +8,7 @@ import pytest
 
 from drivers.voltage_source import STEP_EVERY, SourceMeter
 from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.scpi import ScpiParser, numeric
 from sim_backend.serial_line.wires import FarEnd, plug_in
 from sim_backend.serve import Gate, ServedBench
 from sim_backend.voltage_source import (
@@ -83,6 +84,29 @@ def test_it_ramps_within_its_slew_holds_and_goes_to_rest(wired):
     limit = next(i for i, one in enumerate(wired.panel.changes) if one[0] == "limit")
     on = wired.panel.changes.index(next(c for c in wired.panel.changes if c[2] == 1.0))
     assert limit < on, "the compliance comes before the output"
+
+
+def test_a_range_that_was_not_taken_is_sent_again_and_then_refused(wired):
+    """Steps of 500 uV stood as 50 uV; nobody asked."""
+    panel, choose, lost = wired.panel, wired.panel._choose, [1]
+
+    def loses(volts):
+        if lost.pop() if lost else False:
+            return
+        choose(volts)
+
+    panel._range = 21.0
+    panel.parser = ScpiParser(
+        {**panel._commands(), "SOURce:VOLTage:RANGe": numeric(loses, -210.0, 210.0)}
+    )
+    wired.source.open()
+    assert panel._range == 2.1
+    wired.source.close()
+    panel._range, lost[:] = 21.0, [1, 1]
+    with pytest.raises(
+        RefusedError, match="stays in its range of 21 V where that of 2"
+    ):
+        wired.again().open()
 
 
 def test_what_lies_beyond_the_limits_is_never_sent(wired):
