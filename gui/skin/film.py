@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.model.circuit import FloatArray
 from tactile_lab.skin.events import EVENT, Events
+from tactile_lab.skin.kernel import STUCK
 
 DOTS = 40_000
 """Most dots of the raster; of more spikes every second, every fourth, ... is drawn."""
@@ -56,7 +57,7 @@ class Film:
 
     Attributes:
         stretch: time that one picture tells of, s.
-        most: spikes of the fullest taxel in a stretch.
+        most: spikes of the fullest taxel in a stretch, of those that are not stuck.
         dots: for the raster.
     """
 
@@ -66,7 +67,7 @@ class Film:
         self.dots, self.most = Dots(), 1
         self._size = events.places.shape[0]
         self._starts: list[float] = []
-        total = events.time.shape[0]
+        total, free = events.time.shape[0], events.role != STUCK
         open_, count = 0, np.zeros(self._size, np.int64)
         for first in range(0, total, STEP):
             time = events.time[first : first + STEP]
@@ -77,7 +78,7 @@ class Film:
                 if stretch != open_:
                     open_, count = stretch, np.zeros(self._size, np.int64)
                 count += np.bincount(taxel[number == stretch], minlength=self._size)
-                self.most = max(self.most, int(count.max()))
+                self.most = max(self.most, int(count[free].max(initial=0)))
 
     def counts(self, at: float) -> NDArray[np.int64]:
         """Spikes of each taxel in the stretch before `at` s."""

@@ -13,6 +13,7 @@ from gui.look.theme import Theme
 from gui.plots.axis import Line, RoundAxis, guarded, stroke
 from gui.skin.film import pixels
 from tactile_lab.model.circuit import FloatArray
+from tactile_lab.skin.layout import Array
 
 MM = 1e3
 FOOT, LEFT, BAR = 38, 56, 62
@@ -60,16 +61,20 @@ class View(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 class TaxelMap(View):
     """Every taxel where it lies, coloured by its rate; with the bar of colours.
 
+    What is dead has no colour and is crossed out, what is stuck is framed: shapes can
+    be told apart without colours, and of the two tones of a frame one stands out from
+    any colour of the map.
+
     Args:
         theme: of the window.
-        places: of the taxels, shape (n, 2), m.
-        side: of a taxel, m.
+        array: of the taxels.
     """
 
-    def __init__(self, theme: Theme, places: FloatArray, side: float) -> None:
+    def __init__(self, theme: Theme, array: Array) -> None:
         super().__init__(theme, "x (mm)", "y (mm)", "Map of the taxels")
+        places, side = array.places, array.side
         self._which, (x, y, wide, high) = pixels(places, side)
-        self._beside = self._which < 0
+        self._blank = (self._which < 0) | array.named(array.dead)[self._which]
         self.picture = Picture(axisOrder="col-major")
         self.picture.setColorMap(pg.colormap.get("viridis"))
         self._place = QRectF(MM * x, MM * y, MM * wide, MM * high)
@@ -86,7 +91,20 @@ class TaxelMap(View):
         )
         self.bar.setMinimumWidth(BAR)
         self.ci.addItem(self.bar, 0, 2)
+        mm = MM * side
+        self.cross = self._marks("x", 0.5 * mm, MM * places[array.named(array.dead)])
+        stuck = MM * places[array.named(array.stuck)]
+        self.frames = [self._marks("s", part * mm, stuck) for part in (0.92, 0.76)]
         self.dress()
+
+    def _marks(
+        self, symbol: str, size: float, places: FloatArray
+    ) -> pg.ScatterPlotItem:
+        """Marks at places, mm, that grow with the map."""
+        made = pg.ScatterPlotItem(symbol=symbol, size=size, pxMode=False)
+        made.setData(places[:, 0], places[:, 1])
+        self.box.addItem(made, ignoreBounds=True)
+        return made
 
     def dress(self) -> None:
         """Take on the theme's colours."""
@@ -97,11 +115,16 @@ class TaxelMap(View):
         axis.setTextPen(tokens.muted)
         axis.setPen(tokens.border_strong)
         axis.setLabel("Rate (Hz)", color=tokens.muted, **{"font-size": "12px"})
+        self.cross.setPen(None)
+        self.cross.setBrush(QColor(tokens.muted))
+        for frame, colour in zip(self.frames, (tokens.text, tokens.plot), strict=True):
+            frame.setPen(stroke(colour, 2.0))
+            frame.setBrush(None)
 
     def show_rates(self, rates: FloatArray, most: float) -> None:
         """Show the rate of each taxel, Hz, NaN for none yet; `most` is full colour."""
         image = rates[self._which]
-        image[self._beside] = np.nan
+        image[self._blank] = np.nan
         self.picture.setImage(
             image, levels=(0.0, most), autoLevels=False, rect=self._place
         )

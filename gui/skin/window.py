@@ -18,6 +18,7 @@ from gui.skin.views import Raster, TaxelMap
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count, show
 from tactile_lab.skin.events import FILE, Events
+from tactile_lab.skin.layout import Array
 from tactile_lab.skin.skin import Skin, load_skin
 
 FRAME = 33
@@ -88,7 +89,7 @@ class SkinWindow(QWidget):
         self.film: Film | None = None
         self._dots, self._rates = Dots(), np.full(skin.array.size, np.nan)
         self._at, self._last = 0.0, 0.0
-        self.map = TaxelMap(theme, skin.array.places, skin.array.side)
+        self.map = TaxelMap(theme, skin.array)
         self.raster = Raster(theme, skin.duration, skin.array.size)
         self.play = IconButton(theme, "play", "Play (Space)", checkable=True)
         self.slider = QSlider(Qt.Orientation.Horizontal)
@@ -107,7 +108,11 @@ class SkinWindow(QWidget):
         self.warning.setVisible(bool(warnings))
         about = f"{skin.array.size:,} taxels · {show(skin.duration, 's')} · simulated"
         both = QSplitter(Qt.Orientation.Horizontal)
-        both.addWidget(self.map)
+        left = QWidget()
+        self.marks = label(marked(skin.array), "muted", wrap=True)
+        self.marks.setVisible(bool(self.marks.text()))
+        column(left, (self.map, 1), self.marks)
+        both.addWidget(left)
         both.addWidget(self.raster)
         both.setSizes([520, 640])
         column(
@@ -197,7 +202,9 @@ class SkinWindow(QWidget):
 
     def _show_computed(self) -> None:
         """Mean rates and spikes of the taxels that are computed so far."""
-        self.map.show_rates(self._rates, max(1.0, float(np.nanmax(self._rates))))
+        free = self._rates[~self._skin.array.named(self._skin.array.stuck)]
+        most = np.nanmax(free, initial=1.0)
+        self.map.show_rates(self._rates, float(most))
         self.raster.show_dots(*self._dots.points)
         self.numbers.set_whole(
             f"{self.progress.value():,} of {self._skin.array.size:,} taxels computed, "
@@ -225,3 +232,12 @@ class SkinWindow(QWidget):
         self._last = wall.monotonic()
         if on and self._at >= self._skin.duration:
             self.show_time(0.0)
+
+
+def marked(array: Array) -> str:
+    """What the marks of a map mean; "" where nothing is marked."""
+    dead, stuck = len(array.dead), len(array.stuck)
+    said = [f"✕ dead ({dead:,})"] if dead else []
+    if stuck:
+        said.append(f"▢ stuck ({stuck:,}), left out of full colour")
+    return " · ".join(said)

@@ -84,6 +84,39 @@ def test_the_map_shows_the_spikes_before_the_moment(lab, folder, events):
     window.close()
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_dead_and_stuck_taxels_are_marked_and_told(lab, tmp_path, theme):
+    asked = BALL.replace("stuck = [3]", "stuck = [3]\ndead = [7, 12]")
+    asked = asked.replace("100 Hz", "1 kHz")
+    (tmp_path / "ball.toml").write_text(asked)
+    lab.window.theme.choose(theme)
+    try:
+        window = shown(lab, tmp_path / "ball.toml", tmp_path)
+        assert window.marks.text() == (
+            "✕ dead (2) · ▢ stuck (1), left out of full colour"
+        )
+        places = 1e3 * window._skin.array.places
+        crossed = np.column_stack(window.map.cross.getData())
+        np.testing.assert_allclose(crossed, places[[7, 12]])
+        for frame in window.map.frames:
+            np.testing.assert_allclose(np.column_stack(frame.getData()), places[[3]])
+        assert window.film.most < 1000 * window.film.stretch, "the stuck one's"
+        window.show_time(0.3)
+        image, which = window.map.picture.image, window.map._which
+        assert np.isnan(image[(which == 7) | (which == 12)]).all()
+        assert not np.isnan(image[which == 3]).any()
+        window.close()
+    finally:
+        lab.window.theme.choose("light")
+
+
+def test_nothing_is_said_of_marks_where_there_are_none(lab, tmp_path):
+    (tmp_path / "ball.toml").write_text(BALL.replace("stuck = [3]", ""))
+    window = shown(lab, tmp_path / "ball.toml", tmp_path)
+    assert window.marks.isHidden()
+    window.close()
+
+
 def test_play_moves_on_to_the_end_and_stops_there(lab, folder, events):
     window = shown(lab, folder / "pressed", folder)
     window.speed.setCurrentText("10 × faster")
