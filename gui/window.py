@@ -120,6 +120,7 @@ class Window(QMainWindow):
         tools = self.centre.tools
         watching = self.session.monitor.alive
         tools.monitor.setEnabled(watching or snapshot.state is WindowState.READY)
+        self._render_tools()
         if focus is not None and not (focus.isEnabled() and focus.isVisible()):
             # what had it is locked or gone: Space shall not press what comes next
             self.page.setFocus()
@@ -129,7 +130,12 @@ class Window(QMainWindow):
         """Render what changes all the time: header, STOP, manual."""
         self.header.render_snapshot(snapshot)
         self._render_manual(snapshot)
+        self._render_tools()
         self._render_closing(snapshot)
+
+    def _render_tools(self) -> None:
+        live = self.screen_.live
+        self.centre.tools.show_possible(growing=live is not None and live.running)
 
     def _render_closing(self, snapshot: Snapshot) -> None:
         self.closing.render_snapshot(snapshot, busy=self.session.busy)

@@ -199,6 +199,11 @@ class PlanSource(Source):
         self.length, self.holds = preview.length, preview.holds
         self.twin_spikes = preview.spikes
 
+    @property
+    def has_model(self) -> bool:
+        """Whether the plan was computed with the sensor."""
+        return bool(self.preview.traces)
+
     def modelled(self, signal: str, start: float, end: float, count: int) -> Trace:
         """The model's."""
         if signal not in self.preview.traces:
@@ -242,6 +247,12 @@ class LiveSource(Source):
         self._slow = {name: Readings() for name in ("force", *AVERAGED)}
         self._spikes = np.empty(1024)
         self._spike_count = 0
+
+    @property
+    def has_model(self) -> bool:
+        """Whether there is a plan with the sensor, or the twin has begun."""
+        planned = self.preview is not None and bool(self.preview.traces)
+        return planned or self.model.end > 0
 
     @property
     def reach(self) -> float:

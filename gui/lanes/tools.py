@@ -88,6 +88,20 @@ class Tools(QWidget):
         if self.monitor.isChecked() is not on:
             self.monitor.setChecked(on)
 
+    def show_possible(self, *, growing: bool) -> None:
+        """Offer what means something for what the lanes show; `growing`: it goes on."""
+        model = self._stack.source.has_model
+        for button, possible in (
+            (self.follow, growing),
+            (self.freeze, growing),
+            (self.twin, model),
+            (self.residual, model and self._stack.row("residual") is not None),
+        ):
+            if button.isEnabled() is not possible:
+                if button.hasFocus():
+                    button.clearFocus()  # or Qt would give it to what comes next
+                button.setEnabled(possible)
+
     def bring(self, which: int) -> None:
         """Bring cursor A (0) or B (1) to the middle of the view."""
         if self._view.cursors is None:

@@ -62,7 +62,7 @@ QLabel[role="hvalue"] { color: $header_text; font-weight: 600; font-size: 15px; 
 QLabel[role="sim"] { background: #F5A524; color: #241500; font-weight: 700;
   font-size: 10px; border-radius: 3px; padding: 3px 7px; letter-spacing: 1px; }
 
-QPushButton, QToolButton { background: $panel; border: 1px solid $border_strong;
+QPushButton, QToolButton { background: $panel; border: 1px solid $control;
   border-radius: 6px; padding: 5px 12px; min-height: 20px; font-weight: 500; }
 QPushButton:hover, QToolButton:hover { background: $sunken; border-color: $accent; }
 QPushButton:pressed, QToolButton:pressed { background: $selected; }
@@ -95,13 +95,15 @@ QToolButton[role="toggle"][alone="true"] { padding: 4px; }
 QToolButton[role="toggle"]:hover { background: $sunken; border-color: $border; }
 QToolButton[role="toggle"]:checked { background: $selected; color: $selected_text;
   border-color: $selected; }
+QToolButton[role="toggle"]:disabled, QToolButton[role="toggle"]:checked:disabled {
+  background: transparent; color: $faint; border-color: transparent; }
 QToolButton[role="toggle"]:focus { border: 2px solid $accent; padding: 4px 8px; }
 QFrame[role="segments"] { background: $sunken; border: 1px solid $border;
   border-radius: 6px; }
 QToolButton[role="segment"] { background: transparent; border: 1px solid transparent;
   border-radius: 5px; padding: 3px 9px; }
 QToolButton[role="segment"]:checked { background: $panel;
-  border: 1px solid $border_strong; font-weight: 600; }
+  border: 1px solid $control; font-weight: 600; }
 QToolButton[role="segment"]:focus { border: 2px solid $accent; padding: 2px 8px; }
 QToolButton[role="section"] { background: transparent; border: 1px solid transparent;
   padding: 3px 4px; font-size: 11px; font-weight: 600; color: $muted; }
@@ -117,7 +119,7 @@ QToolButton[role="tab"]:focus { border: 2px solid $accent; border-radius: 5px;
   padding: 6px 8px 8px 8px; }
 
 QLineEdit, QPlainTextEdit, QComboBox, QAbstractSpinBox { background: $field;
-  border: 1px solid $border_strong; border-radius: 6px; padding: 3px 8px;
+  border: 1px solid $control; border-radius: 6px; padding: 3px 8px;
   min-height: 22px; selection-background-color: $accent;
   selection-color: $on_accent; }
 QLineEdit, QPlainTextEdit { placeholder-text-color: $muted; }
@@ -144,10 +146,10 @@ QCheckBox::indicator:checked { background: $accent; border-color: $accent;
 
 QScrollArea, QScrollArea > QWidget > QWidget { background: transparent; border: 0; }
 QScrollBar:vertical { background: transparent; width: 10px; margin: 0; }
-QScrollBar::handle:vertical { background: $border_strong; border-radius: 4px;
+QScrollBar::handle:vertical { background: $control; border-radius: 4px;
   min-height: 30px; margin: 1px 2px; }
 QScrollBar:horizontal { background: transparent; height: 10px; margin: 0; }
-QScrollBar::handle:horizontal { background: $border_strong; border-radius: 4px;
+QScrollBar::handle:horizontal { background: $control; border-radius: 4px;
   min-width: 30px; margin: 2px 1px; }
 QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
 QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
@@ -178,7 +180,7 @@ QProgressBar { background: $sunken; border: 0; border-radius: 3px; max-height: 6
   min-height: 6px; }
 QProgressBar::chunk { background: $accent; border-radius: 3px; }
 QSlider { min-height: 22px; background: transparent; }
-QSlider::groove:horizontal { background: $border_strong; height: 4px;
+QSlider::groove:horizontal { background: $control; height: 4px;
   border-radius: 2px; }
 QSlider::handle:horizontal { background: $accent; border: 2px solid $panel;
   width: 16px; height: 16px; margin: -8px 0; border-radius: 10px; }

@@ -27,6 +27,7 @@ class Tokens:
     field: str = _both("#FFFFFF", "#1A2433")
     border: str = _both("#DCE2E9", "#243040")
     border_strong: str = _both("#B9C3CE", "#3B4A5F")
+    control: str = _both("#7F8C9C", "#667992")
     text: str = _both("#16202B", "#E7EDF4")
     muted: str = _both("#566374", "#9DACBE")
     faint: str = _both("#8B97A5", "#6F7F93")

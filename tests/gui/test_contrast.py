@@ -121,6 +121,18 @@ def test_what_is_disabled_is_told_apart(tokens: Tokens) -> None:
 
 
 @both
+def test_the_edge_of_every_control_stands_out(tokens: Tokens) -> None:
+    """WCAG 2.1, 1.4.11; borders as the style sheet has them."""
+    for ground in ("page", "panel", "sunken", "field"):
+        ratio = contrast(tokens.control, getattr(tokens, ground))
+        assert ratio >= DRAWN, (ground, round(ratio, 2))
+    text = sheet(tokens)
+    for one in ("QLineEdit, QPlainTextEdit, QComboBox", "QPushButton, QToolButton"):
+        body = re.search(rf"\n{re.escape(one)}[^{{}}]*\{{([^}}]*)\}}", text)
+        assert body is not None and f"border: 1px solid {tokens.control}" in body[1]
+
+
+@both
 def test_all_that_is_plotted_stands_out(tokens: Tokens) -> None:
     for name in (*TRACES, *OTHERS):
         for ground in ("plot", "panel", "sunken", "band", "ahead"):

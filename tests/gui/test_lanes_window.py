@@ -66,11 +66,11 @@ def test_a_press_on_stop_acts_there_through_an_open_menu(lab, apart) -> None:
 
 def test_keys_act_there(lab, apart) -> None:
     tools = lab.window.centre.tools
-    before = tools.twin.isChecked()
+    before = tools.zoom.isChecked()
     assert lab.app.focusWidget() is apart  # not STOP, which Space would press
-    QTest.keyClick(apart, Qt.Key.Key_M)
-    assert tools.twin.isChecked() is not before
-    QTest.keyClick(apart, Qt.Key.Key_M)
+    QTest.keyClick(apart, Qt.Key.Key_Z)
+    assert tools.zoom.isChecked() is not before
+    QTest.keyClick(apart, Qt.Key.Key_Z)
     QTest.keyClick(apart, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert lab.window.apart is None
 

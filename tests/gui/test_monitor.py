@@ -11,14 +11,19 @@ def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     assert "mV" in window.centre.monitor_bar.words
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert keys == ["V_C1", "V_C2", "V_K", "spikes", "rate"]
+    tools = window.centre.tools
+    assert tools.freeze.isEnabled() and tools.follow.isEnabled()
+    assert not tools.twin.isEnabled() and not tools.residual.isEnabled()
     assert session.state is WindowState.READY
     assert window.header.stop.truth is CoilKnowledge.OFF
     session.out.mkdir(exist_ok=True)
     before = set(session.out.iterdir())
     window.setup.run.click()
     lab.until(lambda: session.state is WindowState.RUNNING)
+    lab.until(lambda: tools.twin.isEnabled() and tools.residual.isEnabled())
     assert not session.monitor.alive, "the scope is handed over before the run"
     lab.until(lambda: session.state in (WindowState.READY, WindowState.FAULT))
+    lab.until(lambda: not (tools.follow.isEnabled() or tools.freeze.isEnabled()))
     new = set(session.out.iterdir()) - before
     assert len(new) == 1, "watching keeps nothing"
 

@@ -20,16 +20,16 @@ from gui.app import FRAME, fit
 
 def test_letters_are_shortcuts_only_outside_text_fields(lab) -> None:
     window = lab.window
-    before = window.centre.tools.twin.isChecked()
+    before = window.centre.tools.zoom.isChecked()
     window.centre.log.note.setFocus()
-    QTest.keyClicks(window.centre.log.note, "mmm")
-    assert window.centre.tools.twin.isChecked() is before
-    assert window.centre.log.note.text() == "mmm"
+    QTest.keyClicks(window.centre.log.note, "zzz")
+    assert window.centre.tools.zoom.isChecked() is before
+    assert window.centre.log.note.text() == "zzz"
     window.centre.log.note.clear()
     window.centralWidget().setFocus()
-    QTest.keyClick(window, Qt.Key.Key_M)
-    assert window.centre.tools.twin.isChecked() is not before
-    QTest.keyClick(window, Qt.Key.Key_M)
+    QTest.keyClick(window, Qt.Key.Key_Z)
+    assert window.centre.tools.zoom.isChecked() is not before
+    QTest.keyClick(window, Qt.Key.Key_Z)
 
 
 def test_cursors_are_readable_as_text(lab) -> None:
