@@ -9,7 +9,7 @@ from gui.session.live_task import LiveTask
 from gui.session.log import Log, Severity
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import Ending
-from tactile_lab.acquisition.events import CoilCurrent, RunState, StateChanged
+from tactile_lab.acquisition.events import CoilCurrent, Message, RunState, StateChanged
 from tactile_lab.engine.commands import begin_manual, hold, renew
 from tactile_lab.engine.events import Samples, TaskEvent
 from tactile_lab.engine.link import Link
@@ -54,6 +54,8 @@ class LiveManual(LiveTask):
         elif isinstance(event, CoilCurrent):
             self._status.coil.sign_of_life()
             self._see(event)
+        elif isinstance(event, Message):
+            self._log.add(Severity.WARNING, "coil", event.text)
         elif isinstance(event, Samples):
             self.say(renew)
 

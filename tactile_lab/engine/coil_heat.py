@@ -15,10 +15,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from tactile_lab.bench import CoilLimits
+from tactile_lab.bench import Bench, CoilLimits
 from tactile_lab.errors import LimitError
 from tactile_lab.lab import state_folder
 from tactile_lab.planning.heat import cool_down
+from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock, replacing
 
 BOOT = Path("/proc/sys/kernel/random/boot_id")
@@ -41,6 +42,19 @@ class CoilHeat:
         self._limits = limits
         self._longest = self.after(limits.heat)
         self.path = state_folder() / "coils" / f"{quote(port, safe='')}.json"
+
+    @classmethod
+    def of(cls, scene: Scene, bench: Bench) -> CoilHeat | None:
+        """Of the coil that a bench has; None of a simulated one, which is always new.
+
+        Args:
+            scene: its bench file names the coil's port and limits.
+            bench: made of it.
+        """
+        coil = scene.bench.coil
+        if bench.simulated or bench.coil is None or coil is None:
+            return None
+        return cls(coil.port, coil.limits)
 
     def after(self, heat: float) -> float:
         """Time until it counts as cold with that heat, A^2 s, in s."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from tactile_lab.acquisition.events import Message
 from tactile_lab.engine.engine import ServedTask
 from tactile_lab.engine.request import Request
+from tactile_lab.errors import LimitError
 
 if TYPE_CHECKING:
     from tactile_lab.engine.execution import Execution
@@ -113,8 +114,15 @@ def answer(served: ServedTask, text: str) -> None:
 
 
 def hold(served: ServedTask, current: float) -> None:
-    """Have the coil driven by hand go to `current`, A, and stay."""
-    served.to_task(lambda control: control.hold(current))
+    """Have the coil driven by hand go to `current`, A, and stay, or say why not."""
+
+    def go(control: ManualControl) -> None:
+        try:
+            control.hold(current)
+        except LimitError as reason:
+            served.emit(Message("warning", str(reason)))
+
+    served.to_task(go)
 
 
 def renew(served: ServedTask) -> None:

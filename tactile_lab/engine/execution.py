@@ -100,7 +100,7 @@ class Execution(Task[Executed]):
         self._ask = ask
         self._asked_field = asked_field
         self._check_somebody_is_there()
-        self._heat = self._coil_heat()
+        self._heat = CoilHeat.of(scene, used)
         if self._heat is not None:
             self._heat.left()  # what cannot be told is refused here
         self._search = SpikeSearch.of(scene, self.needs.detect_on)
@@ -182,13 +182,6 @@ class Execution(Task[Executed]):
             duration=runner.duration,
             took=took,
         )
-
-    def _coil_heat(self) -> CoilHeat | None:
-        """What is kept of the coil's heat; simulated coils are new with each run."""
-        coil = self.scene.bench.coil
-        if self.bench.simulated or not self.needs.coil or coil is None:
-            return None
-        return CoilHeat(coil.port, coil.limits)
 
     def _let_cool(self) -> None:
         """Wait until a coil that was heated before is as cold as plans take it to be.

@@ -14,15 +14,20 @@ from __future__ import annotations
 import statistics
 from dataclasses import dataclass
 
+import numpy as np
+
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.stop import Lease
 from tactile_lab.bench import Bench, OffReport
 from tactile_lab.engine.bench import open_bench
+from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.task import Task
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.planning.heat import heat_along, heat_left
 from tactile_lab.planning.needs import needs
+from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.waveform import Waveform
 
@@ -35,7 +40,7 @@ class ManualControl(Task[Ending]):
     """Holds the coil at a current until told otherwise; it begins with the output off.
 
     Whoever holds it calls `renew` at least every 2 s; else the coil's thread switches
-    off.
+    off. How warm a real coil is left is kept for whoever drives it next.
 
     Args:
         scene: names the bench.
@@ -45,6 +50,7 @@ class ManualControl(Task[Ending]):
 
     Raises:
         SceneError: the bench has no coil.
+        LimitError: how warm its coil is cannot be told.
     """
 
     def __init__(
@@ -59,6 +65,11 @@ class ManualControl(Task[Ending]):
         super().__init__(scene, used, events.until_it_fails(emit))
         if self.bench.coil is None:
             raise SceneError("This bench has no coil source to drive by hand.")
+        self._limits = self.bench.coil.limits
+        self._heat = CoilHeat.of(scene, used)
+        self._left = self._heat.left() if self._heat else 0.0
+        self._began = self.bench.clock.now()
+        self._steps = [(0.0, 0.0)]
         self._lease = Lease(
             self.bench.clock,
             holder=("Whoever drives the coil by hand", "a window or script that hangs"),
@@ -78,7 +89,18 @@ class ManualControl(Task[Ending]):
         self._lease.renew()
 
     def hold(self, current: float) -> None:
-        """Go to `current`, A, as fast as the slew limit lets it, and stay."""
+        """Go to `current`, A, as fast as the slew limit lets it, and stay.
+
+        Raises:
+            LimitError: it would heat a coil that is still warm from whoever drove it
+                before: the driver counts the heat of this time alone.
+        """
+        warm = self._left - self._since(self.bench.clock.now())
+        if warm > 0 and abs(current) > self._limits.continuous:
+            raise LimitError(
+                f"The coil is still warm: {show(current, 'A')} may flow in {warm:.0f} "
+                f"s, until then {show(self._limits.continuous, 'A')} at most."
+            )
         if not self._energised:
             self.thread.energise()
             self._energised = True
@@ -86,6 +108,34 @@ class ManualControl(Task[Ending]):
 
     def run(self) -> Ending:
         """Open the source and follow the coil until `stop`, or until it fails."""
+        if self._heat is None:
+            return self._followed()
+        try:
+            with self._heat.heating() as alone:
+                ending = self._followed()
+                if alone:
+                    self._keep(self._heat, ending)
+                return ending
+        except LimitError as reason:
+            return Ending.refused(str(reason))
+
+    def _keep(self, heat: CoilHeat, ending: Ending) -> None:
+        """Keep how warm the coil is left; as hot as may be where it may still flow."""
+        limits = self._limits
+        used = limits.heat
+        if ending.off.verified:
+            end = self._since(self.bench.clock.now())
+            flowed = Waveform.stairs(np.array(self._steps), end)
+            used = heat_along(flowed, limits, heat_left(self._left, limits))[0]
+        try:
+            heat.keep(heat.after(min(used, limits.heat)))
+        except LimitError as reason:  # the coil's state comes first
+            self._emit(events.Message("warning", str(reason)))
+
+    def _since(self, time: float) -> float:
+        return time - self._began
+
+    def _followed(self) -> Ending:
         coil, told = self.thread, False
         self._lease.renew()
         coil.start()
@@ -97,6 +147,8 @@ class ManualControl(Task[Ending]):
                 self._emit(events.StateChanged(events.RunState.READY, "source opened"))
             for one in coil.take_applied():
                 self._emit(events.CoilCurrent(one.time, one.setpoint, one.measured))
+                if self._steps[-1][1] != one.setpoint:
+                    self._steps.append((self._since(one.time), one.setpoint))
         off = coil.off or OffReport(False, None, "The coil's thread said nothing.")
         if coil.failure is not None:
             why = str(coil.failure)

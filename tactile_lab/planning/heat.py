@@ -24,6 +24,13 @@ def cool_down(used: float, limits: CoilLimits) -> float:
     return limits.recovery * math.log(used / (COLD * limits.heat))
 
 
+def heat_left(time: float, limits: CoilLimits) -> float:
+    """Heat of a coil that counts as cold in `time` s, A^2 s; 0 where it does now."""
+    if time <= 0:
+        return 0.0
+    return COLD * limits.heat * math.exp(time / limits.recovery)
+
+
 def heat_along(
     current: Waveform, limits: CoilLimits, used: float = 0.0
 ) -> tuple[float, float, float | None]:

@@ -83,6 +83,47 @@ def switched_on(source: Source, to: bool = True) -> list[float]:
     ]
 
 
+BY_HAND = """
+import json, sys
+from tactile_lab.acquisition.events import CoilCurrent
+from tactile_lab.engine.manual import ManualControl
+from tactile_lab.errors import LimitError
+from tactile_lab.scene.load import load
+
+def heard(event):
+    if isinstance(event, CoilCurrent):
+        hand.renew()
+        if event.setpoint > 0.2:
+            hand.stop("hot enough")
+    elif event.text == "source opened":
+        try:
+            hand.hold(0.3)
+        except LimitError as reason:
+            print(reason)
+            hand.stop("warm")
+
+scene = load("demo", json.loads(sys.argv[2]), sys.argv[1])
+hand = ManualControl(scene, emit=heard)
+print(hand.run().off.verified)
+"""
+
+
+def test_what_was_heated_by_hand_is_hot_for_the_next_program(source: Source):
+    """Its heat was forgotten, and counted from nothing by whoever came next."""
+    bench = source.bench.read_text().replace("0.02 A^2 s", "0.1 A^2 s")
+    source.bench.write_text(bench.replace('"1 s"', '"600 s"'))
+    said = []
+    for _ in range(2):
+        asked = [sys.executable, "-c", BY_HAND, str(source.bench), json.dumps(SHORT)]
+        said.append(subprocess.run(asked, stdout=-1, text=True))
+    assert said[0].stdout == "True\n"
+    assert heat_of(source).left() > 100.0
+    first, second = said[1].stdout.splitlines()
+    assert "still warm: 300 mA may flow in" in first and "50 mA at most" in first
+    assert second == "True"
+    assert len(switched_on(source)) == 1
+
+
 LONGEST = 600.0 * math.log(100)
 
 

@@ -5,7 +5,7 @@ from PySide6.QtTest import QTest
 
 from gui.state import CoilKnowledge, WindowState, truth
 from tactile_lab.acquisition.ending import CoilState, Ending
-from tactile_lab.acquisition.events import CoilCurrent, RunState
+from tactile_lab.acquisition.events import CoilCurrent, Message, RunState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine.commands import renew
 from tactile_lab.engine.events import Ended, Samples
@@ -196,3 +196,9 @@ def test_the_lanes_show_the_coil_while_it_is_driven_by_hand(lab) -> None:
     assert not source.running
     lab.complete_run()
     assert session.source is session.run.source, "the next run takes the lanes"
+
+
+def test_a_current_that_a_warm_coil_is_refused_is_told(lab) -> None:
+    manual = lab.session.manual
+    manual.hear(Message("warning", "The coil is still warm: 1 A may flow in 90 s."))
+    assert "still warm" in lab.session.log.lines[-1].text
