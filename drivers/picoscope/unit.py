@@ -164,7 +164,7 @@ class ScopeUnit:
         """Let go of the handle; idempotent.
 
         Raises:
-            TactileLabError: the unit is there but could not be closed.
+            RefusedError: the unit is there but could not be closed.
         """
         if self._calls is None or not self._handle:
             return
@@ -173,7 +173,11 @@ class ScopeUnit:
         self._memory.clear()
         self._calls.released()
         if code not in status.DEAD | {status.OK}:
-            raise status.failure(code, "Closing the scope")
+            raise RefusedError(
+                f"The scope was not let go of: {status.describe(code)}. What it had "
+                "delivered is kept. If it cannot be opened again, pull its USB cable "
+                "and put it back."
+            )
 
     def _acknowledged(self, code: int, doing: str) -> tuple[str, ...]:
         """Answer power states, of which one may follow another, until it is ready."""

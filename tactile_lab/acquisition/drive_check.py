@@ -76,7 +76,7 @@ class DriveCheck:
         held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
         steady = held.size and np.ptp(held[:, 1]) <= STEADY * np.abs(held[:, 1]).max()
         if not steady:
-            begin, end = _moving(current)
+            begin, end = _moving(current, trial.length)
             held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
         if held.size == 0:
             return []
@@ -119,12 +119,16 @@ class DriveCheck:
         )
 
 
-def _moving(current: NDArray[np.float64]) -> tuple[float, float]:
-    """From the first current that flows until field and shunt are at rest again, s."""
+def _moving(current: NDArray[np.float64], length: float) -> tuple[float, float]:
+    """From the first current that flows until field and shunt are at rest again, s.
+
+    Nothing is known of what comes after a trial of that length.
+    """
     flows = np.flatnonzero(np.abs(current[:, 1]) > NOTHING)
     if flows.size == 0:
         return 0.0, -1.0
-    return float(current[flows[0], 0]), float(current[flows[-1], 0]) + SETTLING
+    last = float(current[flows[-1], 0]) + SETTLING
+    return float(current[flows[0], 0]), min(last, length)
 
 
 def _shunt(amperes: float, seen: float) -> str:

@@ -39,6 +39,12 @@ def test_what_fits_is_not_remarked_on(run_scene):
     assert warnings(run_scene(*SHORT, MEASURED)) == []
 
 
+def test_a_short_hold_with_a_short_rest_is_not_doubted(run_scene):
+    """The shunt's mean ended with the trial, that of the read-back 0.2 s later."""
+    short = ("protocol.hold=0.3 s", "protocol.rest=0.1 s")
+    assert warnings(run_scene(*SHORT, *short, MEASURED)) == []
+
+
 @pytest.mark.parametrize("factor", [0.5, 0.0, -1.0, 2.0])
 def test_a_field_that_does_not_fit_the_current_is_told(run_scene, factor):
     (told,) = warnings(run_scene(*SHORT, MEASURED, bench=with_field(factor)))

@@ -109,6 +109,15 @@ def test_unplugged_while_stopping_still_lets_go(call: str) -> None:
     rig.works()
 
 
+@pytest.mark.parametrize("code", [0x14, 0x26])
+def test_a_scope_that_cannot_be_closed_has_lost_no_samples(code: int) -> None:
+    """ "Streaming stopped by itself" made the certificate call samples missing."""
+    rig = Rig(ScopeFault(kind="status", call="CloseUnit", code=code, times=1))
+    rig.stream(0.1)
+    with pytest.raises(RefusedError, match=r"not let go of.*is kept.*USB cable"):
+        rig.scope.close()
+
+
 def test_unplugged_before_opening() -> None:
     rig = Rig(ScopeFault(kind="unplug", call="OpenUnit"))
     rig.fails(NotFoundError, "udev rule")
