@@ -253,15 +253,22 @@ class Magnet(SceneTable):
 
 def _with_kinks(wave: Waveform, levels: NDArray[np.float64]) -> Waveform:
     """`wave` with a point wherever it crosses one of `levels`."""
-    points: list[tuple[float, float]] = [(wave.start, float(wave.value[0]))]
-    for t0, t1, v0, v1 in wave.segments():
-        if t1 > t0 and v0 != v1:
-            low, high = min(v0, v1), max(v0, v1)
-            inner = levels[(levels > low) & (levels < high)]
-            inner = np.sort(inner)[:: 1 if v1 > v0 else -1]
-            for level in inner:
-                t = t0 + (t1 - t0) * (float(level) - v0) / (v1 - v0)
-                if points[-1][0] < t < t1:
-                    points.append((t, float(level)))
-        points.append((t1, v1))
-    return Waveform.through(points)
+    levels, jumps = np.sort(levels), np.diff(wave.time) == 0
+    begin, change = wave.value[:-1], np.diff(wave.value)
+    low, high = np.minimum(begin, wave.value[1:]), np.maximum(begin, wave.value[1:])
+    first, stop = np.searchsorted(levels, low, "right"), np.searchsorted(levels, high)
+    counts = np.where(jumps, 0, np.maximum(stop - first, 0))
+    if not counts.any():
+        return wave
+    part = np.repeat(np.arange(counts.size), counts)  # of the wave, one for each point
+    nth = np.arange(part.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    rises = change[part] > 0
+    value = levels[np.where(rises, first[part] + nth, stop[part] - 1 - nth)]
+    start, end = wave.time[part], wave.time[part + 1]
+    time = start + (end - start) * (value - begin[part]) / change[part]
+    before = np.where(nth == 0, start, np.roll(time, 1))
+    new = (before < time) & (time < end)  # or it would be a jump
+    where, time, value = part[new] + 1, time[new], value[new]
+    return Waveform(
+        np.insert(wave.time, where, time), np.insert(wave.value, where, value)
+    )
