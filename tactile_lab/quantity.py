@@ -22,6 +22,8 @@ PREFIXES = {
 _NUMBER = re.compile(
     r"\s*([-+−]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+−]?[0-9]+)?)\s*(\S.*?)?\s*$"
 )
+DECIMAL_COMMA = re.compile(r"\d,\d")
+"""What may be a decimal comma, or none."""
 _UNIT = r"[fpnµmkMG]?(?:Hz/m?N|Hz|N|V|A|s|T|K|F|Ohm|B|S/s)(?!\w)|[%°]"
 _BETWEEN = re.compile(rf"(?<=[\d?]) (?={_UNIT})|(?<=±) ")
 _FACTOR = re.compile(r"^(?P<symbol>[^\^/ ]+?)(?:\^(?P<power>\d+)|(?P<square>²))?$")
@@ -47,6 +49,11 @@ def parse(text: str, unit: str) -> float:
     if written is None:
         raise QuantityError(
             f'"{text}" has no unit; write for example {example(unit, digits)}.'
+        )
+    if DECIMAL_COMMA.search(text):
+        raise QuantityError(
+            f'"{text}" has a comma in its number; write a decimal point, and nothing '
+            f"between thousands, such as {example(unit)}."
         )
     factor = _factor(written, unit)
     if factor is None:

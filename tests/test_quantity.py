@@ -200,3 +200,9 @@ def test_a_value_is_told_as_far_as_it_is_known(value, half, unit, told):
 def test_two_digits_are_written_out(value, sign, told):
     """The largest offset of a run stood as 2.6e+02 ms in its report."""
     assert rounded(value, sign) == told
+
+
+@pytest.mark.parametrize("text", ["2,5 s", "1.000,5 s", "1,000 s", "2,5"])
+def test_a_comma_in_a_number_is_named(text: str) -> None:
+    with pytest.raises(QuantityError, match="comma in its number"):
+        parse(text, "s")

@@ -16,7 +16,7 @@ from pydantic import ConfigDict, PydanticUserError, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from tactile_lab.complaint import reason
-from tactile_lab.quantity import Unit, exact, parse, printed, typed
+from tactile_lab.quantity import DECIMAL_COMMA, Unit, exact, parse, printed, typed
 
 
 class Kind(Enum):
@@ -250,6 +250,11 @@ def _value(parameter: FormField, text: str) -> Any:
         case Kind.QUANTITY:
             return _quantity(text, symbol)
         case Kind.QUANTITIES:
+            if DECIMAL_COMMA.search(text):
+                raise FieldError(
+                    f"{text}: a comma between digits may be a decimal one. Write a "
+                    "decimal point, and a space after a comma that parts two values."
+                )
             parts = [one.strip() for one in text.replace(";", ",").split(",")]
             parts = [one for one in parts if one] or [""]
             shared = parts[-1].partition(" ")[2].strip() or symbol

@@ -201,3 +201,13 @@ def test_what_grows_in_an_area_that_scrolls_is_never_squeezed(app) -> None:
     assert [row.height() for row in rows] == [60] * 20
     tops = [row.y() for row in rows]
     assert min(b - a for a, b in pairwise(tops)) >= 60, "none lies over another"
+
+
+@pytest.mark.parametrize("text", ["80,5 mN; 120,5 mN", "80,5, 120 mN", "80,5 mN"])
+def test_a_decimal_comma_parts_no_values(text: str) -> None:
+    """It would run 80 and 5 mN instead of 80.5 mN."""
+    levels = parameter("levels", protocol_class("pulses").model_fields["levels"])
+    with pytest.raises(FieldError, match="decimal point"):
+        entry_of(levels, text)
+    told = entry_of(levels, "80.5 mN; 120.5 mN")
+    assert told == entry_of(levels, "80.5, 120.5 mN") == '["80.5 mN", "120.5 mN"]'
