@@ -83,9 +83,10 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
         title += f", {bar.comparison.layout.value}"
     title += " · SIMULATED" if simulated else " · measured"
     try:
-        if path.suffix == ".csv":
+        ending = path.suffix.lower()
+        if ending == ".csv":
             path.write_text(table(stack, title), encoding="utf-8")
-        elif path.suffix == ".svg":
+        elif ending == ".svg":
             _svg(stack, title, path)
         elif not picture(stack, title).save(str(path)):
             raise OSError(f"{path} cannot be written as a picture; end it in .png.")

@@ -87,7 +87,7 @@ def test_view_is_exported(lab) -> None:
     from gui.dialogs.saving import write_scene, write_view
 
     window, folder = lab.window, lab.folder
-    for name in ("view.png", "view.svg", "view.csv"):
+    for name in ("view.png", "view.svg", "VIEW.CSV", "view.csv"):
         write_view(window.panels, None, folder / name)
         assert (folder / name).stat().st_size > 100
     header = (folder / "view.csv").read_text().splitlines()[1]
