@@ -13,7 +13,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from gui.ask_file import ask_file
 from gui.dialogs.closing import Closing
@@ -25,7 +25,11 @@ from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.session.log import Severity
 from gui.stop_anywhere import StopAnywhere
+from gui.tab_order import enter_next, scroll
 from tactile_lab.errors import TactileLabError
+
+SCROLLING = ("PgUp", "PgDown")
+"""Keys that act within an open card, too."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +117,11 @@ class Actions(QObject):
 
         None acts on what lies hidden below a card.
         """
-        cards = self.window.findChildren(Overlay)
-        if any(card.isVisible() for card in cards):
-            return False
-        pressed = _written(event)
+        pressed, covered = _written(event), self._card() is not None
         for key in self.keys:
             if key.single and pressed in key.keys:
+                if covered and pressed not in SCROLLING:
+                    return False
                 if key.repeats or not self._is_held(event):
                     key.act()
                 return True
@@ -213,6 +216,23 @@ class Actions(QObject):
             Shortcut(
                 ("F8",), "Fold the right panel", lambda: self._fold(panels.review)
             ),
+            Shortcut(("F6",), "The next panel", lambda: self._enter(True)),
+            Shortcut(("Shift+F6",), "The panel before", lambda: self._enter(False)),
+            Shortcut(
+                ("PgUp",),
+                "Scroll up",
+                lambda: self._scroll(-1),
+                single=True,
+                repeats=True,
+            ),
+            Shortcut(
+                ("PgDown",),
+                "Scroll down",
+                lambda: self._scroll(1),
+                single=True,
+                repeats=True,
+            ),
+            Shortcut(("F10",), "Menu", self.show_menu),
             Shortcut(("F11",), "Lanes only", self._focus),
             Shortcut(
                 ("Ctrl+L",), "Lanes in a window of their own", self.lanes_asked.emit
@@ -225,6 +245,26 @@ class Actions(QObject):
                 single=True,
             ),
         ]
+
+    def _enter(self, forward: bool) -> None:
+        """Give the keyboard to another panel: form, lanes, log, results, header."""
+        card, panels, active = self._card(), self.panels, QApplication.activeWindow()
+        centre = panels.centre
+        parts = (panels.setup, centre.lanes, centre.record, panels.review)
+        shown = (*(parts if card is None else (card,)), panels.header)
+        enter_next([one for one in shown if one.window() is active], forward=forward)
+
+    def _scroll(self, way: int) -> None:
+        """Scroll an open card, else the panel that has the keyboard, else the right."""
+        setup = self.panels.setup
+        focus = QApplication.focusWidget()
+        left = focus is not None and setup.isAncestorOf(focus)
+        scroll(self._card() or (setup if left else self.panels.review), way)
+
+    def _card(self) -> Overlay | None:
+        """The uppermost open card."""
+        cards = self.window.findChildren(Overlay)
+        return next((card for card in reversed(cards) if card.isVisible()), None)
 
     def _nudge(self, way: int) -> None:
         view = self.panels.centre.view

@@ -5,7 +5,7 @@ Qt goes by when a widget was made; forms, cards and rows are made anew all the t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cmp_to_key
 
 from PySide6.QtCore import Qt
@@ -41,6 +41,28 @@ def move_on(roots: Iterable[QWidget], *, forward: bool) -> bool:
     following.setFocus(tab if forward else back)
     _reveal(following)
     return True
+
+
+def enter_next(panels: Sequence[QWidget], *, forward: bool) -> None:
+    """Give the keyboard to the first widget of the panel after that which has it."""
+    orders = [in_reading_order(panel) for panel in panels if panel.isVisible()]
+    orders = [order for order in orders if order]
+    now = QApplication.focusWidget()
+    inside = [number for number, order in enumerate(orders) if now in order]
+    if orders:
+        at = inside[0] + (1 if forward else -1) if inside else 0 if forward else -1
+        following = orders[at % len(orders)][0]
+        following.setFocus(Qt.FocusReason.TabFocusReason)
+        _reveal(following)
+
+
+def scroll(root: QWidget, way: int) -> None:
+    """Scroll what is seen of `root` by a page: up (-1) or down (1)."""
+    for area in root.findChildren(QScrollArea):
+        bar = area.verticalScrollBar()
+        if area.isVisible() and bar.maximum() > 0:
+            bar.setValue(bar.value() + way * bar.pageStep())
+            return
 
 
 def _takes_keyboard(widget: QWidget) -> bool:

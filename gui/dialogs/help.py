@@ -48,8 +48,10 @@ PANELS = (
         "click shows all. On its axis, or with Ctrl, the wheel zooms the values of a "
         "lane; a drag there moves them, a double click makes it automatic again. "
         "A right click has what else a lane can do, Backspace goes back to the view "
-        "before. What the scene does not record has no lane. The residual is "
-        "measured V_C1 less the model's; the green band is ±50 mV.",
+        "before. By keyboard, Tab to the card of a lane: up and down go to the next, "
+        "with Shift they move it, with Ctrl they zoom its values, Page Up and Down "
+        "move them, Enter opens its menu. What the scene does not record has no lane. "
+        "The residual is measured V_C1 less the model's; the green band is ±50 mV.",
     ),
     (
         "Monitor",

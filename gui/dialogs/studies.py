@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
-from gui.parts import Combo, column, label, push, row, say, scrolling
+from gui.parts import STRETCH, Combo, column, label, push, row, say, scrolling
 from gui.plots.small_plot import SmallPlot
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.studies.live import SeenStudy, is_running, look_at, studies_in
@@ -58,14 +58,20 @@ class StudiesCard(Overlay):
         self.page.clicked.connect(self._open_page)
         self.close_button = push("Close", "primary")
         self.close_button.clicked.connect(self.hide)
+        self.points = Combo()
+        self.points.setAccessibleName("Point")
+        self.points.setMaximumWidth(220)
+        self.point = push("Open the point")
+        self.point.clicked.connect(lambda: self._pick(self.points.currentData()))
         inner = QWidget()
         self._rows = column(inner, self.text, spacing=10)
         self._rows.addStretch(1)
         self._area = scrolling(inner)
         self._area.setMinimumHeight(430)
         head = row(label("Studies", "big"), (self.choice, 1), self.state, spacing=12)
-        foot = row((self.hint, 1), self.page, self.close_button, spacing=12)
-        column(self.card, head, self._area, foot, margin=22, spacing=14)
+        pick = row((self.hint, 1), self.points, self.point, spacing=12)
+        foot = row(STRETCH, self.page, self.close_button, spacing=12)
+        column(self.card, head, self._area, pick, foot, margin=22, spacing=14)
         self.choice.currentIndexChanged.connect(self._show)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look_again)
@@ -137,6 +143,11 @@ class StudiesCard(Overlay):
         plots = () if seen is None else seen.plots
         self._seen = seen
         say(self.hint, HINT if plots else "")
+        self.points.clear()
+        for number, point in ({} if seen is None else seen.points).items():
+            self.points.addItem(str(point), number)
+        for one in (self.points, self.point):
+            one.setVisible(self.points.count() > 0)
         while len(self.figures) < len(plots):
             figure = SmallPlot(self._theme)
             figure.picked.connect(self._pick)

@@ -171,6 +171,13 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             about - (about - low) / factor, about + (high - about) / factor, padding=0
         )
 
+    def move_by(self, part: float) -> None:
+        """Look at higher values, by a part of the range; at lower ones below 0."""
+        low, high = self.shown
+        by = part * (high - low)
+        self._lock()
+        self.setYRange(low + by, high + by, padding=0)
+
     def show_between(self, bottom: float, top: float) -> None:
         """Show the values between two heights in the scene, px."""
         ends = self.value_at(bottom), self.value_at(top)

@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import Enum
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QPixmap, QResizeEvent
+from PySide6.QtGui import (
+    QColor,
+    QContextMenuEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import QFrame, QLabel
 
 from gui.lanes.compare import MARKS
@@ -33,11 +44,38 @@ LINE = 15
 Values = Sequence[float | None]
 
 
+class LaneAct(Enum):
+    """What keys do to the lane whose card has the keyboard."""
+
+    ABOVE, BELOW = "go to the lane above", "go to the lane below"
+    UP, DOWN = "move the lane up", "move the lane down"
+    CLOSER, FURTHER = "zoom into its values", "zoom out of its values"
+    HIGHER, LOWER = "look at higher values", "look at lower values"
+
+
+HELD = Qt.KeyboardModifier
+KEYS = {
+    (HELD.NoModifier, Qt.Key.Key_Up): LaneAct.ABOVE,
+    (HELD.NoModifier, Qt.Key.Key_Down): LaneAct.BELOW,
+    (HELD.ShiftModifier, Qt.Key.Key_Up): LaneAct.UP,
+    (HELD.ShiftModifier, Qt.Key.Key_Down): LaneAct.DOWN,
+    (HELD.ControlModifier, Qt.Key.Key_Up): LaneAct.CLOSER,
+    (HELD.ControlModifier, Qt.Key.Key_Down): LaneAct.FURTHER,
+    (HELD.NoModifier, Qt.Key.Key_PageUp): LaneAct.HIGHER,
+    (HELD.NoModifier, Qt.Key.Key_PageDown): LaneAct.LOWER,
+}
+
+
 class LaneCard(QFrame):
     """Swatch, title, value with unit, and a line of small text.
 
-    A drag of its lower edge makes the lane higher, one of the rest moves it.
+    A drag of its lower edge makes the lane higher, one of the rest moves it. While it
+    has the keyboard it stands for its lane: see `KEYS`.
     """
+
+    acted = Signal(object)
+    """A key was pressed for the lane; what of `LaneAct` it asks for."""
+    menu_asked = Signal()
 
     resized = Signal(float)
     """Its lower edge was dragged down by so many px."""
@@ -50,6 +88,8 @@ class LaneCard(QFrame):
         self.lane, self._theme = lane, theme
         self.setProperty("role", "lanecard")
         self.setFixedWidth(CARD)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.setAccessibleName(f"Lane {lane.plain}")
         self._swatch = QLabel()
         self._swatch.setFixedSize(QSize(10, 10))
         self.setMouseTracking(True)
@@ -130,6 +170,29 @@ class LaneCard(QFrame):
         if self._runs is None:
             self.show_more(self._more.text())
         self._lay_out_runs()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the card, and a frame while it has the keys."""
+        super().paintEvent(event)
+        if self.hasFocus():
+            painter = QPainter(self)
+            painter.setPen(QPen(QColor(self._theme.tokens.accent), 2))
+            painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Ask for what a key does to the lane."""
+        held = event.modifiers() & ~HELD.KeypadModifier
+        act = KEYS.get((held, Qt.Key(event.key())))
+        if act is not None:
+            self.acted.emit(act)
+        elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not held:
+            self.menu_asked.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Ask for the menu of the lane."""
+        self.menu_asked.emit()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Take hold of the lower edge, or of the lane."""

@@ -39,7 +39,9 @@ class LaneRow:
     def __init__(self, lane: Lane, stage: Stage, theme: Theme) -> None:
         self.lane = lane
         self.card = LaneCard(lane, theme)
-        self.card.setAccessibleDescription(f"{lane.plain} against time")
+        self.card.setAccessibleDescription(
+            f"{lane.plain} against time. Enter opens the menu of the lane."
+        )
         self.rule = line()
         self.box = LaneBox(lane, stage)
         self.statistics: Statistics | None = None

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFrame, QMenu
 
 from gui.lanes.arrangement import Arrangement
 from gui.lanes.box import LaneBox
+from gui.lanes.card import LaneAct
 from gui.lanes.floor import Stage
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.navigator import Navigator
@@ -87,6 +88,8 @@ class LaneStack(QFrame):
         made.card.resized.connect(partial(self._resize, made))
         made.card.moved.connect(partial(self.move_lane, made))
         made.card.dropped.connect(self.arranged)
+        made.card.acted.connect(partial(self._act, made))
+        made.card.menu_asked.connect(partial(self._ask_by_key, made))
         return made
 
     def _stack_cards(self) -> None:
@@ -215,6 +218,31 @@ class LaneStack(QFrame):
     def _move_once(self, which: LaneRow, way: int) -> None:
         self.move_lane(which, way)
         self.arranged.emit()
+
+    def _act(self, which: LaneRow, act: LaneAct) -> None:
+        """Do what was asked of a lane by a key."""
+        box, shown = which.box, self.visible_rows()
+        if act in (LaneAct.UP, LaneAct.DOWN):
+            self._move_once(which, -1 if act is LaneAct.UP else 1)
+        elif act in (LaneAct.ABOVE, LaneAct.BELOW):
+            at = shown.index(which) + (-1 if act is LaneAct.ABOVE else 1)
+            if 0 <= at < len(shown):
+                shown[at].card.setFocus()
+        elif box.valued and act in (LaneAct.CLOSER, LaneAct.FURTHER):
+            factor = 1.25 if act is LaneAct.CLOSER else 1 / 1.25
+            box.zoom(factor, box.geometry().center().y())
+        elif box.valued:
+            box.move_by(0.1 if act is LaneAct.HIGHER else -0.1)
+        self.refresh()
+
+    def _ask_by_key(self, which: LaneRow) -> None:
+        """The menu of a lane, at cursor A or the middle of what is seen."""
+        view, box, card = self.view, which.box, which.card
+        time = view.start + view.width / 2
+        if view.cursors is not None and view.start <= view.cursors[0] <= view.end:
+            time = view.cursors[0]
+        here = QPointF(self.stage.whole().x1(time), box.geometry().center().y())
+        self._ask(box, here, card.mapToGlobal(card.rect().center()))
 
     def _ask(self, box: LaneBox, here: QPointF, at: QPoint) -> None:
         """The menu of a lane, at a place in it."""

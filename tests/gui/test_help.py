@@ -1,5 +1,7 @@
 """Help opens at the panel that asked for it."""
 
+from pathlib import Path
+
 from gui.dialogs.help import PANELS, Help
 
 
@@ -41,3 +43,10 @@ def test_narrow_window_has_room_for_one_side_only(lab) -> None:
     window.fold(window.review, False)
     assert window.setup.isVisible() and window.review.isVisible()
     window._folds = dict.fromkeys(window._folds)  # nobody has folded one by hand
+
+
+def test_the_documentation_names_every_key(lab) -> None:
+    page = Path(__file__).parents[2] / "docs" / "window.md"
+    told = page.read_text(encoding="utf-8").partition("## Shortcuts")[2]
+    keys = {one for key in lab.window.actions_.keys for one in key.keys}
+    assert {one for one in keys if f"`{one}`" not in told} == set()

@@ -79,6 +79,12 @@ def test_a_click_on_a_cell_puts_its_scene_into_the_form(lab, tmp_path: Path) -> 
         lab.until(clicked)
 
     assert figure.plot is not None and figure.plot.name == "map"
+    card.points.setCurrentIndex(card.points.findData(13))  # with the keyboard alone
+    assert "V_GS = 1.4 V" in card.points.currentText()
+    card.point.click()
+    assert opened.pop().name and not card.isVisible()
+    card.show_studies((tmp_path,))
+    lab.app.processEvents()
     assert "V_GS = 1.4 V, sensor.R1 = 10000000.0 Ohm" in figure.tell(13)
     click(1.38, -1.0, lambda: "R1 = -1e+06 Ohm must lie betw" in card.hint.text())
     assert card.isVisible() and not opened

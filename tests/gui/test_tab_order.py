@@ -4,6 +4,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
+from gui.dialogs.help import Help
+from gui.menu import GearMenu
 from gui.tab_order import in_reading_order
 
 
@@ -61,6 +63,41 @@ def test_locking_what_has_the_keyboard_gives_it_to_no_button(lab) -> None:
     lab.until(lambda: not window.setup.run.isEnabled())
     assert lab.app.focusWidget() is window.page
     lab.until(lambda: window.setup.run.isEnabled())
+
+
+def press(lab, key, held=Qt.KeyboardModifier.NoModifier) -> QWidget:
+    QTest.keyClick(lab.app.focusWidget() or lab.window, key, held)
+    return lab.app.focusWidget()
+
+
+def test_a_key_goes_from_panel_to_panel_and_back(lab) -> None:
+    window, key = lab.window, Qt.Key.Key_F6
+    window.page.setFocus()
+    panels = (window.setup, window.centre.lanes, window.centre.record, window.review)
+    for panel in panels:
+        assert panel.isAncestorOf(press(lab, key))
+    assert window.header.isAncestorOf(press(lab, key))
+    back = press(lab, key, Qt.KeyboardModifier.ShiftModifier)
+    assert window.review.isAncestorOf(back)
+    window.page.setFocus()
+
+
+def test_what_a_card_says_is_scrolled_by_key(lab) -> None:
+    window = lab.window
+    window.actions_.show_help()
+    bar = window.findChild(Help)._area.verticalScrollBar()
+    lab.until(lambda: bar.maximum() > 0)
+    press(lab, Qt.Key.Key_PageDown)
+    assert bar.value() > 0
+    press(lab, Qt.Key.Key_PageUp)
+    assert bar.value() == 0
+
+
+def test_the_menu_opens_by_key(lab) -> None:
+    lab.window.page.setFocus()
+    press(lab, Qt.Key.Key_F10)
+    lab.until(lambda: isinstance(lab.app.activePopupWidget(), GearMenu))
+    lab.app.activePopupWidget().close()
 
 
 def test_tab_stays_in_an_open_card_and_the_header(lab) -> None:
