@@ -117,8 +117,9 @@ def carry_out_attended(
         def play(execution: Execution) -> Executed:
             if signals is None:
                 return execution.run()
-            if signals.ending:
-                raise KeyboardInterrupt  # it came as the run before was complete
+            if signals.ending:  # it came as the run before was complete
+                execution.folder.finish("aborted", reason="stopped before it began")
+                raise KeyboardInterrupt
             ended.append(run_attended(execution, signals))
             signals.opened = False
             return ended[-1]
@@ -130,7 +131,9 @@ def carry_out_attended(
         except KeyboardInterrupt:
             line.close()
             coil = f" {ended[-1].off.text}" if ended else ""
-            code = ended[-1].exit_code if ended else INTERRUPTED
+            # a run that was complete already is no reason to say that all went well
+            code = ended[-1].exit_code if ended else 0
+            code = code or (signals.ending if signals else 0) or INTERRUPTED
             fail(f"interrupted; the same command goes on where it was.{coil}", code)
             return
         except UnsafeError as error:
