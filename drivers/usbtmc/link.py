@@ -55,6 +55,8 @@ class UsbtmcLink:
         self._milliseconds = max(1, round(timeout * 1e3))
         self._header_once = header_once
         self._backend = backend
+        self.others: tuple[str, ...] = ()
+        """Serial numbers of others of its kind, any of which could have been meant."""
         self._device: Any = None
         self._recovery: Recovery | None = None
         self._interface = 0
@@ -95,10 +97,15 @@ class UsbtmcLink:
         def fits(device: Any) -> bool:
             return self.serial is None or _serial_of(device) == self.serial
 
-        device = usb.core.find(
-            idVendor=self.vendor, idProduct=self.product, custom_match=fits,
+        found = usb.core.find(
+            find_all=True,
+            idVendor=self.vendor,
+            idProduct=self.product,
+            custom_match=fits,
             backend=self._backend,
-        )  # fmt: skip
+        )
+        device, *rest = [*found] or [None]
+        self.others = tuple(_serial_of(one) or "one without a number" for one in rest)
         if device is None:
             raise NotFoundError(
                 f"{self.name} is not attached. Check its cable and power, and the "

@@ -212,6 +212,8 @@ class UsbtmcScope(Opened):
     def settings(self) -> dict[str, str]:
         """Settings in force, for the run's record."""
         known = {"identity": self.identity, "dialect": self._dialect.id}
+        if self._link.others:
+            known["others"] = ", ".join(self._link.others)
         if self._stream is not None:
             known["interval_s"] = repr(self._stream.interval)
             known["record_samples"] = str(

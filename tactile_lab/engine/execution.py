@@ -323,8 +323,8 @@ class Execution(Task[Executed]):
         if others := scope.get("others"):
             found += (
                 f"Several oscilloscopes are attached and the bench file names none: "
-                f"{scope.get('serial', 'the first')} was taken, not {others}. Write "
-                'serial = "..." into [scope].',
+                f"{scope.get('serial', scope['identity'])} was taken, not {others}. "
+                'Write serial = "..." into [scope].',
             )
         if not self.plan.timeline.asks_force:
             return found

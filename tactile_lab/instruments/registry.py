@@ -327,7 +327,7 @@ def _telling(
             made = function(*given)
         except TactileLabError:
             raise
-        except Exception as reason:  # whatever a user's driver raises
+        except (Exception, SystemExit) as reason:  # of the user's own
             said = fault_in(path.resolve(), reason)
             raise SceneError(f"Driver file {path} fails: {said}") from reason
         if interface is not None:

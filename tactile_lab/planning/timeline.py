@@ -104,7 +104,7 @@ def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
         raise LimitError(f"{scene.path or scene.name}: {reason}") from reason
     except TactileLabError:
         raise
-    except Exception as reason:
+    except (Exception, SystemExit) as reason:
         raise SceneError(f"{name} fails: {scene.protocol.fault(reason)}") from reason
     if not driver.steps:
         raise SceneError(f"{name} asks for no trial.")

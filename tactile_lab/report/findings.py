@@ -88,7 +88,7 @@ def find(run: RunData) -> Findings:
                 kind = type(plot).__name__
                 raise TypeError(f"plots gave {kind}; yield a Plot")
             plot.to_dict()  # what cannot be described is not drawn either
-    except Exception as error:  # whatever a user's protocol raises: the rest is kept
+    except (Exception, SystemExit) as error:  # of the user's own; the rest is kept
         missing.append(f"No plot of the answer: {run.protocol.fault(error)}")
         answers = ()
     return Findings(
@@ -116,7 +116,7 @@ def _conclusion(run: RunData) -> Conclusion:
                 kind = type(run.protocol).__name__
                 raise TypeError(f"{kind}.conclude gave {own!r}; return a Conclusion")
             own.plain  # noqa: B018 - what cannot be stored is no conclusion
-        except Exception as error:  # whatever a user's protocol raises
+        except (Exception, SystemExit) as error:  # of the user's own
             own = Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
     return own + force_at_zero(run)
 

@@ -232,6 +232,19 @@ def test_a_kernel_driver_is_moved_aside_and_put_back() -> None:
     assert not wire.device.claimed
 
 
+def test_others_of_its_kind_are_told_where_none_is_named() -> None:
+    """The first that was found was taken, unsaid."""
+    wire = Wire()
+    other = SimulatedDevice(vendor=0x1AB1, product=0x04CE, serial="S2")
+    wire.bus.plug(other)
+    wire.link.open()
+    assert wire.link.others == ()
+    wire.link.close()
+    wire.link.serial = None
+    wire.link.open()
+    assert wire.link.others == ("S2",)
+
+
 def test_another_serial_or_no_usbtmc() -> None:
     wire = Wire()
     wire.link.serial = "S2"

@@ -135,6 +135,16 @@ def test_the_record_before_is_not_taken_for_the_new_one() -> None:
     assert second.received > first.received + 0.024
 
 
+def test_another_of_its_kind_stands_in_the_settings() -> None:
+    lab = Lab()
+    lab.records(1)
+    assert "others" not in lab.scope.settings()
+    other = SimulatedDevice(vendor=0x1AB1, product=0x04CE, serial="DS1ZSIM0002")
+    lab.scope._link._backend.plug(other)
+    lab.records(1)
+    assert lab.scope.settings()["others"] == "DS1ZSIM0002"
+
+
 def test_another_model_is_refused() -> None:
     lab = Lab()
     lab.rigol.identity = "SIGLENT,SDS1104X-E,1,1"

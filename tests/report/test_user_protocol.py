@@ -110,6 +110,7 @@ def test_the_window_reads_the_same_drawings(made):
     ("old", "new", "says"),
     [
         ("(trial,) = run.results", "(trial,) = 1 / 0", "ZeroDivisionError"),
+        ("(trial,) = run.results", "raise SystemExit(7)", "SystemExit"),
         ("return Conclusion", "Conclusion", "return a Conclusion"),
         ('"fall_V": fall', '"fall_V": object()', "TypeError"),
         ("y=trace.mean,", "y=trace.mean[1:],", "give as many"),
@@ -152,17 +153,23 @@ def test_what_cannot_be_shown_is_told_and_costs_nothing_else(
     assert bool(found["statements"]) != bool(found["plots"]), "the other one is kept"
 
 
-@pytest.mark.parametrize("when", ["first", "later"])
-def test_trials_that_raise_are_refused_with_file_and_line(tmp_path, when):
-    bad = {"first": "        int('x')\n        pulse =", "later": "        pulse ="}[
-        when
-    ]
-    after = "" if when == "first" else "\n        int('x')"
-    hold = "hold=(0.1, 0.4))"
-    text = OWN.replace("        pulse =", bad, 1).replace(hold, hold + after, 1)
+@pytest.mark.parametrize(
+    ("when", "bad", "kind"),
+    [
+        ("first", "int('x')", "ValueError"),
+        ("later", "int('x')", "ValueError"),
+        ("first", "raise SystemExit(7)", "SystemExit"),  # the program ended with 7
+    ],
+)
+def test_trials_that_raise_are_refused_with_file_and_line(tmp_path, when, bad, kind):
+    if when == "first":
+        text = OWN.replace("        pulse =", f"        {bad}\n        pulse =", 1)
+    else:
+        hold = "hold=(0.1, 0.4))"
+        text = OWN.replace(hold, f"{hold}\n        {bad}", 1)
     (tmp_path / "own.py").write_text(text)
-    line = 1 + text[: text.index("int('x')")].count("\n")
-    with pytest.raises(SceneError, match=rf"own.py, line {line}: ValueError"):
+    line = 1 + text[: text.index(bad)].count("\n")
+    with pytest.raises(SceneError, match=rf"own.py, line {line}: {kind}"):
         Execution(load(str(tmp_path / "own.py"), SLOW), tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
 
