@@ -17,7 +17,6 @@ from gui.lanes.lane import BAND, Lane
 from gui.lanes.paint import Frame
 from gui.lanes.readings import Painted, values_at
 from gui.lanes.source import Source
-from gui.look.fonts import sized
 from gui.look.tokens import Tokens
 from gui.plots.axis import guarded
 from gui.plots.numbers import decimals, nice_range, number, signed, value_ticks
@@ -448,6 +447,5 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(tokens.trace(self.lane.key)))
         painter.drawRoundedRect(box, 3, 3)
-        painter.setPen(QColor(tokens.plot))
-        painter.setFont(sized(11, QFont.Weight.DemiBold))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+        weight = QFont.Weight.DemiBold
+        paint.write(painter, box.center(), text, tokens.plot, align=0.5, weight=weight)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from time import monotonic
 
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF
@@ -45,6 +45,7 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
         self._view, self._theme = view, theme
         self._run_of: tuple[object, ...] = ()
         self._run_until = 0.0
+        self._shown: object = None
         self.setFixedHeight(HEIGHT)
         self.setCacheMode(pg.GraphicsView.CacheModeFlag.CacheNone)
         self.setAccessibleName("Whole run; arrow keys move the visible window")
@@ -78,16 +79,24 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
             self.refresh()
 
     def refresh(self) -> None:
-        """Show the visible window, and the run anew where it has grown."""
-        source, now = self.source, time.monotonic()
+        """Show the visible window, and the run anew where it has grown.
+
+        A visible window that follows a run goes on as the run's picture grows.
+        """
+        source, view, now = self.source, self._view, monotonic()
         grown = None if source.running else (source.reach, source.spikes.size)
         of = (source, grown, self.width())
-        if of != self._run_of or (source.running and now > self._run_until):
+        due = of != self._run_of or (source.running and now > self._run_until)
+        if due:
             self._run_of, self._run_until = of, now + GROWS
             self._show_run()
-        self.window_.blockSignals(True)
-        self.window_.setRegion((self._view.start, self._view.end))
-        self.window_.blockSignals(False)
+        creeps = view.follow and source.running and source.reach > 0
+        shown = view.width if creeps else (view.start, view.end)
+        if due or shown != self._shown:
+            self._shown = shown
+            self.window_.blockSignals(True)
+            self.window_.setRegion((view.start, view.end))
+            self.window_.blockSignals(False)
 
     def _show_run(self) -> None:
         """Outline of the force, planned and measured, and the rate, each up to 1."""

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import (
     QColor,
+    QFont,
     QPainter,
     QPen,
     QPolygonF,
@@ -287,11 +288,13 @@ def dots(painter: QPainter, x: FloatArray, y: FloatArray, colour: str) -> None:
 
 
 @lru_cache(maxsize=2048)
-def _laid_out(text: str, pixels: int) -> tuple[QStaticText, float, float]:
+def _laid_out(
+    text: str, pixels: int, weight: QFont.Weight = QFont.Weight.Normal
+) -> tuple[QStaticText, float, float]:
     """A short text laid out once: drawing it again costs a tenth."""
     made = QStaticText(text)
     made.setTextFormat(Qt.TextFormat.PlainText)
-    made.prepare(QTransform(), sized(pixels))
+    made.prepare(QTransform(), sized(pixels, weight))
     size = made.size()
     return made, size.width(), size.height()
 
@@ -304,6 +307,7 @@ def write(
     *,
     align: float = 0.0,
     pixels: int = 11,
+    weight: QFont.Weight = QFont.Weight.Normal,
 ) -> None:
     """Write a number or a name.
 
@@ -314,9 +318,10 @@ def write(
         colour: as "#rrggbb".
         align: 0 starts at the point, 0.5 is centred there, 1 ends there.
         pixels: size.
+        weight: of its strokes.
     """
-    laid_out, width, height = _laid_out(text, pixels)
-    painter.setFont(sized(pixels))
+    laid_out, width, height = _laid_out(text, pixels, weight)
+    painter.setFont(sized(pixels, weight))
     painter.setPen(pen(colour))
     where = QPointF(round(at.x() - align * width), round(at.y() - height / 2))
     painter.drawStaticText(where, laid_out)

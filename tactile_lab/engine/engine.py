@@ -51,7 +51,7 @@ more asks by mistake, as a script does that never waits for an end."""
 LOOK = 0.1
 """Time between two looks at whether what waits for the instruments was stopped, s."""
 
-EVERY, AT_LEAST = 0.02, 0.2
+EVERY, AT_LEAST = 0.03, 0.2
 """Time between two looks at the newest samples and at the coil, and after which they
 are told although nothing changed, s."""
 

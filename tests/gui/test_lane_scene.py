@@ -18,6 +18,7 @@ from PySide6.QtSvg import QSvgGenerator, QSvgRenderer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu
 
+from gui.lanes import navigator
 from gui.lanes.arrangement import Arrangement
 from gui.lanes.box import LaneBox, heights_of
 from gui.lanes.card import LaneCard
@@ -530,3 +531,31 @@ def test_a_lane_shows_that_it_has_the_keyboard(stack):
     at = QPoint(1, card.height() // 2)
     assert after.pixelColor(at) != before.pixelColor(at)
     assert after.pixelColor(at).name().upper() == LIGHT.accent
+
+
+def test_the_window_in_the_whole_run_follows_as_its_picture_grows(app, monkeypatch):
+    """It was moved by a pixel in every frame: a tenth of what a frame cost."""
+    clock = [100.0]
+    monkeypatch.setattr(navigator, "monotonic", lambda: clock[0])
+    source, view = LiveSource(None, 0.2), TimeView()
+    source.holds.append(Stretch(0.0, 20.0, "hold"))
+    whole = Navigator(view, Theme("light"))
+    whole.source = source
+
+    def shown_at(now: float) -> tuple[float, float]:
+        cells = np.arange(source.reach, now, 1e-3)
+        source.add_bins({"V_C1": Trace.bins(cells, cells, cells, cells, 1e-3)})
+        view.set_now(now, 20.0)
+        whole.refresh()
+        return whole.window_.getRegion()
+
+    first = shown_at(6.0)
+    assert first == (view.start, view.end)
+    clock[0] += 0.033
+    assert shown_at(6.033) == first and view.end > first[1]
+    view.set_width(3.0)
+    assert shown_at(6.04) == (view.start, view.end)  # what a hand does is seen at once
+    clock[0] += navigator.GROWS
+    assert shown_at(6.3) == (view.start, view.end)
+    view.show_span(1.0, 2.0)
+    assert shown_at(6.4) == (1.0, 3.0)
