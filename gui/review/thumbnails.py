@@ -85,7 +85,7 @@ class Thumbnails(QObject):
             self._wanted = [folder for folder in folders if folder not in self._kept]
             idle, self._busy = not self._busy, True
         if idle:
-            start(self._read, "thumbnails")
+            start(self._read, "thumbnails", finishes=True)
 
     def _read(self) -> None:
         while True:
@@ -98,7 +98,8 @@ class Thumbnails(QObject):
                 self._kept[folder] = thumbnail_of(folder)
             except (TactileLabError, OSError, KeyError, ValueError):
                 self._kept[folder] = None  # its card says what is wrong with it
-            if not isValid(self):  # the window has gone meanwhile
+            ended = not threading.main_thread().is_alive()
+            if ended or not isValid(self):  # the window has gone meanwhile
                 return
             self.made.emit(folder)
             time.sleep(PAUSE)

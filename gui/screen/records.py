@@ -93,7 +93,7 @@ class Records(QObject):
                 return
             self.compared.emit(Comparison(members))
 
-        start(work, "compare")
+        start(work, "compare", finishes=True)
 
     def _load(self, folder: Path, *, ended: bool) -> None:
         def work() -> None:
@@ -106,7 +106,7 @@ class Records(QObject):
                 return
             self._read.emit(source, ended)
 
-        start(work, "open run")
+        start(work, "open run", finishes=True)
 
     def _arrived(self, source: RunSource, ended: bool) -> None:
         if not ended:

@@ -54,3 +54,39 @@ def test_the_bench_is_asked_while_the_window_is_built(tmp_path):
     assert not told["collects in any thread"]
     assert told["log"][0].startswith("Asking the instruments of")
     assert told["sources read"] == [] and told["code"] == 0
+
+
+LEFT = """
+import sys, threading, time
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+from PySide6.QtCore import QCoreApplication, QObject
+
+from gui.lanes import stored
+from gui.screen.records import Records
+
+reading, kept = threading.Event(), h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+
+def read(folder):
+    with h5py._objects.phil:
+        reading.set()
+        time.sleep(0.5)
+        print("read")
+    raise OSError("nothing is there")
+
+stored.RunSource = read
+app, parent = QCoreApplication([]), QObject()
+records = Records(SimpleNamespace(), parent)
+records.open(Path("a run"))
+reading.wait()
+"""
+
+
+def test_a_program_that_is_left_while_a_run_is_read_ends():
+    """Cut off within HDF5, the reading thread kept its lock, and the end waited."""
+    done = subprocess.run(
+        [sys.executable, "-c", LEFT], capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "read\n", "")
