@@ -76,29 +76,29 @@ class Belief:
             "temperature": self.temperature is not None,
         }
 
-    def displaced(self) -> Iterator[tuple[str, DrivenCircuit]]:
-        """By each independent cause of uncertainty: moved by `PART` of its band."""
+    def displaced(self, part: float = PART) -> Iterator[tuple[str, DrivenCircuit]]:
+        """By each independent cause of uncertainty: moved by `part` of its band."""
         if self.clock > 0:
-            later = self.force.shifted(PART * self.clock)
+            later = self.force.shifted(part * self.clock)
             yield "clocks", DrivenCircuit(self.driven.circuit, later)
         followers = self.followers
         if followers is not None and followers.input_bias_uncertainty > 0:
-            bias = PART * followers.input_bias_uncertainty
+            bias = part * followers.input_bias_uncertainty
             yield "follower", self.deviating(Deviation(input_bias=bias))
         if self.magnet.lag_uncertainty:
-            lag = PART * self.magnet.lag_uncertainty
+            lag = part * self.magnet.lag_uncertainty
             yield "lag", self.deviating(Deviation(lag=lag))
         known = self.magnet.force_uncertainty
         if known is not None and known.absolute > 0:
             # at rest there is no force, by definition
             rest = np.abs(self.force.value) < STEADY
-            pushed = np.where(rest, 0.0, PART * known.absolute)
+            pushed = np.where(rest, 0.0, part * known.absolute)
             moved = Waveform(self.force.time, self.force.value + pushed)
             yield "force", DrivenCircuit(self.driven.circuit, moved)
         if known is not None and known.relative > 0:
-            yield "force", self.deviating(Deviation(force=PART * known.relative))
+            yield "force", self.deviating(Deviation(force=part * known.relative))
         if self.temperature:
             yield (
                 "temperature",
-                self.deviating(Deviation(temperature=PART * self.temperature)),
+                self.deviating(Deviation(temperature=part * self.temperature)),
             )

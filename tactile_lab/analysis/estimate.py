@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tactile_lab.quantity import printed
+from tactile_lab.quantity import PREFIXES, prefix_of, printed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -54,14 +54,21 @@ class Estimate:
         """
         digits = 3
         if self.half > 0 and self.value:
-            digits = max(3, math.floor(math.log10(abs(self.value) / self.half)) + 1)
+            whole = math.floor(math.log10(abs(self.value))) + 1
+            digits = max(3, math.ceil(whole - math.log10(self.half)))
         value, low, high = (
             printed(f"{number * factor:.{digits}g}")
             for number in (self.value, self.low, self.high)
         )
+        behind = f" {unit}".rstrip()
         if self.value == self.low < self.high:
-            return f"{low} {unit} (at its bound; below {high} {unit}, 95 %)"
-        return f"{value} {unit} ({low} to {high} {unit}, 95 %)"
+            return f"{low}{behind} (at its bound; below {high}{behind}, 95 %)"
+        return f"{value}{behind} ({low} to {high}{behind}, 95 %)"
+
+    def shown(self, unit: str) -> str:
+        """The same with the prefix before the SI `unit` that suits it: in pA, not A."""
+        prefix = prefix_of(max(abs(self.low), abs(self.high)), unit)
+        return self.text(prefix + unit, 1 / PREFIXES[prefix])
 
     def widened(self, *halves: float) -> Estimate:
         """With further independent causes of error, half-widths of their 95 % bands."""

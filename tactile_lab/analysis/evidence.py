@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.analysis.estimate import correlated
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.model.circuit import Circuit
@@ -30,6 +31,8 @@ SCALES = {**dict.fromkeys(VOLTAGES, 0.01), "I_bias": 1e-10, "g31": 0.004}
 """Steps of parameters fitted as they are; all others are fitted by their logarithm."""
 STEP = 2e-3
 """Grid on which I_C is integrated between spikes, s."""
+LEAST = 0.15e-3
+"""What V_C2 at firing is known to at best, V."""
 LONGEST = 1.0
 """Intervals longer than this tell little about rate and much about drift, s."""
 
@@ -111,11 +114,14 @@ class Residuals:
         return misses
 
     def weights(self, residual: FloatArray) -> FloatArray:
-        """One over the scatter of each kind of evidence."""
+        """One over the scatter of each kind of evidence; V_C1's bins may err alike."""
+        traced, fired = residual[: self.bins], residual[self.bins :]
         weights = np.empty(self.size)
-        for part in (slice(0, self.bins), slice(self.bins, self.size)):
-            if residual[part].size:
-                weights[part] = 1 / max(scatter(residual[part]), 1e-9)
+        if traced.size:
+            alike = math.sqrt(correlated(traced))
+            weights[: self.bins] = 1 / max(scatter(traced) * alike, 1e-9)
+        if fired.size:
+            weights[self.bins :] = 1 / max(scatter(fired), LEAST)
         return weights
 
 
@@ -171,10 +177,6 @@ class Together:
         """All residuals of a circuit and its force for each run, V."""
         pairs = zip(self._runs, driven, strict=True)
         return np.concatenate([run.under(one) for run, one in pairs])
-
-    def weighted(self, x: FloatArray, weights: FloatArray) -> FloatArray:
-        """All residuals over their scatter."""
-        return self.residual(x) * weights
 
     def first_weights(self) -> FloatArray:
         """A few millivolts for either kind of evidence, before anything is known."""

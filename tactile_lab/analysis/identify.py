@@ -5,9 +5,11 @@ What it is fitted to: `tactile_lab.analysis.evidence`.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,11 +22,14 @@ from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, Together,
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
-from tactile_lab.model.circuit import PARAMETERS, Circuit
+from tactile_lab.model.circuit import PARAMETERS, Circuit, units
+from tactile_lab.quantity import printed
 from tactile_lab.waveform import Waveform
 
 FloatArray = NDArray[np.float64]
-Displaced = Callable[[Circuit], Iterable[tuple[str, DrivenCircuit]]]
+Displaced = Callable[[Circuit, float], Iterable[tuple[str, DrivenCircuit]]]
+Cause = tuple[str, int]
+"""Name of a cause of uncertainty, and the how manieth of that name."""
 
 ALIKE = 0.98
 """Two parameters whose estimates correlate more than this are hardly told apart."""
@@ -38,6 +43,9 @@ TIMES = ("clocks", "lag")
 """Causes of uncertainty that move V_C1 at the edges of the force, and hardly elsewhere.
 """
 DIFFERENCE = np.array(1e-4)
+ROUNDS, LONGEST = 4, 3.0
+"""Of a fit repeated where a cause is at the end of its band; how far it may go, in the
+steps of the parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +80,7 @@ class Evidence:
         V_C1: measured, decimated; its bins must be independent. Its resolution is taken
             for what the channel's offset is known to.
         spike_times: detected spikes, s.
-        displaced: what a circuit and its force become if either is moved by `PART` of
+        displaced: what a circuit and its force become if either is moved by a part of
             its 95 % band, for each independent cause of uncertainty.
     """
 
@@ -81,7 +89,60 @@ class Evidence:
     duration: float
     V_C1: Measured | None = None
     spike_times: FloatArray | None = None
-    displaced: Displaced = lambda _: ()
+    displaced: Displaced = lambda _circuit, _part: ()
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """How residuals err: each by its own scatter, and those of V_C1 by one offset.
+
+    An offset adds to what the model says, so that it can be left open exactly: what the
+    shape of V_C1 tells is then not lost with its level.
+
+    Attributes:
+        plain: one over the scatter of each, shape (n,), errors of times aside.
+        offsets: half of the 95 % band of each one's offset, V, shape (n,).
+        edges: variance that errors of times add to each, V^2, shape (n,).
+    """
+
+    plain: FloatArray
+    offsets: FloatArray
+    edges: FloatArray
+
+    def found(self, problem: Together, residual: FloatArray) -> Noise:
+        """The same with the scatter that residuals, shape (n,), show."""
+        left = self.freed(residual) * self.weights / self.plain
+        return replace(self, plain=problem.weights(left))
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """One over the scatter of each, shape (n,)."""
+        found: FloatArray = 1 / np.sqrt(1 / self.plain**2 + self.edges)
+        return found
+
+    def whitened(self, residual: FloatArray) -> FloatArray:
+        """Residuals made independent and of scatter 1, shape (n,) or (n, k)."""
+        scaled = (residual.T * self.weights).T
+        return scaled - self._along(scaled, 1 - 1 / math.sqrt(1 + self._power))
+
+    def freed(self, residual: FloatArray) -> FloatArray:
+        """Residuals, shape (n,), less the offset that its band and they make best."""
+        scaled = residual * self.weights
+        part = self._power / (1 + self._power)
+        return residual - self._along(scaled, part) / self.weights
+
+    @cached_property
+    def _offset(self) -> FloatArray:
+        """One standard deviation of the offset, in each one's scatter."""
+        return self.offsets * self.weights / Z95
+
+    @cached_property
+    def _power(self) -> float:
+        return float(self._offset @ self._offset)
+
+    def _along(self, scaled: FloatArray, part: float) -> FloatArray:
+        along: FloatArray = np.multiply.outer(self._offset, self._offset @ scaled)
+        return along * part / (self._power or 1.0)
 
 
 def identify(
@@ -92,7 +153,7 @@ def identify(
     *,
     V_C1: Measured | None = None,
     spike_times: FloatArray | None = None,
-    displaced: Displaced = lambda _: (),
+    displaced: Displaced = lambda _circuit, _part: (),
 ) -> Identified:
     """Fit the parameters `names` to one run; see `Evidence` and `identify_together`."""
     seen = Evidence(circuit, force, duration, V_C1, spike_times, displaced)
@@ -136,17 +197,20 @@ def identify_together(
             f"{problem.size} data points cannot determine {len(problem.names)} "
             "parameters" + "".join(f" ({why})" for why in unused)
         )
-    x, weights = np.zeros(len(problem.names)), problem.first_weights()
+    x, displaced = np.zeros(len(problem.names)), [one.displaced for one in runs]
+    noise = Noise(problem.first_weights(), problem.offsets, np.zeros(problem.size))
     for _ in range(3):  # the scatter of the two kinds of evidence is itself estimated
+
+        def whitened(x: FloatArray, noise: Noise = noise) -> FloatArray:
+            return noise.whitened(problem.residual(x))
+
         solved = least_squares(
-            problem.weighted, x, x_scale="jac", diff_step=DIFFERENCE, method="lm",
-            kwargs={"weights": weights},
-        )  # fmt: skip
+            whitened, x, x_scale="jac", diff_step=DIFFERENCE, method="lm"
+        )
         x = np.asarray(solved.x, dtype=np.float64)
-        weights = problem.weights(problem.residual(x))
-        causes = _systematic(problem, x, [one.displaced for one in runs])
-        weights = _without_edges(weights, causes)
-    found = _identified(problem, x, weights, [moved for _, moved in causes])
+        noise = replace(noise, edges=_edges(problem, x, displaced))
+        noise = noise.found(problem, problem.residual(x))
+    found = _identified(problem, x, noise, displaced)
     return replace(found, warnings=(*unused, *found.warnings))
 
 
@@ -166,65 +230,93 @@ def _check(circuit: Circuit, names: Sequence[str]) -> None:
 _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
-def _systematic(
-    problem: Together, x: FloatArray, displaced: Sequence[Displaced]
-) -> list[tuple[str, FloatArray]]:
-    """Half of the 95 % band each systematic cause gives all residuals, V, by name.
+def _displaced(
+    problem: Together, x: FloatArray, displaced: Sequence[Displaced], part: float
+) -> dict[Cause, list[DrivenCircuit]]:
+    """Circuit and force of all runs with `part` of the 95 % band of one cause, by it.
 
     The n-th cause of a name is the same one in every run.
     """
-    driven, here = problem.driven(x), problem.residual(x)
-    found: dict[tuple[str, int], list[DrivenCircuit]] = {}
-    scales = problem.scales(x)
+    driven, scales = problem.driven(x), problem.scales(x)
+    found: dict[Cause, list[DrivenCircuit]] = {}
     for number, (one, causes_of) in enumerate(zip(driven, displaced, strict=True)):
         met: Counter[str] = Counter()
-        for name, moved in causes_of(one.circuit):
+        for name, moved in causes_of(one.circuit, part):
             scaled = DrivenCircuit(moved.circuit, moved.force.scaled(scales[number]))
             found.setdefault((name, met[name]), list(driven))[number] = scaled
             met[name] += 1
-    causes = [
-        (name, (problem.under(moved) - here) / PART)
-        for (name, _), moved in found.items()
-    ]
-    if problem.offsets.any():
-        causes.append(("offset", problem.offsets))
-    return causes
+    return found
 
 
-def _without_edges(
-    weights: FloatArray, causes: Sequence[tuple[str, FloatArray]]
+def _edges(
+    problem: Together, x: FloatArray, displaced: Sequence[Displaced]
 ) -> FloatArray:
-    """Weights that trust little what a small error of a time moves far, as at edges."""
-    late = [moved / Z95 for name, moved in causes if name in TIMES]
-    return 1 / np.sqrt(1 / weights**2 + sum((moved**2 for moved in late), np.array(0)))
+    """Variance by which to trust less what a small error of a time moves far, V^2."""
+    here, variance = problem.residual(x), np.zeros(problem.size)
+    for (name, _), driven in _displaced(problem, x, displaced, PART).items():
+        if name in TIMES:
+            variance += ((problem.under(driven) - here) / PART / Z95) ** 2
+    return variance
+
+
+def _moved(
+    problem: Together,
+    x: FloatArray,
+    displaced: Sequence[Displaced],
+    jacobian: FloatArray,
+    noise: Noise,
+) -> list[FloatArray]:
+    """How far each cause, at the end of its band, moves the estimate, shape (n,) each.
+
+    The fit is repeated there, what residuals weigh included.
+    """
+
+    def step(residual: FloatArray, noise: Noise) -> FloatArray:
+        asked = noise.whitened(jacobian), noise.whitened(residual)
+        return np.asarray(np.linalg.lstsq(*asked, rcond=1e-7)[0], dtype=np.float64)
+
+    here, moves = step(problem.residual(x), noise), []
+    for cause in _displaced(problem, x, displaced, PART):
+        ways = []
+        # what is early moves it as what is late does, but may begin before the run
+        for end in (1.0,) if cause[0] in TIMES else (-1.0, 1.0):
+            there, seen = x, noise
+            for _ in range(ROUNDS):
+                driven = _displaced(problem, there, displaced, end)[cause]
+                residual = problem.under(driven)
+                there = there - step(residual, seen) + here
+                there = x + np.clip(there - x, -LONGEST, LONGEST)
+                seen = seen.found(problem, residual)
+            ways.append(np.abs(there - x))
+        moves.append(np.max(ways, axis=0))
+    return moves
 
 
 def _identified(
-    problem: Together, x: FloatArray, weights: FloatArray, causes: list[FloatArray]
+    problem: Together, x: FloatArray, noise: Noise, displaced: Sequence[Displaced]
 ) -> Identified:
-    jacobian = _jacobian(problem, x) * weights[:, None]
+    plain = _jacobian(problem, x)
+    jacobian = noise.whitened(plain)
     lengths = np.linalg.norm(jacobian, axis=0)
     for name, length in zip(problem.names, lengths, strict=True):
         if length < 1e-9 * max(lengths.max(), 1e-300):
             raise NotIdentifiableError(f"{name} does not act on the data at all")
     freedom = problem.size - len(problem.names)
-    residual = problem.residual(x)
     unit = jacobian / lengths
     strength, direction = np.linalg.eigh(unit.T @ unit)
     inverse = direction / np.maximum(strength, 1e-14) @ direction.T
     covariance = inverse / np.outer(lengths, lengths) * problem.size / freedom
     errors = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(errors, errors)
+    moved = _moved(problem, x, displaced, plain, noise)
     values = problem.values(x)
-    # what each cause moves the least-squares estimate by, to first order
-    solve = inverse / np.outer(lengths, lengths) @ jacobian.T
-    moved = [np.abs(solve @ (cause * weights)) for cause in causes]
     estimates = {
         name: _estimate(
             name, values[name], float(errors[i]), freedom, [m[i] for m in moved]
         )
         for i, name in enumerate(problem.names)
     }
+    residual = noise.freed(problem.residual(x))
     traced, fired = residual[problem.traced], residual[~problem.traced]
     return Identified(
         circuit=problem.driven(x)[0].circuit,
@@ -266,19 +358,28 @@ def _warnings(
     estimates: dict[str, Estimate], correlation: FloatArray, weakest: float
 ) -> tuple[str, ...]:
     names, found = list(estimates), []
+    loose = {name for name, each in estimates.items() if _is_loose(name, each)}
     for i, one in enumerate(names):
         for j in range(i + 1, len(names)):
-            if abs(correlation[i, j]) > ALIKE:
+            # errors that go together matter little where both are small
+            if abs(correlation[i, j]) > ALIKE and loose & {one, names[j]}:
                 hard = "cannot be" if weakest < DEGENERATE else "are hardly"
                 found.append(
                     f"{one} and {names[j]} {hard} told apart by these data "
-                    f"(correlation {correlation[i, j]:.3f}): fix one of them"
+                    f"(correlation {printed(f'{correlation[i, j]:.3f}')}): "
+                    "fix one of them"
                 )
-    for name, estimate in estimates.items():
-        limit = LOOSE_VOLTAGE if name in VOLTAGES else LOOSE * abs(estimate.value)
-        if (estimate.high - estimate.low) / 2 > limit:
-            found.append(
-                f"{name} is not identifiable: its 95 % interval is {estimate.low:.3g} "
-                f"to {estimate.high:.3g}"
-            )
+    for name in loose:
+        told = estimates[name].shown(unit_of(name))
+        found.append(f"{name} is not identifiable: it is {told}")
     return tuple(found)
+
+
+def _is_loose(name: str, estimate: Estimate) -> bool:
+    limit = LOOSE_VOLTAGE if name in VOLTAGES else LOOSE * abs(estimate.value)
+    return estimate.half > limit
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a fitted parameter; "" of one without, such as a factor."""
+    return units()[name].symbol if name in units() else ""

@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_lab.analysis.belief import PART, Belief
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.evidence import FloatArray, Residuals
+from tactile_lab.analysis.evidence import LEAST, FloatArray, Residuals
 from tactile_lab.analysis.spike_pairs import irregularity
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import Deviation, DrivenCircuit
@@ -48,8 +48,6 @@ SYSTEMATIC = 0.03
 """Of one code: what the mean of dithered codes is off by, alike at each level."""
 DITHERED = 0.25
 """Of one code: noise smooths a converter's steps where they leave less than this."""
-LEAST = 0.15e-3
-"""What V_C2 at firing is known to at best, V."""
 FEWEST = 3
 """Fewer data than this tell nothing."""
 BAND = 1.25
@@ -111,7 +109,7 @@ class Explanation:
         if not self.suspects:
             return "The model can follow none of the usual suspects."
         best, *others = self.suspects
-        noise = f"times the noise of {self.misfit:.3g} times"
+        falls = f"from {rounded(self.misfit)} to {rounded(best.misfit)} times the noise"
         if not self.candidates:
             names = ", ".join(TITLES[s.name][0] for s in self.suspects)
             return (
@@ -125,21 +123,20 @@ class Explanation:
             )
         if self.cause is None:
             each = "".join(
-                f"; {s.text} leaves {rounded(s.misfit)} times"
-                for s in self.candidates[1:]
+                f"; {s.text}: to {rounded(s.misfit)} times" for s in self.candidates[1:]
             )
             return (
                 f"Each of {len(self.candidates)} causes would explain it alone, and "
-                f"this run cannot tell them apart: {best.text} leaves "
-                f"{rounded(best.misfit)} {noise}{each}."
+                f"this run cannot tell them apart. The misfit falls by {best.text}: "
+                f"{falls}{each}."
             )
         next_best = "".join(
             f"; the next best, {TITLES[o.name][0]}, leaves {rounded(o.misfit)} times"
             for o in others[:1]
         )
         return (
-            f"One cause explains it: {best.text}. That leaves {rounded(best.misfit)} "
-            f"{noise}{next_best}."
+            f"One cause explains it: {best.text}. With it the misfit falls {falls}"
+            f"{next_best}."
         )
 
     @property

@@ -76,20 +76,18 @@ def _is_run(word: str) -> bool:
 
 
 def _print(found: FittedRuns) -> None:
+    from tactile_lab.analysis.identify import unit_of
+
     together = found.together
     many = len(found.alone) > 1
     for name, estimate in together.estimates.items():
-        say(
-            f"{name:8} {estimate.value:.6g}  "
-            f"({estimate.low:.6g} to {estimate.high:.6g}, 95 %)"
-        )
+        unit = unit_of(name)
+        say(f"{name:8} {estimate.shown(unit)}")
         for run, one in found.alone.items() if many else ():
             if one is None:
                 say(f"    {run} alone cannot tell")
             elif name in one.estimates:
-                mine = one.estimates[name]
-                say(f"    {run} alone {mine.value:.6g}  ({mine.low:.6g} to "
-                    f"{mine.high:.6g})")  # fmt: skip
+                say(f"    {run} alone {one.estimates[name].shown(unit)}")
     if together.scatter_V_C1 is not None:
         say(
             f"V_C1 is left with {together.scatter_V_C1 * 1e3:.2g} mV of scatter. The "

@@ -107,12 +107,12 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
     seen = None
     if trace is not None:
         seen = measured(run, believed, trace)
-        if believed.magnet.lag_uncertainty is None:
-            inside = settled(run.force, seen.time)
-            seen = replace(seen, time=seen.time[inside], value=seen.value[inside])
+        lag = LAG if believed.magnet.lag_uncertainty is None else 0.0
+        inside = settled(run.force, seen.time, believed.clock, lag)
+        seen = replace(seen, time=seen.time[inside], value=seen.value[inside])
 
-    def displaced(circuit: Circuit) -> Iterator[tuple[str, DrivenCircuit]]:
-        for name, driven in replace(believed, circuit=circuit).displaced():
+    def displaced(circuit: Circuit, part: float) -> Iterator[tuple[str, DrivenCircuit]]:
+        for name, driven in replace(believed, circuit=circuit).displaced(part):
             if not (name == "follower" and "I_bias" in names):
                 yield name, driven
 
@@ -126,10 +126,21 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
     )
 
 
-def settled(force: Waveform, time: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which bins (middles, s) lie wholly beyond `LAG` of the step before."""
-    steps = np.append(-np.inf, force.time[1:][np.diff(force.value) != 0])
+def settled(
+    force: Waveform, time: NDArray[np.float64], clock: float, lag: float
+) -> NDArray[np.bool_]:
+    """Which bins lie wholly where the force is known.
+
+    Args:
+        force: with the steps of the source.
+        time: shape (n,), middles of the bins, s.
+        clock: how far a step may lie from where it is believed to be, s.
+        lag: how long after a step the force is not known, s.
+    """
+    steps = np.concatenate(
+        [[-np.inf], force.time[1:][np.diff(force.value) != 0], [np.inf]]
+    )
     half = float(np.median(np.diff(time))) / 2 if time.size > 1 else 0.0
-    last = steps[np.searchsorted(steps, time + half, side="right") - 1]
-    beyond: NDArray[np.bool_] = time - half - last > LAG
+    after = np.searchsorted(steps, time + half + clock, side="right")
+    beyond: NDArray[np.bool_] = time - half - steps[after - 1] > clock + lag
     return beyond

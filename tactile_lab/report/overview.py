@@ -43,9 +43,10 @@ def overview(run: Measurement) -> Plot:
         told.append(_potential(spiking, axis))
     if run.searched or run.spike_times.size:
         told += _spikes(run, axis)
-    marks = (*_holds(run, axis), *(Guide(at=cut) for cut in axis.cuts))
+    holds = _holds(run, axis)
+    marks = (*holds, *(Guide(at=cut) for cut in axis.cuts))
     parts = [f"({'abcdef'[i]}) {text}." for i, (_, text) in enumerate(told)]
-    ends = " Grey bands: holds, from when the applied force was there."
+    ends = " Grey bands: holds, from when the applied force was there." if holds else ""
     return Plot(
         name="figure",
         caption=" ".join(parts) + ends,
@@ -218,11 +219,14 @@ def _potential(signal: RecordedSignal, axis: ClosedTime) -> Told:
 
 
 def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
-    """The spike train in a lane of its own, and the rate."""
+    """The spike train in a lane of its own, and the rate where there is one."""
     trials = run.results
     starts = [axis.at(t.start) for t in trials]
     spikes = [t.spike_times + at for t, at in zip(trials, starts, strict=True)]
+    train = spike_train(np.concatenate([*spikes, []]), axis.begin, axis.end)
     at, rates = _rates(spikes)
+    if not rates.size:
+        return [train]
     fits = [
         _fit(t, start)
         for t, start in zip(trials, starts, strict=True)
@@ -236,11 +240,10 @@ def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
         unit="Hz",
         prefix="",
         series=(Series(x=at, y=rates, mark="dots"), *fits),
-        limits=(0.0, 1.08 * float(np.nanmax(rates)) if rates.size else 1.0),
+        limits=(0.0, 1.08 * float(np.nanmax(rates))),
         height=1.5,
     )
-    together = np.concatenate([*spikes, []])
-    return [spike_train(together, axis.begin, axis.end), (panel, text)]
+    return [train, (panel, text)]
 
 
 def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

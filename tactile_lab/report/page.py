@@ -57,7 +57,7 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
         twin=drawn.pop("twin", None),
         drift=drawn.pop("drift", None),
         answers=tuple(drawn.values()),
-        beside=() if beside is None else sentences(beside),
+        beside=() if beside is None else sentences(beside, run),
         budget="" if beside is None else beside.budget_line,
         drift_said=(said,) if said else (),
         certificate=_certificate(run),
@@ -69,15 +69,20 @@ def _key_numbers(run: RunData) -> dict[str, str]:
     cut = any(not trial.complete for trial in run.results)
     cells = {
         "Status": run.status,
-        "Duration": show(run.duration, "s"),
+        "Duration": _seconds(run.duration),
         "Trials": f"{len(run.results)}{', the last cut short' if cut else ''}",
         "Spikes": str(sum(t.response.spikes for t in run.results)),
     }
     if run.loss is not None:
         cells["Lost"] = run.loss.sentence.removeprefix("loss: ")
     if run.took is not None:
-        cells["Took"] = show(run.took, "s", 3)
+        cells["Took"] = _seconds(run.took, 3)
     return cells
+
+
+def _seconds(time: float, digits: int = 4) -> str:
+    """A time as one says it: 50 ms, 18.2 s, 1,767 s."""
+    return show(time, "s", digits) if time < 1000 else f"{time:,.0f} s"
 
 
 def _certificate(run: RunData) -> dict[str, str]:

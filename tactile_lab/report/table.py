@@ -58,8 +58,9 @@ def _field_table(run: Measurement) -> Table:
         current, field = run.current_at(end), run.field_between(start, end)
         shown = NONE
         if field.size > 1:
-            error = 2 * float(field.std(ddof=1)) / field.size**0.5
-            shown = _with(float(field.mean()), error, "T", 4)
+            error = float(field.std(ddof=1)) / field.size**0.5
+            mean = Estimate.of(float(field.mean()), error, field.size - 1)
+            shown = _with(mean.value, mean.half, "T", 4)
         elif field.size:
             shown = show(float(field[0]), "T", 4)
         at, read = show(trial.start, "s"), str(field.size)
@@ -68,7 +69,7 @@ def _field_table(run: Measurement) -> Table:
         headings=("Trial", "Start", "Current", "Field", "Readings"),
         rows=tuple(rows),
         note="Current at the end of the hold as read back; field: mean of the readings "
-        "in it, ± their scatter (95 %).",
+        "in it, ± what their scatter leaves open of it (95 %).",
     )
 
 

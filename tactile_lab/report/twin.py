@@ -18,10 +18,14 @@ from tactile_lab.analysis.spike_pairs import Matched
 from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
 from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
+from tactile_lab.model.temperature import temperature
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import printed, rounded
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
+
+CHANGED = 0.5
+"""A temperature that is read to change by less is one temperature, K."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,10 +143,19 @@ def to_dict(beside: BesideModel) -> dict[str, Any]:
     }
 
 
-def sentences(beside: BesideModel) -> tuple[str, ...]:
+def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
     """What the twin says, for people."""
     found = beside.twin
     said = [beside.budget_line] if beside.budgets else []
+    if run.circuit is not None and run.temperature is not None:
+        read = run.temperature[:, 1]
+        if read.size and np.ptp(read) > CHANGED:
+            said.append(
+                f"The sensor's temperature was read from {read.min():.2f} K to "
+                f"{read.max():.2f} K; the model stays at "
+                f"{temperature(run.circuit):.2f} K, so that it goes astray as far as "
+                "that matters."
+            )
     if beside.explanation is not None:
         said.append(
             f"It misses by more than what is stated allows. {beside.explanation.text}"

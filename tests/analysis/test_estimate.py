@@ -11,9 +11,23 @@ from tactile_lab.analysis.estimate import Estimate
         (3.1, 0.2, "3.1 s (2.9 to 3.3 s, 95 %)"),
         (8.6923, 0.03, "8.69 s (8.66 to 8.72 s, 95 %)"),
         (8.69, 0.001, "8.69 s (8.689 to 8.691 s, 95 %)"),
+        (1.4, 0.0033, "1.4 s (1.397 to 1.403 s, 95 %)"),
+        (1.4, 4e-5, "1.4 s (1.39996 to 1.40004 s, 95 %)"),
         (-2e-3, 1e-3, "−0.002 s (−0.003 to −0.001 s, 95 %)"),
         (0.0, 0.5, "0 s (−0.5 to 0.5 s, 95 %)"),
     ],
 )
 def test_the_ends_of_an_interval_are_told_apart(value, half, text):
     assert Estimate(value, half / 2, value - half, value + half).text("s") == text
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "unit", "text"),
+    [
+        (65.3e-12, 2e-12, "A", "65.3 pA (63.3 to 67.3 pA, 95 %)"),
+        (0.039, 1e-3, "V m/N", "0.039 V m/N (0.038 to 0.04 V m/N, 95 %)"),
+        (1.02, 0.01, "", "1.02 (1.01 to 1.03, 95 %)"),
+    ],
+)
+def test_a_number_has_the_unit_that_suits_it(value, half, unit, text):
+    assert Estimate(value, half / 2, value - half, value + half).shown(unit) == text

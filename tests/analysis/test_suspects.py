@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tactile_lab.analysis.belief import Belief
-from tactile_lab.analysis.suspects import SUSPECTS, explain
+from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.suspects import SUSPECTS, Explanation, Suspect, explain
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.bench import Followers
 from tactile_lab.deviation import Deviation
@@ -110,3 +111,12 @@ def test_a_cause_is_named_though_the_follower_is_not_quite_as_stated():
     found = explained(Deviation(V_GS=4e-3, input_bias=15e-12))
     assert found.cause.name == "V_GS"
     assert found.cause.size.low <= 4e-3 <= found.cause.size.high
+
+
+def test_what_a_cause_leaves_is_said_beside_what_the_belief_leaves():
+    size = Estimate(4e-3, 1e-4, 3.8e-3, 4.2e-3)
+    found = Explanation(176.4, (Suspect("V_GS", size, 1.02), Suspect("R1", size, 9.0)))
+    assert (
+        "With it the misfit falls from 180 to 1 times the noise; the next best, R1, "
+        "leaves 9 times."
+    ) in found.text

@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 
 import numpy as np
@@ -63,7 +64,9 @@ def test_identify_finds_the_bench_s_own_parameters(run_folder):
     found = json.loads(call("identify", run_folder, "V_GS", "tau", "--json").stdout)
     assert found["parameters"]["V_GS"]["value"] == pytest.approx(1.4, abs=5e-3)
     assert found["parameters"]["tau"]["value"] == pytest.approx(8.69, rel=0.1)
-    assert "V_GS" in call("identify", run_folder, "V_GS").stdout
+    said = call("identify", run_folder, "V_GS", "tau").stdout
+    assert re.search(r"^V_GS +1\.\S+ V \(1\.\S+ to 1\.\S+ V, 95 %\)$", said, re.M), said
+    assert re.search(r"^tau +\S+ s \(\S+ to \S+ s, 95 %\)$", said, re.M), said
 
 
 def test_identify_fits_several_runs_together(run_folder):

@@ -25,6 +25,8 @@ from tactile_lab.report.overview import overview
 from tactile_lab.report.results import as_json, results
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
+from tactile_lab.report.table import trials_table
+from tactile_lab.report.twin import sentences
 from tactile_lab.report.write import write
 from tactile_lab.store.facts import facts, grouped
 from tactile_lab.store.folder import write_json
@@ -313,6 +315,11 @@ def test_calibrate_field_reads_both_branches(tmp_path):
         force=Waveform.constant(0.0), current=np.array(rows),
         field=np.array(readings), searched=False,
     )  # fmt: skip
+    few = (0.9, 1.0, 1.1, 1.2, 1.3)
+    scattered = np.array([(at, 1e-3 + 1e-6 * n) for n, at in enumerate(few)])
+    shown = trials_table(replace(run, field=scattered)).rows[0][3]
+    # Student's t of five readings: 2.776 times 1.58 uT over the root of 5
+    assert shown == "1.0020 ± 0.0020 mT"
     values = find(run).conclusion.values
     assert values["slope_T_per_A"] == pytest.approx(0.011, rel=1e-6)
     assert values["half_width_T"] == pytest.approx(3e-4, rel=1e-6)
@@ -356,11 +363,24 @@ def test_a_teslameter_that_hangs_is_no_exact_one():
     assert band is not None and 20e-6 < band < 1e-3
 
 
+def test_a_model_that_stays_cool_beside_a_sensor_that_warms_says_so(rate_force):
+    time = np.linspace(0, rate_force.duration, 20)
+    warming = np.column_stack([time, 291.65 + 15 * time / time[-1]])
+    beside = find(rate_force).beside
+    said = sentences(beside, replace(rate_force, temperature=warming))
+    assert any(
+        "read from 291.65 K to 306.65 K; the model stays at 290.11 K" in t for t in said
+    )
+    assert not any("read from" in text for text in sentences(beside, rate_force))
+
+
 def test_monitor_tells_the_distance_to_threshold():
     quiet = Waveform.through([(0.0, 0.0), (3.0, 0.0)])
     run = modelled("monitor", [("part 1", 0.0, quiet, False)])
     distance = find(run).conclusion.values["distance_to_threshold_V"]
     assert distance == pytest.approx(4.347 - 3.974, abs=2e-3)
+    drawn = overview(replace(run, searched=True))
+    assert "Rate" not in [panel.label for panel in drawn.panels], "there is none"
 
 
 def test_the_twin_is_reported(rate_force, tmp_path):
@@ -527,9 +547,13 @@ def test_identification_leaves_out_the_field_s_lag(rate_force):
     steps = np.array([1.0, 1.0, 2.0, 2.0])
     force = Waveform(np.r_[0.0, steps, 3.0], np.array([0, 0, 0.1, 0.1, 0, 0]))
     time = np.arange(0.005, 3, 0.01)
-    late = ~settled(force, time)
+    late = ~settled(force, time, 0.0, 0.03)
     assert late.sum() == 8
     assert np.all((time[late] - np.floor(time[late])) < 0.04)
+    # clocks that err make it early as well
+    blurred = ~settled(force, time, 0.02, 0.03)
+    assert np.all(time[blurred] > np.floor(time[blurred] + 0.03) - 0.03)
+    assert blurred.sum() > late.sum() + 2
     # V_C1 that comes some milliseconds late, as behind a real core
     trace = rate_force.trace("V_C1")
     lagging = replace(trace, mean=np.interp(trace.time - 4e-3, trace.time, trace.mean))

@@ -231,8 +231,9 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
     )  # fmt: skip
     report = write(tmp_path, empty)
     assert "No trial was completed" in report.html.read_text(encoding="utf-8")
-    labels = [panel.label for panel in overview(report.findings.run).panels]
-    assert labels == ["Force", "Spikes", "Rate"]
+    drawn = overview(report.findings.run)
+    assert [panel.label for panel in drawn.panels] == ["Force", "Spikes"]
+    assert "Grey bands" not in drawn.caption, "no hold is shaded"
 
 
 @pytest.mark.parametrize(
