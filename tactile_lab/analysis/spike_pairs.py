@@ -18,6 +18,8 @@ WITHIN = 0.5
 """A spike may lie off its expected place by this part of the interval around it."""
 SILENCE = 3.0
 """A gap so many times longer than the interval before begins a new burst."""
+FINEST = 0.001
+"""An error of the rate below this tells nothing more, %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +81,9 @@ class Matched:
             largest = rounded(np.max(np.abs(self.offsets)) * 1e3)
             text += f", offset {middle} ms (median), {largest} ms at most"
         if self.rate_error.size:
-            middle = rounded(np.median(self.rate_error) * 100)
-            text += f", rate error {middle} % (median)"
+            middle = float(np.median(self.rate_error)) * 100
+            told = rounded(middle) if abs(middle) >= FINEST else f"below {FINEST}"
+            text += f", rate error {told} % (median)"
         return text
 
 

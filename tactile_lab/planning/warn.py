@@ -136,9 +136,10 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
         )
     elif interval > width:
         yield (
-            f"V_K at {show(rate, 'S/s')} misses about {1 - width / interval:.0%} of "
-            f"the spikes: they stay above {show(threshold_of(scene), 'V')} for "
-            f"{show(width, 's', 2)}, one sample takes {show(interval, 's')}. Sample at "
+            f"V_K at {show(rate, 'S/s')} misses about "
+            f"{100 * (1 - width / interval):.0f} % of the spikes: they stay above "
+            f"{show(threshold_of(scene), 'V')} for {show(width, 's', 2)}, one sample "
+            f"takes {show(interval, 's')}. Sample at "
             f"{show(_round_up(2 / width), 'S/s')} or faster."
         )
     elif interval > scene.circuit.tau_K / SAMPLES_PER_DECAY:

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
@@ -124,7 +124,7 @@ def _stagger(texts: list[Annotation]) -> None:
         if row is None:
             text.set_visible(False)
             continue
-        rows[row] = box.x1 + 0.3 * box.height
+        rows[row] = box.x1 + 0.8 * box.height
         if row:
             up = -1 if text.get_verticalalignment() == "top" else 1
             text.xyann = (0, text.xyann[1] + up * 8.0)
@@ -156,7 +156,7 @@ def _boxes(figure: Figure, plot: Plot) -> list[Axes]:
 
 def _x_axis(axes: Axes, plot: Plot, factor: float) -> None:
     if plot.x_log:
-        axes.set_xscale("log")
+        _log_x(axes)
     if plot.x_ticks:
         at = [factor * x for x in plot.x_ticks]
         axes.set_xticks(at, [f"{x:.3g}" for x in at])
@@ -168,6 +168,14 @@ def _x_axis(axes: Axes, plot: Plot, factor: float) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
     if plot.x_limits is not None:
         axes.set_xlim(factor * plot.x_limits[0], factor * plot.x_limits[1])
+
+
+def _log_x(axes: Axes) -> None:
+    """A logarithmic x axis whose numbers are written out: 5, 10, 20, not 10^1."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:

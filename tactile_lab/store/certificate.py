@@ -72,13 +72,15 @@ class Certificate:
 
     def __str__(self) -> str:
         if self.missing:
-            samples = f"samples are missing, not known how many ({self.written} stored)"
+            samples = (
+                f"samples are missing, not known how many ({self.written:,} stored)"
+            )
         elif self.produced is None:
-            samples = f"not known of {self.written} samples (the run was cut short)"
+            samples = f"not known of {self.written:,} samples (the run was cut short)"
         else:
-            samples = f"{self.samples} of {self.produced} samples"
+            samples = f"{self.samples:,} of {self.produced:,} samples"
             if self.seen_from is not None and self.covered is None:
-                samples += f" (seen from {show(self.seen_from, 's')} a stretch on)"
+                samples += f" (gaps of {show(self.seen_from, 's')} or more are seen)"
         if self.covered is not None and self.streamed is not None:
             return (
                 f"loss: {samples}; gaps by design, {self.covered:.4g} of "

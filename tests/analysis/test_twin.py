@@ -164,6 +164,13 @@ def test_a_lost_spike_is_missed_and_a_false_one_is_extra(times, data):
     assert match(rest, times).measured == pytest.approx(rest)
 
 
+def test_an_error_of_the_rate_that_tells_nothing_is_no_power_of_ten():
+    times = np.arange(1.0, 9.0)
+    said = match(times * (1 + 1e-9), times).sentence
+    assert "rate error below 0.001 % (median)" in said
+    assert "rate error −0.1 %" in match(times * 1.001, times).sentence
+
+
 def test_nothing_matches_nothing():
     assert match([], [1.0]).missed == 1
     assert match([1.0], []).extra == 1

@@ -71,8 +71,8 @@ def test_a_preview_that_cannot_be_written_is_refused(tactile_lab, tmp_path, name
 
 def test_warnings_go_to_stderr(tactile_lab):
     answer = tactile_lab("plan", "--set", "record.sample_rate=0.2 MS/s", "--json")
-    assert "misses about 44%" in answer.err
-    assert any("misses about 44%" in text for text in answer.json["warnings"])
+    assert "misses about 44 %" in answer.err
+    assert any("misses about 44 %" in text for text in answer.json["warnings"])
 
 
 def test_the_keys_of_a_scene_are_listed_with_their_meaning(tactile_lab):

@@ -42,7 +42,7 @@ def test_runs_lists_and_filters(run):
     listed = tell("runs", run.parent)
     assert listed.exit_code == 0
     assert run.name in listed.output
-    assert "0 of 10000 samples" in listed.output
+    assert "0 of 10,000 samples" in listed.output
     found = json.loads(tell("runs", run.parent, "--sensor", "S12", "--json").stdout)
     assert [entry["name"] for entry in found["runs"]] == [run.name]
     none = tell("runs", run.parent, "--protocol", "hold")

@@ -87,7 +87,7 @@ def test_amplitudes_need_a_faster_rate():
 
 
 def test_a_rate_that_misses_spikes_is_warned_of():
-    assert "misses about 44% of the spikes" in warned("record.sample_rate=0.2 MS/s")
+    assert "misses about 44 % of the spikes" in warned("record.sample_rate=0.2 MS/s")
     assert "misses" not in warned("record.sample_rate=0.5 MS/s")
     quiet = warned("record.sample_rate=0.2 MS/s", 'record.signals=["V_C1"]')
     assert "misses" not in quiet, "nobody looks for spikes there"

@@ -1,5 +1,7 @@
 """What a figure shows: margins, and texts that do not run into each other."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -32,3 +34,20 @@ def test_labels_of_trials_close_together_can_be_read(apart, level):
     assert boxes
     for n, box in enumerate(boxes):
         assert not any(box.overlaps(other) for other in boxes[:n])
+
+
+def test_a_logarithmic_axis_has_numbers_that_do_not_run_into_each_other():
+    onset = Series(x=[0.0047, 0.012, 0.03, 0.06], y=[1.0, 2.0, 3.0, 4.0], mark="points")
+    panels = (Panel(label="Latency", series=(onset,)),) * 2
+    plot = Plot(name="x", caption="x.", x_label="Onset", x_unit="s", x_log=True,
+                panels=panels)  # fmt: skip
+    figure = draw(plot, "x")
+    figure.canvas.draw()
+    upper, lower = figure.axes
+    told = [t for t in lower.get_xticklabels(which="both") if t.get_text()]
+    assert {"5", "10", "20", "50"} <= {t.get_text() for t in told}
+    assert not any("10^" in t.get_text() for t in told)
+    boxes = [t.get_window_extent() for t in told]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    numbers = upper.get_xticklabels(which="both")
+    assert not any(t.get_text() and t.get_visible() for t in numbers)

@@ -70,7 +70,7 @@ def test_a_slow_disk_ends_a_real_run_and_keeps_what_came(bench, folder, layout):
     verdict = verify(folder.path)
     assert verdict.sound
     assert verdict.certificate.samples > 0
-    assert "of 40000 samples" in str(verdict.certificate)
+    assert "of 40,000 samples" in str(verdict.certificate)
 
 
 def test_what_goes_wrong_in_the_thread_reaches_the_caller(bench, folder, layout):
