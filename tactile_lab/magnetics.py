@@ -192,7 +192,7 @@ class Magnet(SceneTable):
             )
         if self.calibration is None:
             return force.scaled(1 / self.newtons_per_ampere)
-        bent = _with_kinks(force, self.force(self.calibration.current))
+        bent = force.with_points_at(self.force(self.calibration.current))
         return Waveform(bent.time, self._inverse(bent.value))
 
     def force_for(
@@ -212,9 +212,9 @@ class Magnet(SceneTable):
             return current.scaled(self.newtons_per_ampere)
         if beyond == "hold":
             ends = self.calibration.least, self.calibration.most
-            current = _with_kinks(current, np.array(ends))
+            current = current.with_points_at(np.array(ends))
             current = Waveform(current.time, np.clip(current.value, *ends))
-        bent = _with_kinks(current, self.calibration.current)
+        bent = current.with_points_at(self.calibration.current)
         return Waveform(bent.time, self.force(bent.value))
 
     @property
@@ -249,26 +249,3 @@ class Magnet(SceneTable):
             f"the limit of {show(limit, 'A')} and the calibration's "
             f"{show(self.calibration.least, 'A')} to {show(self.calibration.most, 'A')}"
         )
-
-
-def _with_kinks(wave: Waveform, levels: NDArray[np.float64]) -> Waveform:
-    """`wave` with a point wherever it crosses one of `levels`."""
-    levels, jumps = np.sort(levels), np.diff(wave.time) == 0
-    begin, change = wave.value[:-1], np.diff(wave.value)
-    low, high = np.minimum(begin, wave.value[1:]), np.maximum(begin, wave.value[1:])
-    first, stop = np.searchsorted(levels, low, "right"), np.searchsorted(levels, high)
-    counts = np.where(jumps, 0, np.maximum(stop - first, 0))
-    if not counts.any():
-        return wave
-    part = np.repeat(np.arange(counts.size), counts)  # of the wave, one for each point
-    nth = np.arange(part.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    rises = change[part] > 0
-    value = levels[np.where(rises, first[part] + nth, stop[part] - 1 - nth)]
-    start, end = wave.time[part], wave.time[part + 1]
-    time = start + (end - start) * (value - begin[part]) / change[part]
-    before = np.where(nth == 0, start, np.roll(time, 1))
-    new = (before < time) & (time < end)  # or it would be a jump
-    where, time, value = part[new] + 1, time[new], value[new]
-    return Waveform(
-        np.insert(wave.time, where, time), np.insert(wave.value, where, value)
-    )

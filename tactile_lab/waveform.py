@@ -203,6 +203,31 @@ class Waveform:
                 float(self.value[i + 1]),
             )
 
+    def with_points_at(self, levels: FloatArray) -> Waveform:
+        """The same waveform with a point wherever it crosses one of `levels`."""
+        levels, jumps = np.sort(levels), np.diff(self.time) == 0
+        begin, change = self.value[:-1], np.diff(self.value)
+        low, high = np.minimum(begin, self.value[1:]), np.maximum(begin, self.value[1:])
+        first, stop = (
+            np.searchsorted(levels, low, "right"),
+            np.searchsorted(levels, high),
+        )
+        counts = np.where(jumps, 0, np.maximum(stop - first, 0))
+        if not counts.any():
+            return self
+        part = np.repeat(np.arange(counts.size), counts)  # of it, one for each point
+        nth = np.arange(part.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        rises = change[part] > 0
+        value = levels[np.where(rises, first[part] + nth, stop[part] - 1 - nth)]
+        start, end = self.time[part], self.time[part + 1]
+        time = start + (end - start) * (value - begin[part]) / change[part]
+        before = np.where(nth == 0, start, np.roll(time, 1))
+        new = (before < time) & (time < end)  # or it would be a jump
+        where, time, value = part[new] + 1, time[new], value[new]
+        return Waveform(
+            np.insert(self.time, where, time), np.insert(self.value, where, value)
+        )
+
     def shifted(self, by: float) -> Waveform:
         """The same waveform `by` s later."""
         return Waveform(self.time + by, self.value)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+
+import numpy as np
 
 from tactile_lab.bench import CoilLimits
 from tactile_lab.waveform import Waveform
@@ -48,39 +49,16 @@ def heat_along(
         Heat at the end, its largest value (A^2 s), and when the budget is spent (s),
         None if it never is.
     """
-    most, spent = used, None
-    bound = limits.continuous
-    for t0, t1, i0, i1 in current.segments():
-        for start, end, a, b in _split(t0, t1, i0, i1, bound):
-            span = end - start
-            if max(abs(a), abs(b)) <= bound * (1 + 1e-12):
-                used *= math.exp(-span / limits.recovery)
-                continue
-            gain = span * ((a * a + a * b + b * b) / 3 - bound * bound)
-            used += max(gain, 0.0)
-            if used > limits.heat and spent is None:
-                over = used - limits.heat
-                spent = end - span * min(over / gain, 1.0) if gain > 0 else end
-            most = max(most, used)
+    most, spent, bound = used, None, limits.continuous
+    bent = current.with_points_at(np.array([-bound, bound]))
+    a, b, spans = bent.value[:-1], bent.value[1:], np.diff(bent.time)
+    warm = np.maximum(np.abs(a), np.abs(b)) > bound * (1 + 1e-12)
+    gains = spans * np.where(warm, (a * a + a * b + b * b) / 3 - bound * bound, 0.0)
+    kept = np.where(warm, 1.0, np.exp(-spans / limits.recovery))
+    rows = np.column_stack([bent.time[1:], spans, gains, kept])[spans > 0]
+    for end, span, gain, part in rows.tolist():
+        used = used * part + max(gain, 0.0)
+        most = max(most, used)
+        if gain > 0 and used > limits.heat and spent is None:
+            spent = end - span * min((used - limits.heat) / gain, 1.0)
     return used, most, spent
-
-
-def _split(
-    t0: float, t1: float, i0: float, i1: float, bound: float
-) -> list[tuple[float, float, float, float]]:
-    """One segment cut where the magnitude of the current crosses `bound`."""
-    if t1 <= t0:
-        return []
-    cuts = [0.0, 1.0]
-    if i1 != i0:
-        cuts += [
-            part
-            for level in (-bound, bound)
-            if 0 < (part := (level - i0) / (i1 - i0)) < 1
-        ]
-    cuts.sort()
-    span, rise = t1 - t0, i1 - i0
-    return [
-        (t0 + span * a, t0 + span * b, i0 + rise * a, i0 + rise * b)
-        for a, b in itertools.pairwise(cuts)
-    ]
