@@ -23,9 +23,7 @@ from tactile_lab.engine.events import Begun, Samples, TaskEvent
 from tactile_lab.engine.jobs import record
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
-from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
-
-ENDLESS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')
+from tactile_lab.engine.sensor import KEPT, LONG_PARTS, SILENT, SensorState
 
 
 class LiveMonitor(LiveTask):
@@ -49,7 +47,7 @@ class LiveMonitor(LiveTask):
     def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Monitor the sensor on a bench ("sim" or a bench file)."""
         self.source, self.recording = None, False
-        wanted = Request("monitor", (*ENDLESS, *overrides), bench)
+        wanted = Request("monitor", (*LONG_PARTS, *overrides), bench)
         self._begin(begin_monitor, wanted)
 
     def record(self, out: Path, notes: Mapping[str, str]) -> None:

@@ -24,8 +24,6 @@ from tactile_lab.commands.terminal import StatusLine, fail, refusing, say, warn
 if TYPE_CHECKING:
     from tactile_lab.engine.monitor import Monitor
 
-ENDLESS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')
-"""Until stopped; what the user sets comes after and wins."""
 SHOWN_EVERY, LINE_EVERY = 0.5, 5.0
 """Time between two looks on a terminal, and between two lines where piped, s."""
 RECORD = "SIGUSR1"
@@ -61,10 +59,12 @@ def command(
     with Signals({RECORD: lambda: asked.put(RECORD)}) as signals:
         with refusing():
             from tactile_lab.engine.monitor import Monitor
+            from tactile_lab.engine.sensor import LONG_PARTS
 
-            loaded = scene_asked(scene or "monitor", (*ENDLESS, *overrides), bench)
+            loaded = scene_asked(scene or "monitor", (*LONG_PARTS, *overrides), bench)
             kept = noted(notes)
-            monitor = Monitor(loaded, realtime=True, keep=keep)
+            ends = any(one.startswith("protocol.duration") for one in overrides)
+            monitor = Monitor(loaded, realtime=True, keep=keep, endless=not ends)
             signals.look()
         _watch(monitor, signals, asked, out, kept)
 

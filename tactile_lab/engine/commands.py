@@ -88,7 +88,7 @@ def begin_monitor(served: ServedTask, request: Request) -> Monitor:
     """Monitor a request that asks for no force; only `jobs.record` keeps anything."""
     from tactile_lab.engine.monitor import Monitor
 
-    return Monitor(request.load(), realtime=True, emit=served.emit)
+    return Monitor(request.load(), realtime=True, emit=served.emit, endless=True)
 
 
 def begin_manual(served: ServedTask, request: Request) -> ManualControl:

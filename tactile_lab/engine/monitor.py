@@ -35,7 +35,7 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.trial import Outcome, Trial
+from tactile_lab.trial import Outcome, Trial, Trials
 from tactile_lab.waveform import Waveform
 
 MOST = 1_000_000_000
@@ -55,6 +55,7 @@ class Monitor(Task[Ending]):
         realtime: pace a simulated bench by the wall clock.
         emit: told of everything that happens, from the deciding thread.
         keep: how much is held, s.
+        endless: begin the protocol anew when it has ended, until stopped.
 
     Raises:
         SceneError, LimitError: the scene cannot be run on its bench, asks for a force,
@@ -69,6 +70,7 @@ class Monitor(Task[Ending]):
         realtime: bool = False,
         emit: events.Emit = events.ignore,
         keep: float = KEPT,
+        endless: bool = False,
     ) -> None:
         self.plan = plan(scene, preview=False)
         needed = self.plan.needs
@@ -91,7 +93,7 @@ class Monitor(Task[Ending]):
         self._recording = threading.Lock()
         self._runner = Runner(
             Program(
-                trials=scene.protocol.trials,
+                trials=self._rounds if endless else scene.protocol.trials,
                 fault=scene.protocol.fault,
                 channels=needed.channels,
                 interval=1.0 / scene.record.sample_rate,
@@ -110,8 +112,12 @@ class Monitor(Task[Ending]):
         )
 
     def run(self) -> Ending:
-        """Monitor until `stop`, or until the protocol ends."""
+        """Monitor until `stop`, or until the protocol ends where that ends it."""
         return self._runner.run()
+
+    def _rounds(self) -> Trials:
+        while True:
+            yield from self.scene.protocol.trials()
 
     @property
     def sensor(self) -> SensorState:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 KEPT = 60.0
 """How much a monitor holds for `record`, s."""
 
+LONG_PARTS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')
+"""What an endless monitor plays, round by round: spikes are forgotten part by part."""
+
 SILENT = 2.0
 """Time without a spike after which the rate counts as 0, s."""
 

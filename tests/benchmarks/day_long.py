@@ -1,17 +1,21 @@
-"""Memory of a run that lasts a day: a hold and the monitor, hour by simulated hour.
+"""Memory of a day: a hold, a stored run without force, and the monitor, hour by hour.
 
     python tests/benchmarks/day_long.py [--hours 24] [--rate 10000] [--out FILE]
 
-Each is the program itself on the built-in bench, as fast as it computes. Its memory is
-looked at as its progress passes each hour, and its peak once the report is written.
-The exit code is 1 where it grows: where the last half of the hours needs more than
-`SLACK` above the first half, or the run loses a sample.
+The first two are the program itself on the built-in bench, as fast as it computes; its
+memory is looked at as its progress passes each hour, and its peak once the report is
+written. `watched` is what `tactile-lab monitor` and the window's *Monitor* do, in a
+process of its own and by the simulated clock: four times the last minute is recorded,
+with its report. The exit code is 1 where memory grows: where the last half of the hours
+needs more than `SLACK` above the first half, or a sample is lost.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
+import os
 import shutil
 import socket
 import statistics
@@ -19,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -103,18 +108,72 @@ def one(scene: str, hours: float, rate: float, root: Path) -> tuple[str, bool]:
     return row, grown <= SLACK and not lost and complete
 
 
+def watched(hours: float, rate: float, root: Path) -> tuple[str, bool]:
+    """As `one`, of an endless monitor, in a process that has done nothing else."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(watch, (hours, rate, root))
+
+
+def watch(hours: float, rate: float, root: Path) -> tuple[str, bool]:
+    """A row of the table, of an endless monitor in this process."""
+    from tactile_lab.acquisition import events
+    from tactile_lab.engine.monitor import Monitor
+    from tactile_lab.engine.sensor import LONG_PARTS
+    from tactile_lab.report.from_run import read
+    from tactile_lab.report.write import write
+    from tactile_lab.scene.load import load
+    from tactile_lab.store.run import Run
+
+    at_hours: list[float] = []
+    kept: list[Path] = []
+
+    def emit(event: events.Event) -> None:
+        if not isinstance(event, events.Progress):
+            return
+        if event.elapsed >= HOUR * (len(at_hours) + 1):
+            at_hours.append(memory(os.getpid(), "VmRSS"))
+            print(f"watched {len(at_hours)} h {at_hours[-1]:.0f} MB", flush=True)
+            if len(at_hours) % max(1, round(hours / 4)) == 0:
+                kept.append(monitor.record(root))
+                write(kept[-1], read(kept[-1]))
+        if len(at_hours) >= hours:
+            monitor.stop("a day is over")
+
+    fires = "sensor.V_GS=1.65 V"
+    changes = (*LONG_PARTS, f"record.sample_rate={rate:g} S/s", fires)
+    monitor = Monitor(load("monitor", changes), emit=emit, endless=True)
+    ending = monitor.run()
+    lost, spikes, size = 0, 0, 0
+    for folder in kept:
+        size += sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+        with Run.load(folder) as run:
+            lost += run.info["loss"]["samples"]
+            lost += abs(run.samples - round(run.duration * rate))
+            spikes += run.spikes["time"].size
+    half = len(at_hours) // 2
+    grown = statistics.median(at_hours[half:]) - statistics.median(at_hours[:half])
+    row = (
+        f"| watched | {len(at_hours):.1f} | {at_hours[0]:.0f} | {at_hours[half]:.0f} "
+        f"| {at_hours[-1]:.0f} | {grown:+.0f} | {memory(os.getpid(), 'VmHWM'):.0f} "
+        f"| {size / 1e6:.1f} in {len(kept)} | {spikes} | {lost} | {ending.reason} |"
+    )
+    return row, grown <= SLACK and not lost
+
+
 def main() -> int:
-    """Run both, print and write the table."""
+    """Run all, print and write the table."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--hours", type=float, default=24.0)
     options.add_argument("--rate", type=float, default=10e3)
-    options.add_argument("--scene", choices=SCENES, action="append")
+    kinds = (*SCENES, "watched")
+    options.add_argument("--scene", choices=kinds, action="append")
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
     rows, flat = [], True
     with tempfile.TemporaryDirectory() as root:
-        for scene in chosen.scene or SCENES:
-            row, stays = one(scene, chosen.hours, chosen.rate, Path(root))
+        for scene in chosen.scene or kinds:
+            of = watched if scene == "watched" else partial(one, scene)
+            row, stays = of(chosen.hours, chosen.rate, Path(root))
             rows, flat = [*rows, row], flat and stays
             print(row, flush=True)
     text = "\n".join(

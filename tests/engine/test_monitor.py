@@ -100,6 +100,20 @@ def test_a_scope_whose_clock_is_slow_is_watched_on(monkeypatch):
     assert np.ravel(spans) == pytest.approx([0.0, 60.0] * 3, abs=0.03)
 
 
+def test_an_endless_monitor_goes_on_until_it_is_stopped():
+    """One without end ended by itself after a day, without a word."""
+
+    def emit(event):
+        if isinstance(event, events.Progress) and event.elapsed > 5:
+            monitor.stop("enough")
+
+    overrides = ("protocol.duration=1 s", "record.sample_rate=1 kS/s")
+    monitor = Monitor(load("monitor", overrides), emit=emit, endless=True)
+    ending = monitor.run()
+    assert ending.state is RunState.ABORTED
+    assert monitor.live.reach > 4.5
+
+
 def test_what_pushes_is_not_watched():
     with pytest.raises(SceneError, match="asks for a force"):
         Monitor(load("demo"))
