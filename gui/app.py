@@ -19,7 +19,7 @@ from gui.look.theme import Theme
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips
-from tactile_lab.engine.memory import share_heap
+from tactile_lab.engine.memory import map_large, share_heap
 from tactile_lab.engine.threads import start
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def main(
     # Python threads hand over every 5 ms by default: too long for a frame of 33 ms
     sys.setswitchinterval(1e-3)
     share_heap()
+    map_large()
     app = application(["tactile-lab"])
     chosen = Theme(theme)
     chosen.apply()

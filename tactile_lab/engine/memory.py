@@ -19,8 +19,12 @@ from pathlib import Path
 
 GLIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 
-ARENA_MAX = -8
-"""`M_ARENA_MAX` of glibc's malloc.h: how many heaps threads share."""
+ARENA_MAX, MMAP_THRESHOLD = -8, -3
+"""`M_ARENA_MAX` and `M_MMAP_THRESHOLD` of glibc's malloc.h: how many heaps threads
+share, and the size, bytes, from which on memory is mapped alone."""
+
+LARGE = 1 << 20
+"""Such a size, bytes: of the pyramids of a run of half a minute and longer."""
 
 UNCHANGED = re.compile(
     r"^([0-9a-f]+)-([0-9a-f]+) r-[x-]p .*[.]so[.0-9]*\n"
@@ -36,6 +40,17 @@ def share_heap() -> None:
     mallopt = getattr(GLIBC, "mallopt", None)
     if mallopt is not None:
         mallopt(ARENA_MAX, 1)
+
+
+def map_large() -> None:
+    """Have what is large come and go alone: it left the heap full of holes.
+
+    glibc does so until the first of that size is freed. Not for whoever streams: each
+    block would cost the faults of its pages.
+    """
+    mallopt = getattr(GLIBC, "mallopt", None)
+    if mallopt is not None:
+        mallopt(MMAP_THRESHOLD, LARGE)
 
 
 def give_back() -> None:

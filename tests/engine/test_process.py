@@ -2,6 +2,7 @@
 
 import os
 import re
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -78,6 +79,37 @@ def test_only_what_is_in_a_library_as_in_its_file_is_forgotten():
     assert resident(*libraries, "Anonymous") >= written
     assert resident(*libraries) < whole
     assert np.linalg.eigvalsh(np.eye(3)).tolist() == [1, 1, 1]
+
+
+HOLES = """
+import re, sys
+from pathlib import Path
+import numpy as np
+from tactile_lab.engine import memory
+
+def heap():
+    maps = Path("/proc/self/maps").read_text()
+    low, high = re.findall(r"(\\w+)-(\\w+) .*[[]heap[]]", maps)[0]
+    return int(high, 16) - int(low, 16)
+
+memory.share_heap()
+if "map" in sys.argv:
+    memory.map_large()
+del (first := [np.ones(1 << 20)])[:]  # from now on glibc keeps so much in its heap
+before, kept = heap(), []
+large = [(np.ones(1 << 18), kept.append(bytes(1000 + n))) for n in range(20)]
+print(heap() - before)
+"""
+
+
+@forks
+def test_what_is_large_leaves_no_holes_in_the_heap():
+    """The window grew by 10 MB in 16 runs."""
+    kept, mapped = (
+        int(subprocess.check_output([sys.executable, "-c", HOLES, word], timeout=120))
+        for word in ("keep", "map")
+    )
+    assert kept > 30e6 > 5e6 > mapped
 
 
 def test_an_engine_that_cannot_be_started_is_lost(monkeypatch):
