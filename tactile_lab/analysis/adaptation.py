@@ -100,7 +100,8 @@ def fit_adaptation(spike_times: ArrayLike, hold: tuple[float, float]) -> Adaptat
 
     Raises:
         NotIdentifiableError: fewer than 10 intervals, a rate that does not fall, a
-            hold shorter than 2/|beta|, or a time constant no better known than itself.
+            hold shorter than 2/|beta|, a time constant below the shortest interval, or
+            no better known than itself.
         ParameterError: times not finite or not increasing.
     """
     times = within(spike_times, hold)
@@ -125,6 +126,11 @@ def fit_adaptation(spike_times: ArrayLike, hold: tuple[float, float]) -> Adaptat
         raise NotIdentifiableError(
             f"2/|beta|, about {SHORTEST_HOLD / -beta:.2g} s, exceeds the hold of "
             f"{length:.3g} s"
+        )
+    if -1 / beta < (shortest := float(np.min(ends - starts))):
+        raise NotIdentifiableError(
+            f"1/|beta|, about {-1 / beta:.2g} s, is below the shortest interval, "
+            f"{shortest:.2g} s, so that one interval alone would tell it"
         )
     if alpha.low <= 0:
         raise NotIdentifiableError("the fall is within the train's irregularity")

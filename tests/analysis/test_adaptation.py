@@ -110,3 +110,13 @@ def test_a_rate_that_does_not_fall(slope):
 def test_students_quantile():
     assert student_95(7) == pytest.approx(2.3646, abs=2e-3)
     assert student_95(30) == pytest.approx(2.0423, abs=1e-4)
+
+
+def test_a_fall_within_the_first_interval_is_no_law():
+    """Of a sensor over a grating: it stood as 3.0 ms (2.6 to 3.7 ms), alpha 50 MHz."""
+    train = [
+        0.1101, 0.1537, 0.2193, 0.2408, 0.3130, 0.3361, 0.4093, 0.4343, 0.5083,
+        0.5342, 0.6093, 0.6352, 0.7114, 0.7370, 0.8139,
+    ]  # fmt: skip
+    with pytest.raises(NotIdentifiableError, match="below the shortest interval"):
+        fit_adaptation(train, (0.18, 0.82))
