@@ -39,6 +39,17 @@ def test_what_fits_is_not_remarked_on(run_scene):
     assert warnings(run_scene(*SHORT, MEASURED)) == []
 
 
+def test_a_port_that_got_another_name_is_told(run_scene):
+    def moved(scene):
+        made = open_bench(scene, needs(scene))
+        settings = made.coil.settings
+        made.coil.settings = lambda: settings() | {"moved": "It is at another port."}
+        return made
+
+    ran = run_scene(*SHORT, "protocol.hold=0.3 s", bench=moved)
+    assert warnings(ran) == ["It is at another port."]
+
+
 def test_a_short_hold_with_a_short_rest_is_not_doubted(run_scene):
     """The shunt's mean ended with the trial, that of the read-back 0.2 s later."""
     short = ("protocol.hold=0.3 s", "protocol.rest=0.1 s")

@@ -15,7 +15,7 @@ from tactile_lab.report.from_run import read
 from tactile_lab.report.results import results
 from tactile_lab.scene.load import load
 
-SHORT = ("protocol.hold=0.6 s", "record.sample_rate=20 kS/s")
+SHORT = ("protocol.hold=0.4 s", "record.sample_rate=20 kS/s")
 
 
 def checked(folder, *overrides, **faults):
