@@ -12,7 +12,13 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtGui import (
+    QContextMenuEvent,
+    QGuiApplication,
+    QKeyEvent,
+    QKeySequence,
+    QShortcut,
+)
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gui.ask_file import ask_file
@@ -191,6 +197,7 @@ class Actions(QObject):
                 ("End",), "End of the run", lambda: view.set_follow(True), single=True
             ),
             Shortcut(("N",), "Note", panels.centre.write_note, single=True),
+            Shortcut(("Ctrl+N",), "Note, from a field", panels.centre.write_note),
             Shortcut(("Ctrl+O",), "Open a scene", self.screen.ask_scene),
             Shortcut(("Ctrl+Shift+O",), "Open a run", self.screen.ask_run),
             Shortcut(("Ctrl+K",), "Connect instruments", self.connect_dialog),
@@ -233,6 +240,7 @@ class Actions(QObject):
                 repeats=True,
             ),
             Shortcut(("F10",), "Menu", self.show_menu),
+            Shortcut(("Shift+F10",), "Menu of what has the keyboard", _ask_menu),
             Shortcut(("F11",), "Lanes only", self._focus),
             Shortcut(
                 ("Ctrl+L",), "Lanes in a window of their own", self.lanes_asked.emit
@@ -383,6 +391,15 @@ class Actions(QObject):
     def copy_command(self) -> None:
         """Put the command that runs what the form asks for on the clipboard."""
         QGuiApplication.clipboard().setText(self.panels.setup.request().command())
+
+
+def _ask_menu() -> None:
+    """Ask what has the keyboard for its menu: X11 has no key but Menu for that."""
+    focus = QApplication.focusWidget()
+    if focus is not None:
+        at, why = focus.rect().center(), QContextMenuEvent.Reason.Keyboard
+        asked = QContextMenuEvent(why, at, focus.mapToGlobal(at))
+        QApplication.sendEvent(focus, asked)
 
 
 def _written(event: QKeyEvent) -> str:

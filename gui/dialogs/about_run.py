@@ -117,6 +117,7 @@ class AboutRun(Overlay):
             self.save.setToolTip("Once the run has ended" if live else "")
         self.show_page(0)
         self.open()
+        self.title.setFocus()
         start(lambda: self._look(folder), "about run", finishes=True)
 
     def show_page(self, number: int) -> None:

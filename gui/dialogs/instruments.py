@@ -53,16 +53,20 @@ class InstrumentsPage(QWidget):
         self.attached = AttachedList(theme)
         self.coil_port, self.coil_row = self._ports("Coil source port"), Combo()
         self.meter_port, self.meter_row = self._ports("Teslameter port"), Combo()
+        self.coil_row.setAccessibleName("Kind of coil source")
+        self.meter_row.setAccessibleName("Kind of teslameter")
         self.coil_row.addItems(dialect_ids("coil"))
         self.meter_row.addItems([*dialect_ids("field meter"), BY_PERSON])
         self.scope = Combo()
+        self.scope.setAccessibleName("Oscilloscope")
         for driver in driver_names(ScopeDriver):
             self.scope.addItem(SCOPES.get(driver, driver), driver)
         self.scope.addItem("none", "")
         self.serial = line_edit("Serial number", "serial number, if several")
         words = "vendor library, if not in the usual places"
         self.library = line_edit("Vendor library", words)
-        self.test_coil, self.test_meter = push("Test"), push("Test")
+        self.test_coil = push("Test", name="Test the coil source")
+        self.test_meter = push("Test", name="Test the teslameter")
         self.answers = {"coil": label("", wrap=True), "meter": label("", wrap=True)}
         self._lay_out()
         self.meter_row.currentTextChanged.connect(self._allow)

@@ -15,8 +15,10 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QWidget,
 )
+from shiboken6 import isValid
 
 from gui.parts import STRETCH, bar, lines, row
+from gui.tab_order import in_reading_order
 
 HEADER = 68
 
@@ -35,6 +37,7 @@ class Overlay(QWidget):
         self.card = QFrame(self)
         self.card.setProperty("role", "dialog")
         self._width = width
+        self._before: QWidget | None = None
         shadow = QGraphicsDropShadowEffect(self.card)
         shadow.setBlurRadius(40)
         shadow.setOffset(0, 10)
@@ -58,10 +61,16 @@ class Overlay(QWidget):
         whole.addLayout(said, 1)
 
     def open(self) -> None:
-        """Show the card."""
+        """Show the card, and give it the keyboard unless it has it."""
         self._place()
         self.show()
         self.raise_()
+        focus = QApplication.focusWidget()
+        if focus is None or not self.isAncestorOf(focus):
+            self._before = focus
+            inside = in_reading_order(self.card)
+            if inside:
+                inside[0].setFocus()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Follow the window's size."""
@@ -70,10 +79,16 @@ class Overlay(QWidget):
         return False
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Give the keyboard back to the window; Qt would pick some button."""
-        focus = QApplication.focusWidget()
+        """Give the keyboard back to what had it, or the window; Qt picks any button."""
+        focus, before = QApplication.focusWidget(), self._before
+        self._before = None
         page = self._window.findChild(QWidget, "page")
-        if page is not None and focus is not None and self.isAncestorOf(focus):
+        if page is None or focus is None or not self.isAncestorOf(focus):
+            return
+        there = before is not None and isValid(before)
+        if before is not None and there and before.isEnabled() and before.isVisible():
+            before.setFocus()
+        else:
             page.setFocus()
 
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -256,6 +256,7 @@ class RunsView(QWidget):
         self.compare.setText(
             f"Compare {many} runs" if many in (2, 3) else "Compare: tick 2 or 3"
         )
+        self.compare.setAccessibleName(self.compare.text())
         self.compare.setToolTip("Tick two or three runs to compare them")
         place = 0
         for card in self.cards:

@@ -4,6 +4,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
+from gui.dialogs.about_run import AboutRun
+from gui.dialogs.connect import Connect
 from gui.dialogs.help import Help
 from gui.menu import GearMenu
 from gui.tab_order import in_reading_order
@@ -98,6 +100,39 @@ def test_the_menu_opens_by_key(lab) -> None:
     press(lab, Qt.Key.Key_F10)
     lab.until(lambda: isinstance(lab.app.activePopupWidget(), GearMenu))
     lab.app.activePopupWidget().close()
+
+
+def test_a_card_takes_the_keyboard_and_gives_it_back(lab) -> None:
+    """Enter in the card below would have opened the run again."""
+    lab.runs(1)
+    window = lab.window
+    window.screen_.list_runs()
+    window.review.show_tab(1)
+    lab.until(lambda: window.review.runs.cards)
+    card = window.review.runs.cards[0]
+    card.setFocus()
+    press(lab, Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
+    lab.until(lambda: lab.app.activePopupWidget() is not None)
+    menu = lab.app.activePopupWidget()
+    about = next(one for one in menu.actions() if one.text().startswith("About"))
+    menu.close()
+    about.trigger()
+    shown = window.findChild(AboutRun)
+    lab.until(lambda: shown.isAncestorOf(lab.app.focusWidget()))
+    press(lab, Qt.Key.Key_Escape)
+    assert not shown.isVisible()
+    focus = lab.app.focusWidget()
+    assert window.review.isAncestorOf(focus) or focus is window.page
+    window.page.setFocus()
+    window.review.show_tab(0)
+
+
+def test_every_control_of_connect_has_a_name(lab) -> None:
+    lab.window.actions_.connect_dialog()
+    dialog = lab.window.findChild(Connect)
+    lab.app.processEvents()
+    assert all(names(dialog))
+    dialog.hide()
 
 
 def test_tab_stays_in_an_open_card_and_the_header(lab) -> None:
