@@ -81,8 +81,8 @@ class Matched:
             largest = rounded(np.max(np.abs(self.offsets)) * 1e3)
             text += f", offset {middle} ms (median), {largest} ms at most"
         if self.rate_error.size:
-            middle = float(np.median(self.rate_error)) * 100
-            told = rounded(middle) if abs(middle) >= FINEST else f"below {FINEST}"
+            error = float(np.median(self.rate_error)) * 100
+            told = rounded(error) if abs(error) >= FINEST else f"below {FINEST}"
             text += f", rate error {told} % (median)"
         return text
 
