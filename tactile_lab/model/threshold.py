@@ -14,7 +14,7 @@ def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
     """Where the series a, monotone on [low, high], passes `level` (Illinois' rule)."""
     f_low = (a[0] - level) + series_at(a, ORDER, 2.0 * low - 1.0)
     f_high = (a[0] - level) + series_at(a, ORDER, 2.0 * high - 1.0)
-    u = high
+    u, last = high, 0.0
     for _ in range(100):
         if high - low <= 1e-16 or f_low == f_high:
             break
@@ -22,10 +22,13 @@ def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
         f = (a[0] - level) + series_at(a, ORDER, 2.0 * u - 1.0)
         if abs(f) <= 1e-16 * abs(level):
             break
+        # an end that stays twice counts for half of what it is
+        half = 0.5 if f * last > 0.0 else 1.0
+        last = f
         if (f > 0.0) == (f_low > 0.0):
-            low, f_low, f_high = u, f, 0.5 * f_high
+            low, f_low, f_high = u, f, half * f_high
         else:
-            high, f_high, f_low = u, f, 0.5 * f_low
+            high, f_high, f_low = u, f, half * f_low
     return u
 
 

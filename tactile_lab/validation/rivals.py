@@ -155,7 +155,7 @@ def located(method: int, dense: FloatArray, level: float) -> float:
     low, high = 0.0, 1.0
     f_low = dense_at(method, dense, 1, 0.0) - level
     f_high = dense_at(method, dense, 1, 1.0) - level
-    u = 1.0
+    u, last = 1.0, 0.0
     for _ in range(60):
         if high - low <= 1e-15 or f_high == f_low:
             break
@@ -163,10 +163,13 @@ def located(method: int, dense: FloatArray, level: float) -> float:
         f = dense_at(method, dense, 1, u) - level
         if abs(f) <= 4e-16 * abs(level):
             break
+        # an end that stays twice counts for half of what it is
+        half = 0.5 if f * last > 0.0 else 1.0
+        last = f
         if f < 0.0:
-            low, f_low, f_high = u, f, 0.5 * f_high
+            low, f_low, f_high = u, f, half * f_high
         else:
-            high, f_high, f_low = u, f, 0.5 * f_low
+            high, f_high, f_low = u, f, half * f_low
     return u
 
 
