@@ -18,8 +18,8 @@ TAU_L, V_FIRE, V_RESET, T_EPS, Y_CRITICAL, Y_SATURATED = range(12, 18)
 """Where `par` holds what T1 and the integrator need."""
 PARAMETERS = 18
 
-SHORT, LONG = 24.0, 48.0
-"""Pieces of up to SHORT tau_L resolve exp(-t/tau_L); from LONG on they need not."""
+SHORT = 24.0
+"""Pieces of up to so many tau_L can resolve exp(-t/tau_L)."""
 MOST_TERMS = 40
 
 
@@ -32,7 +32,7 @@ def omega(z: float) -> float:
             return w
         w *= 1.0 - w / (1.0 + w)
     elif z < 3.0:
-        w = 0.567 + (z - 0.0) * (0.362 + 0.0737 * z - 0.003 * z * z)
+        w = 0.567 + z * (0.362 + 0.0737 * z - 0.003 * z * z)
         w = max(w, 0.2)
     else:
         log = math.log(z)
@@ -42,7 +42,7 @@ def omega(z: float) -> float:
         r = z - w - math.log(w)
         one = 1.0 + w
         a = one * (one + 2.0 / 3.0 * r)
-        w *= 1.0 + r / one * (a - 0.5 * r) / (a - r)
+        w *= 1.0 + r * (a - 0.5 * r) / (one * (a - r))
     return w
 
 
@@ -86,21 +86,32 @@ def series_at(series: FloatArray, degree: int, x: float) -> float:
     b1 = b2 = 0.0
     x2 = 2.0 * x
     for n in range(degree, 0, -1):
-        b1, b2 = series[n] + x2 * b1 - b2, b1
+        b1, b2 = (series[n] - b2) + x2 * b1, b1
     return x * b1 - b2
 
 
 @inner
 def both_at(q: FloatArray, P: FloatArray, degree: int, x: float) -> tuple[float, float]:
-    """The series q and P at x, both whole, in one run of Clenshaw's recurrence."""
-    b1 = b2 = c1 = c2 = 0.0
-    x2 = 2.0 * x
-    for n in range(degree, ORDER, -1):
-        b1, b2 = P[n] + x2 * b1 - b2, b1
-    for n in range(min(degree, ORDER), 0, -1):
-        b1, b2 = P[n] + x2 * b1 - b2, b1
-        c1, c2 = q[n] + x2 * c1 - c2, c1
-    return q[0] + x * c1 - c2, P[0] + x * b1 - b2
+    """The series q and P at x, both whole; a zero follows either's last coefficient.
+
+    Clenshaw's recurrence in T_2(x) for even and odd terms apart: four sums, none of
+    which waits for another.
+    """
+    y = 4.0 * x * x - 2.0
+    P_0 = P_2 = P_1 = P_3 = 0.0
+    q_0 = q_2 = q_1 = q_3 = 0.0
+    top = degree // 2
+    for k in range(top, ORDER // 2, -1):
+        P_0, P_2 = (P[2 * k] - P_2) + y * P_0, P_0
+        P_1, P_3 = (P[2 * k + 1] - P_3) + y * P_1, P_1
+    for k in range(min(top, ORDER // 2), 0, -1):
+        P_0, P_2 = (P[2 * k] - P_2) + y * P_0, P_0
+        P_1, P_3 = (P[2 * k + 1] - P_3) + y * P_1, P_1
+        q_0, q_2 = (q[2 * k] - q_2) + y * q_0, q_0
+        q_1, q_3 = (q[2 * k + 1] - q_3) + y * q_1, q_1
+    of_P = (0.5 * y * P_0 - P_2) + x * ((P[1] - P_3) + (y - 1.0) * P_1)
+    of_q = (0.5 * y * q_0 - q_2) + x * ((q[1] - q_3) + (y - 1.0) * q_1)
+    return q[0] + of_q, P[0] + of_P
 
 
 @inner
@@ -110,25 +121,37 @@ def needed(q: FloatArray, P: FloatArray, degree: int, least: float) -> int:
         if degree <= ORDER and abs(q[degree]) > least:
             break
         degree -= 1
+    P[degree + 1] = 0.0
     return degree
 
 
 @inner
-def particular(q: FloatArray, r: float, P: FloatArray) -> int:
+def particular(q: FloatArray, r: float, largest: float, P: FloatArray) -> int:
     """Series of a P with (1/r) dP/du + P = Q, r = piece / tau_L; returns its degree.
 
-    From LONG on it is the one polynomial that solves the equation; below, the one that
-    starts at Q(0), by the tridiagonal recursion of the integrated equation.
+    It is the one polynomial that solves the equation, where that is no larger than Q,
+    `largest` V: its rounding then is no more than Q's own. Else, for up to SHORT, it is
+    the one that starts at Q(0), by the tridiagonal recursion of the integrated
+    equation. Returns 0 where neither will do.
     """
-    if r >= LONG:
-        # P_n = q_n - (2/r) (dP/dx)_n, from the top; d_n the coefficients of dP/dx
-        later = d = 0.0
-        P[ORDER] = q[ORDER]
-        for n in range(ORDER - 1, -1, -1):
-            following = later + 2.0 * (n + 1) * P[n + 1]
-            later, d = d, following
-            P[n] = q[n] - (2.0 / r) * (following if n else 0.5 * following)
-        return ORDER
+    # P_n = q_n - (2/r) (dP/dx)_n, from the top; d_n the coefficients of dP/dx
+    later = d = size = 0.0
+    per = 2.0 / r
+    top = ORDER
+    while top > 1 and abs(q[top]) <= 2e-16 * largest:
+        P[top] = 0.0
+        top -= 1
+    P[top] = q[top]
+    for n in range(top - 1, -1, -1):
+        following = later + 2.0 * (n + 1) * P[n + 1]
+        later, d = d, following
+        change = per * (following if n else 0.5 * following)
+        P[n] = q[n] - change
+        size += abs(change)
+    if size <= largest:
+        return top
+    if r > SHORT:
+        return 0
     degree = min(ORDER + 2 + math.ceil(r), MOST_TERMS)
     half = 0.5 * r
     # P_n = alpha_n - beta_n P_(n-1), from the top; beta kept in P's upper half

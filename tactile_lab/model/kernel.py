@@ -11,9 +11,7 @@ import numpy as np
 from tactile_lab.model.circuit import LARGEST_VOLTAGE, FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import (
-    LONG,
     MOST_TERMS,
-    SHORT,
     T_EPS,
     TAU_L,
     V_FIRE,
@@ -38,9 +36,12 @@ from tactile_lab.model.node_a import (
 )
 from tactile_lab.model.spiking import (
     COUNT,
+    EPS,
     RESUME,
     TOO_FAST,
     VOLTAGE,
+    grown,
+    most_spikes,
     run_piece,
 )
 from tactile_lab.model.tableau import NODES, ORDER
@@ -167,7 +168,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         values = np.empty(ORDER + 1)
         part = np.empty(ORDER + 1)
         a = np.empty(ORDER + 1)
-        q = np.empty(ORDER + 1)
+        q = np.zeros(ORDER + 2)
         P = np.empty(2 * MOST_TERMS + 2)
         fires = np.empty(4)
         piece_fires = np.empty(4)
@@ -267,7 +268,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 error_in = node[Y_ERROR]
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, values[ORDER]))
-                floor = 2.5e-16 * (biggest + 12.0 * depth) + unsolved
+                floor = EPS * (biggest + 12.0 * depth) + unsolved
                 error = error_in + left + layer + floor
                 node[Y_LARGEST_ERROR] = max(node[Y_LARGEST_ERROR], error)
                 node[Y_ERROR] = (
@@ -314,13 +315,15 @@ def _build(stamp: int) -> Callable[..., Any]:
                         )
                         piece = width * h
                         r = piece / par[TAU_L]
-                        if left_q > limit or SHORT < r < LONG:
+                        degree = 0
+                        if left_q <= limit:
+                            degree = particular(q, r, largest_Q, P)
+                        if degree == 0:
                             width *= 0.5
                             if width < 1e-12:
                                 status = STUCK
                                 break
                             continue
-                        degree = particular(q, r, P)
                         degree = needed(q, P, degree, 1e-18 * largest_Q)
                         counts[PIECES] += 1
                         size = left_q
@@ -372,8 +375,11 @@ def _build(stamp: int) -> Callable[..., Any]:
                         over = 1.0
                         if width == 1.0:
                             over = min(1.0, 0.02 + (0.1 * r) ** 4)
-                        Q_error = gain * Q_error_y + 2.5e-16 * largest_Q
-                        spikes = run_piece(
+                        Q_error = gain * Q_error_y + EPS * largest_Q
+                        if keep_spikes:
+                            more = most_spikes(piece, q[0] + size, most, par)
+                            spikes = grown(spikes, int(S[COUNT]) + more)
+                        run_piece(
                             t, s + u * h, piece, q, P, degree, piece_fires, Q_error,
                             missed, swing, over, values[ORDER], par, S, spikes,
                             keep_spikes, most,

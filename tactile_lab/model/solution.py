@@ -72,15 +72,15 @@ class Solution:
     @cached_property
     def after(self) -> State:
         """The state at the end, after any jump or reset there."""
-        S, node, before = self.memory, self.node, self.before
+        S, node, before = self.memory.tolist(), self.node.tolist(), self.before
         resume = None
-        V_C2 = float(S[spiking.VOLTAGE])
+        V_C2 = S[spiking.VOLTAGE]
         if not self.need.integrator:
             V_C2, resume = before.V_C2, before.resume
         elif S[spiking.RESUME] >= 0:
             V_C2 = self.circuit.fire_voltage
-            resume = self.end + float(S[spiking.RESUME])
-        last, previous = float(S[spiking.LAST]), float(S[spiking.PREVIOUS])
+            resume = self.end + S[spiking.RESUME]
+        last, previous = S[spiking.LAST], S[spiking.PREVIOUS]
         left_out = tuple(
             name
             for name, solved in (
@@ -90,16 +90,16 @@ class Solution:
         )  # fmt: skip
         return State(
             time=self.end,
-            force=float(node[kernel.FORCE]),
-            V_P=float(node[kernel.V_P]),
-            V_C1=float(node[kernel.Y]),
+            force=node[kernel.FORCE],
+            V_P=node[kernel.V_P],
+            V_C1=node[kernel.Y],
             V_C2=V_C2,
             resume=resume,
             last_spike=last if last > -math.inf else None,
             previous_spike=previous if previous > -math.inf else None,
             spikes=before.spikes + int(S[spiking.COUNT]),
-            error_V_C1=float(node[kernel.Y_ERROR]),
-            error_V_C2=float(S[spiking.ERROR]),
+            error_V_C1=node[kernel.Y_ERROR],
+            error_V_C2=S[spiking.ERROR],
             errors_together=self.errors_together,
             left_out=left_out,
         )

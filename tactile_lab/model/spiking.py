@@ -37,11 +37,11 @@ SHORTEST_INTERVAL = 1e-9
 
 @inner
 def grown(spikes: FloatArray, count: int) -> FloatArray:
-    """The array, or a copy of twice its size where it is full."""
+    """The array if it has a place `count`, or a copy of at least twice its size."""
     if count < spikes.size:
         return spikes
-    larger = np.empty(2 * spikes.size)
-    for i in range(count):
+    larger = np.empty(max(2 * spikes.size, count + 1))
+    for i in range(spikes.size):
         larger[i] = spikes[i]
     return larger
 
@@ -85,6 +85,16 @@ def later(
 
 
 @inner
+def most_spikes(length: float, highest: float, most: float, par: FloatArray) -> int:
+    """What number of spikes cannot be exceeded in `length` s where Q <= `highest` V."""
+    V_f, V_r = par[V_FIRE], par[V_RESET]
+    if not highest > V_f:
+        return 2
+    least = par[T_EPS] + par[TAU_L] * math.log1p((V_f - V_r) / (highest - V_f))
+    return 2 + int(min(1.001 * length / least, most))
+
+
+@inner
 def run_piece(
     t: float,
     s: float,
@@ -103,19 +113,21 @@ def run_piece(
     spikes: FloatArray,
     keep: bool,
     most: float,
-) -> FloatArray:
+) -> None:
     """Carry V_C2 through a piece that starts s after the segment's start at t.
 
     `fires` holds pairs (from, to) of the intervals with Q > V_fire, s after the piece's
     start, empty ones with to <= from. Q is wrong by `Q_error` for long, and by `missed`
     to and fro, of which V_C2 sums up no more than `swing`, V, over the whole piece
-    `over` times that. Returns the array of spikes, grown if need be.
+    `over` times that. `spikes` has room for as many as Q allows, see `most_spikes`.
     """
     tau = par[TAU_L]
+    per_tau = 1.0 / tau
     to_x = 2.0 / length
     V_f, V_r = par[V_FIRE], par[V_RESET]
     known = again = False
-    Q = P_now = 0.0
+    Q = P_now = drift = 0.0
+    d_1 = d_2 = d_3 = 0.0  # the last intervals
     for k in range(fires.size // 2):
         a, b = fires[2 * k], fires[2 * k + 1]
         while b > a:
@@ -137,57 +149,72 @@ def run_piece(
             need = V_f - V
             low, high = 0.0, left
             sure = False
-            d = max(a - ref, 0.0)
-            e = math.expm1(-d / tau)
+            d, e = max(a - ref, 0.0), 0.0
             if need > 0.0:
                 d = left
-                if -above > need:
+                if d_3 > 0.0:
+                    d = 3.0 * (d_1 - d_2) + d_3
+                elif -above > need:
                     # as if P went on in a straight line
-                    drift = (Q_ref - P_ref) / tau
+                    rises = (Q_ref - P_ref) * per_tau
                     d = -tau * math.log1p(need / above)
-                    rise = drift - (above + need) / tau
+                    rise = rises - (above + need) * per_tau
                     if rise > 0.0:
-                        d -= d * drift / rise
-                    d = min(max(d, 0.0), left)
+                        d -= d * rises / rise
+                d = min(d, left) if d > 0.0 else left
+                drift_before = drift if d_1 > 0.0 else 0.0
                 too_low, margin = False, 0.0
                 for _ in range(100):
                     S[SEARCHES] += 1.0
-                    x = (ref + d) * to_x - 1.0
                     e = math.expm1(-d / tau)
-                    Q, P_now = both_at(q, P, degree, x)
+                    Q, P_now = both_at(q, P, degree, (ref + d) * to_x - 1.0)
                     w = above * e + (P_now - P_ref) - need
-                    slope = (Q - V_f - w) / tau
-                    if w < 0.0:
-                        if d >= left:
-                            too_low = True
-                            margin = -w
-                            break
-                        low = d
-                    else:
-                        high = d
-                        sure = True
-                    # exact where Q is constant; its drift decides what is left
-                    change = np.inf
-                    bend = w / (slope * tau) if slope > 0.0 else -1.0
-                    if bend > -1.0:
-                        change = -tau * math.log1p(bend)
+                    slope = (Q - V_f - w) * per_tau
+                    # V_C2' = (Q - V_C2)/tau_L with Q on a straight line; what bends Q
+                    # decides what is left
+                    drift = (Q - Q_ref) / d
+                    rises = (Q - P_now) * per_tau
+                    change = after = np.inf
+                    if slope > 0.0:
+                        per_slope = 1.0 / slope
+                        z = -w * per_slope * per_tau
+                        g = drift * per_slope
+                        bends = abs(z * (g - rises * per_slope))
+                        if abs(z) < 1e-3:
+                            c = 0.5 - 0.5 * g
+                            change = 1.0 + z * (c + z * c * (2.0 * c - 1 / 3))
+                            change *= z * tau
+                            bends += abs(drift - drift_before) * per_slope
+                            g = 1.0 + abs(g)
+                            after = tau * z * z * (bends + z * z * g * g * g)
+                        elif z < 1.0:
+                            change = -tau * math.log1p(-z)
+                            after = tau * z * z * (bends + abs(g))
                     following = d + change
-                    if following >= high and not sure:
-                        following = left
-                    elif not low <= following <= high:
-                        following = 0.5 * (low + high)
+                    settled = after <= 1e-16 * d and 0.0 < following < left
+                    if not settled:
+                        if w < 0.0:
+                            if d >= left:
+                                too_low = True
+                                margin = -w
+                                break
+                            low = d
+                        else:
+                            high = d
+                            sure = True
+                        if following >= high and not sure:
+                            following = left
+                        elif not low <= following <= high:
+                            following = 0.5 * (low + high)
+                        if sure or following < left:
+                            settled = abs(following - d) <= 1e-15 * d
                     step = following - d
-                    after = abs((Q - Q_ref) / (slope * tau)) * step * step / d
-                    settled = slope > 0.0 and after <= 1e-16 * d
-                    if following >= left and not sure:
-                        settled = False
-                    elif abs(step) <= 1e-15 * d:
-                        settled = True
                     d = following
                     if settled:
                         # the series there, from those just evaluated
-                        P_now += (Q - P_now) / tau * step
-                        Q += (Q - Q_ref) / d * step
+                        bends = 0.5 * step * per_tau * (drift - rises)
+                        P_now += step * (rises + bends)
+                        Q += drift * step
                         break
                 if too_low:
                     known = False
@@ -203,9 +230,10 @@ def run_piece(
             carry = (rough - v) + low_part
             at = t + (s + v)
             if need <= 0.0:
+                e = math.expm1(-d / tau)
                 Q, P_now = both_at(q, P, degree, v * to_x - 1.0)
             known = True
-            slope = (Q - V_f) / tau
+            slope = (Q - V_f) * per_tau
             error = later(S[ERROR], e, Q_error, missed, swing, V_f, again)
             time_error = error / max(slope, 1e-300)
             time_error += EPS * d
@@ -213,11 +241,12 @@ def run_piece(
                 S[DOUBT] = 1.0
             fire(at, time_error, S)
             if keep:
-                spikes = grown(spikes, int(S[COUNT]))
                 spikes[int(S[COUNT]) - 1] = at
             if y < par[Y_SATURATED]:
                 S[SATURATED] = 1.0
-            S[ERROR] = time_error * (Q - V_r) / tau
+            S[ERROR] = time_error * (Q - V_r) * per_tau
+            if again:
+                d_3, d_2, d_1 = d_2, d_1, d
             again = True
             S[REF], S[REF_LOW], S[VOLTAGE] = v, carry, V_r
             if par[T_EPS] > 0.0:
@@ -225,10 +254,10 @@ def run_piece(
             closest = max(SHORTEST_INTERVAL, 4.0 * EPS * abs(at))
             if (need == V_f - V_r and d + par[T_EPS] < closest) or S[COUNT] >= most:
                 S[TOO_FAST] = 1.0
-                return spikes
+                return
     if S[RESUME] >= length:
         S[RESUME] -= length
-        return spikes
+        return
     if S[RESUME] >= 0.0:
         S[REF], S[REF_LOW], S[VOLTAGE], S[RESUME] = S[RESUME], 0.0, V_r, -1.0
         known = False
@@ -246,4 +275,3 @@ def run_piece(
             swing, missed = over * swing, over * missed
         S[ERROR] = later(S[ERROR], e, Q_error, missed, swing, V, again)
     S[REF] = S[REF_LOW] = 0.0
-    return spikes

@@ -109,3 +109,11 @@ def test_a_force_that_holds_V_C1_down_by_a_huge_current_has_an_answer(level):
     assert found.sample("V_C1", np.array([0.3]))[0] < 1e-12
     loose = simulate(Circuit(), push, tolerance=1e-6)
     assert np.abs(found.spike_times - loose.spike_times).max() < 2e-6
+
+
+def test_a_train_takes_one_search_a_spike():
+    """It took 2.1: the next interval was not known from the last ones."""
+    force = Waveform.through([(0, 0), (0.5, 0), (0.5, 0.27)])
+    found = simulate(Circuit(), force, until=2.5, tolerance=1e-6)
+    assert found.spike_times.size == 111
+    assert found.stages["spikes"] < 1.7 * 111
