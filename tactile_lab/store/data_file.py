@@ -106,6 +106,7 @@ def open_data(path: Path, *, live: bool) -> h5py.File:
     """
     if live:
         return h5py.File(path, "r", libver="latest", swmr=True)
+    _check_texts(path)
     try:
         return h5py.File(path, "r", libver="latest")
     except OSError as refused:
@@ -113,6 +114,38 @@ def open_data(path: Path, *, live: bool) -> h5py.File:
             return _open_unclosed(path)
         except OSError:
             raise refused from None
+
+
+HEAP = b"GCOL\x01\x00\x00\x00"
+"""With which HDF5 begins a heap of texts (its file format, III.E)."""
+DECLARED = 1 << 20
+"""Length of the file's begin in which all attributes stand, bytes."""
+
+
+def _check_texts(path: Path) -> None:
+    """Refuse a heap of texts in which a free place has no length.
+
+    HDF5 would look for the place behind it for ever as it reads an attribute.
+
+    Raises:
+        OSError: that is so, or the file cannot be read.
+    """
+    with path.open("rb") as file:
+        begin = file.read(DECLARED)
+    at = begin.find(HEAP)
+    while at >= 0:
+        end = min(at + int.from_bytes(begin[at + 8 : at + 16], "little"), len(begin))
+        place = at + 16
+        while place + 16 <= end:
+            used = begin[place : place + 2] != b"\0\0"
+            size = int.from_bytes(begin[place + 8 : place + 16], "little")
+            if not used and size == 0:
+                raise OSError(
+                    f"{path.name} is damaged at byte {place}, among the texts that "
+                    "say what the samples are"
+                )
+            place += 16 + (size + 7) // 8 * 8 if used else size
+        at = begin.find(HEAP, at + len(HEAP))
 
 
 def _open_unclosed(path: Path) -> h5py.File:

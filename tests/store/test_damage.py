@@ -54,6 +54,19 @@ def test_sound_run_has_nothing_lost(complete):
     assert (loss["samples"], loss["spikes"]) == (0, 0)
 
 
+@pytest.mark.parametrize("at", [16, 750])
+def test_a_hole_among_the_texts_of_the_file_is_damage(complete, at):
+    """HDF5 never came back from reading them."""
+    data = bytearray((complete / "data.h5").read_bytes())
+    begin = data.index(b"GCOL") + at
+    data[begin : begin + 512] = bytes(512)
+    (complete / "data.h5").write_bytes(data)
+    (told,) = verify(complete).findings
+    assert "is damaged at byte" in str(told)
+    with pytest.raises(RunFolderError, match="is damaged at byte"):
+        Run.load(complete)
+
+
 @pytest.mark.parametrize("kinds", [["samples"], ["samples", "checks", "pyramid"]])
 def test_a_signal_whose_samples_are_gone_is_damage(complete, kinds):
     """One flipped bit in a name is enough to lose it from the file's list."""
