@@ -102,11 +102,20 @@ def _after(stage: Stage) -> None:
     window.review.show_tab(1)
     window.screen_.list_runs()
     stage.until(lambda: window.review.runs.cards)
-    window.screen_.open_run(window.review.runs.cards[0].entry.folder)
-    stage.live(1.0)
-    stage.until(lambda: getattr(window.screen_.run, "model", None) is not None)
-    window.centre.view.show_span(9.2, 0.6)
-    stage.live(0.4)
+    _old_run(stage, window.review.runs.cards[0].entry.folder)
+
+
+def _old_run(stage: Stage, folder: Path) -> None:
+    """A run from disk where its strongest step begins to fire."""
+    window = stage.window
+    window.screen_.open_run(folder)
+    stage.until(lambda: window.screen_.run is not None and window.screen_.run.has_model)
+    run = window.screen_.run
+    assert run is not None
+    step = [one for one in run.holds if not one.pause][-1]
+    first = float(run.spikes[run.spikes > step.start][0])
+    window.centre.view.show_span(first - 0.15, 0.8)
+    stage.live(0.6)
     stage.shoot("window_old_run")
     window.screen_.close_run()
 
