@@ -11,9 +11,17 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.quantity import show
-from tactile_lab.validation.contest import Method, Row, Truth, judge, methods, truth
+from tactile_lab.validation.contest import (
+    COMPILED,
+    Method,
+    Row,
+    Truth,
+    judge,
+    methods,
+    truth,
+)
 from tactile_lab.validation.extremes import Extreme, extremes, formula
-from tactile_lab.validation.problem import spent
+from tactile_lab.validation.problem import Problem, spent
 from tactile_lab.validation.table import markdown, provenance
 from tactile_lab.waveform import Waveform
 
@@ -46,6 +54,10 @@ def report(
         simulate(circuit, Waveform.constant(0.1), until=0.1)
     known = {(m.name, m.setting): m for m in methods(1, spice_too=False)}
     others = [known.get(rival) for rival in RIVALS.items()] if rivals else []
+    begun = Problem("begun", Circuit(), Waveform.constant(0.1), 0.1)
+    for method in others:
+        if method is not None and method.runs == COMPILED:
+            method.solve(begun, cap=1.0)
     lines, bad = [], 0
     for build in extremes():
         case = build()
