@@ -109,10 +109,14 @@ def test_a_card_takes_the_keyboard_and_gives_it_back(lab) -> None:
     window.screen_.list_runs()
     window.review.show_tab(1)
     lab.until(lambda: window.review.runs.cards)
-    card = window.review.runs.cards[0]
-    card.setFocus()
-    press(lab, Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
-    lab.until(lambda: lab.app.activePopupWidget() is not None)
+
+    def asked() -> bool:
+        """Again and again: a list that was read anew has new cards."""
+        window.review.runs.cards[0].setFocus()
+        press(lab, Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
+        return lab.app.activePopupWidget() is not None
+
+    lab.until(asked)
     menu = lab.app.activePopupWidget()
     about = next(one for one in menu.actions() if one.text().startswith("About"))
     menu.close()
