@@ -86,6 +86,8 @@ def loss_text(loss: Mapping[str, Any]) -> str:
     samples, spikes = loss.get("samples"), loss.get("spikes")
     if samples is None:
         return ""
+    if loss.get("produced") == 0:
+        return "Loss: no samples were kept."
     also = "" if spikes is None else f", {spikes} spikes"
     covered, streamed = loss.get("covered_s"), loss.get("streamed_s")
     if covered is not None and streamed is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
@@ -46,7 +48,10 @@ def trials_table(run: Measurement) -> Table:
         *("Force", "Spikes", "In ramps", "First spike", "Peak rate", "Final rate"),
         *("Fall in hold", "Time constant"),
     )
-    rows = tuple((*(_name(trial),) * named, *_row(run, trial)) for trial in run.results)
+    rows = tuple(
+        (*(_name(trial),) * named, *_row(run, trial), constant)
+        for trial, constant in zip(run.results, _time_constants(run), strict=True)
+    )
     return Table(headings=headings, rows=rows, note=note)
 
 
@@ -143,7 +148,6 @@ def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
         _shown(response.peak_rate, "Hz"),
         _shown(response.final_rate, "Hz"),
         NONE if response.fall is None else f"{100 * response.fall:.0f} %",
-        _time_constant(trial),
     )
 
 
@@ -157,13 +161,22 @@ def _force(trial: MeasuredTrial) -> str | None:
     return None if trial.level is None else show(trial.level, "N")
 
 
-def _time_constant(trial: MeasuredTrial) -> str:
-    """1/|beta| with its 95 % interval, or why there is none."""
-    fit = trial.adaptation
-    if fit is None:
-        return NONE if trial.response.spikes == 0 else trial.why_not
-    tau = fit.time_constant
-    return f"{tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} s)"
+def _time_constants(run: Measurement) -> Iterator[str]:
+    """1/|beta| of each trial with its 95 % interval, or why there is none.
+
+    Why is said once of trials that one after the other have the same reason.
+    """
+    said = ""
+    for trial in run.results:
+        fit = trial.adaptation
+        if fit is not None:
+            tau, said = fit.time_constant, ""
+            yield f"{tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} s)"
+        elif trial.response.spikes == 0:
+            yield NONE
+        else:
+            yield "as above" if trial.why_not == said else trial.why_not
+            said = trial.why_not
 
 
 def _ranged(estimate: Estimate, unit: str) -> str:

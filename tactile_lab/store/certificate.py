@@ -79,6 +79,8 @@ class Certificate:
             samples = f"not known of {self.written:,} samples (the run was cut short)"
         else:
             samples = f"{self.samples:,} of {self.produced:,} samples"
+            if self.produced == 0:
+                samples = "no samples were kept"
             if self.seen_from is not None and self.covered is None:
                 samples += f" (gaps of {show(self.seen_from, 's')} or more are seen)"
         if self.covered is not None and self.streamed is not None:

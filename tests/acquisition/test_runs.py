@@ -16,6 +16,7 @@ from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.table import trials_table
 from tactile_lab.scene.load import load
+from tactile_lab.store.certificate import certify
 from tactile_lab.store.columns import SampleColumn
 from tactile_lab.store.verify import verify
 
@@ -112,6 +113,7 @@ def test_V_K_is_acquired_for_spikes_even_where_it_is_not_stored(run_scene, short
     with ran.stored() as run:
         assert run.signals == ()
         assert run.spikes.size == ran.done.spikes
+        assert str(certify(run)).startswith("loss: no samples were kept")
 
 
 def test_V_C1_alone_searches_no_spikes_and_opens_one_channel(run_scene, short):

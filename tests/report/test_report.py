@@ -169,6 +169,15 @@ def test_the_table_has_one_row_per_trial(demo):
     assert "exceeds the hold of 2 s" in shown.rows[3][-1]
 
 
+def test_the_table_says_once_why_trials_have_no_time_constant(demo):
+    few = demo.trials[1]
+    last = [row[-1] for row in trials_table(replace(demo, trials=(few,) * 3)).rows]
+    assert "10 are needed" in last[0]
+    assert last[1:] == ["as above", "as above"]
+    other = trials_table(replace(demo, trials=(few, demo.trials[3], few))).rows
+    assert "as above" not in [row[-1] for row in other]
+
+
 def test_the_table_stands_in_columns(demo):
     lines = trials_table(find(demo).run).text.splitlines()
     assert sum(not line.startswith(" ") for line in lines) == 6
