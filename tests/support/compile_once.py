@@ -37,6 +37,7 @@ COMMANDS = (
     ("skin", "plain.toml"),
     ("skin", "saturated.toml"),
     ("study", "sweep.toml"),
+    ("validate", "stability", "--case", "R_k", "--cap", "0.01"),
 )
 
 
