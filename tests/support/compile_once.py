@@ -11,6 +11,8 @@ import tempfile
 from pathlib import Path
 
 from tactile_lab.cli import cli
+from tactile_lab.skin.single import simulate_taxel
+from tactile_lab.skin.skin import load_skin
 
 SKIN = """
 duration = "0.1 s"
@@ -50,6 +52,7 @@ def main() -> None:
         Path("sweep.toml").write_text(STUDY)
         for command in COMMANDS:
             cli.main(command, standalone_mode=False)
+        simulate_taxel(load_skin("plain.toml"), 0)
         os.chdir("/")
 
 
