@@ -232,6 +232,18 @@ class Waveform:
         """The same waveform `by` s later."""
         return Waveform(self.time + by, self.value)
 
+    def since(self, start: float) -> Waveform:
+        """From `start` s on, after its first value; itself where it begins later.
+
+        Where it has left that value by then, it jumps at `start`.
+        """
+        if self.start >= start:
+            return self
+        after = self.time > start
+        time = np.concatenate([[start, start], self.time[after]])
+        begun = [self.value[0], self.at(start)]
+        return Waveform.tidied(time, np.concatenate([begun, self.value[after]]))
+
     def scaled(self, by: float) -> Waveform:
         """The same waveform with every value multiplied."""
         return Waveform(self.time, self.value * by)

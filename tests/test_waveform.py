@@ -63,6 +63,15 @@ def test_shift_and_scale(wave, by):
     assert wave.scaled(by).at(wave.time) == pytest.approx(by * wave.at(wave.time))
 
 
+def test_what_was_before_leaves_a_jump_from_the_first_value():
+    wave = Waveform.pulse(2.0, ramp=1.0, hold=1.0)
+    late = wave.shifted(-0.5).since(0.0)
+    assert late == Waveform(
+        np.array([0.0, 0.0, 0.5, 1.5, 2.5]), np.array([0.0, 1.0, 2.0, 2.0, 0.0])
+    )
+    assert wave.shifted(0.5).since(0.0) == wave.shifted(0.5)
+
+
 @given(waveforms())
 def test_segments_cover_the_whole_and_equal_waveforms_hash_alike(wave):
     pieces = list(wave.segments())

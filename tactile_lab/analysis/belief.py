@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.bench import Followers
 from tactile_lab.deviation import Deviation, DrivenCircuit
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.waveform import Waveform
+
+FloatArray = NDArray[np.float64]
 
 PART = 0.05
 """Of a cause's 95 % band by which it is moved: so little that each spike is known
@@ -76,29 +79,48 @@ class Belief:
             "temperature": self.temperature is not None,
         }
 
+    @cached_property
+    def bands(self) -> tuple[tuple[str, str, float], ...]:
+        """Each independent cause of uncertainty: its name, what of, half its 95 % band.
+
+        What: a name in `Deviation`, the "clock", s, or a "push" of all forces, N.
+        """
+        followers, known = self.followers, self.magnet.force_uncertainty
+        bias = 0.0 if followers is None else followers.input_bias_uncertainty
+        found = (
+            ("clocks", "clock", self.clock),
+            ("follower", "input_bias", bias),
+            ("lag", "lag", self.magnet.lag_uncertainty),
+            ("force", "push", 0.0 if known is None else known.absolute),
+            ("force", "force", 0.0 if known is None else known.relative),
+            ("temperature", "temperature", self.temperature),
+        )
+        return tuple((cause, what, size) for cause, what, size in found if size)
+
+    def moved(self, parts: FloatArray) -> DrivenCircuit:
+        """The sensor and its force with each cause moved by a part of its band.
+
+        Args:
+            parts: one for each of `bands`, either sign; 1 is the end of the band.
+        """
+        by = {
+            what: part * size
+            for (_, what, size), part in zip(self.bands, parts, strict=True)
+            if part
+        }
+        later, pushed = by.pop("clock", 0.0), by.pop("push", 0.0)
+        circuit, force = self.deviating(Deviation(**by))
+        if pushed:
+            # at rest there is no force, by definition
+            rest = np.abs(force.value) < STEADY
+            force = Waveform(force.time, force.value + np.where(rest, 0.0, pushed))
+        if later:
+            force = force.shifted(later).since(0.0)
+        return DrivenCircuit(circuit, force)
+
     def displaced(self, part: float = PART) -> Iterator[tuple[str, DrivenCircuit]]:
         """By each independent cause of uncertainty: moved by `part` of its band."""
-        if self.clock > 0:
-            later = self.force.shifted(part * self.clock)
-            yield "clocks", DrivenCircuit(self.driven.circuit, later)
-        followers = self.followers
-        if followers is not None and followers.input_bias_uncertainty > 0:
-            bias = part * followers.input_bias_uncertainty
-            yield "follower", self.deviating(Deviation(input_bias=bias))
-        if self.magnet.lag_uncertainty:
-            lag = part * self.magnet.lag_uncertainty
-            yield "lag", self.deviating(Deviation(lag=lag))
-        known = self.magnet.force_uncertainty
-        if known is not None and known.absolute > 0:
-            # at rest there is no force, by definition
-            rest = np.abs(self.force.value) < STEADY
-            pushed = np.where(rest, 0.0, part * known.absolute)
-            moved = Waveform(self.force.time, self.force.value + pushed)
-            yield "force", DrivenCircuit(self.driven.circuit, moved)
-        if known is not None and known.relative > 0:
-            yield "force", self.deviating(Deviation(force=part * known.relative))
-        if self.temperature:
-            yield (
-                "temperature",
-                self.deviating(Deviation(temperature=part * self.temperature)),
-            )
+        for (cause, _, _), parts in zip(
+            self.bands, part * np.eye(len(self.bands)), strict=True
+        ):
+            yield cause, self.moved(parts)

@@ -2,9 +2,10 @@
 
 Each suspect is fitted alone, by a deviation of one size, to V_C1 and to the intervals
 between spikes. Whatever the bench states a band for (offset of V_C1's channel, clocks,
-follower, lag, force, temperature) may take any value in its band, to first order. The
-suspect that leaves only the noise is named, if every other leaves clearly more; those
-that do not are named with it.
+follower, lag, force, temperature) may take any value in its band: what it does is taken
+to first order about the value found before, until that leaves no less. The suspect that
+leaves only the noise is named, if every other leaves clearly more; those that do not
+are named with it.
 """
 
 from __future__ import annotations
@@ -59,6 +60,9 @@ EXPLAINED = 1.5
 CLEARLY = 1.35
 """Times the misfit of the best that every other suspect must leave at least."""
 
+AGAIN, SETTLED, FARTHEST = 8, 0.1, 0.5
+"""So often what the bands do is taken anew at most; until none moves by this part of
+itself; and the most it may move at once."""
 ROUNDS, DIFFERENCE, LONGEST, CLOSE = 8, 0.03, 3.0, 3e-3
 """Of the search for a size, in its steps."""
 
@@ -178,16 +182,19 @@ def explain(
     if V_C1 is not None and code > 0:
         weight[: problem.bins] = math.sqrt(_levels(V_C1) / problem.bins)
     trial = _Trial(belief, problem, noise, weight)
-    misfit = trial.misfit(trial.freed(trial.plain))
+    left = trial.freed(trial.plain)
+    misfit = trial.misfit(left)
+    # what the bands do was taken where nothing of them is used: again where it is
+    about = trial
+    for _ in range(AGAIN):
+        if misfit < NOTICED or about.settled(left):
+            break
+        about = about.about(belief, about.taken(left))
+        left = about.freed(about.plain)
+        misfit = min(misfit, about.misfit(left))
     if misfit < NOTICED:
         return None
     found = [s for name in SUSPECTS if (s := trial.fitted(name)) is not None]
-    found.sort(key=lambda suspect: suspect.misfit)
-    # what the bands allow was taken where all is as believed: again where it is not
-    for i, first in enumerate(found):
-        there = Deviation(**{first.name: first.size.value})
-        again = _Trial(replace(belief, deviation=there), problem, noise, weight)
-        found[i] = again.fitted(first.name, first.size.value) or first
     found.sort(key=lambda suspect: suspect.misfit)
     return Explanation(misfit, tuple(found))
 
@@ -229,13 +236,17 @@ class _Trial:
         problem: Residuals,
         noise: FloatArray,
         weight: FloatArray,
+        parts: FloatArray | None = None,
     ) -> None:
         self._belief, self._problem, self._weight = belief, problem, weight
-        self._scale = weight / noise
-        self.plain = self._under(belief.driven)
+        self._noise, self._scale = noise, weight / noise
+        size = len(belief.bands)
+        self._parts = np.zeros(size) if parts is None else parts
+        self.plain = self._under(belief.moved(self._parts))
+        # V_C1's offset is of the channel, not of what is believed: its part stays 0
         self._bands = [
-            (cause, (self._under(driven) - self.plain) / PART)
-            for cause, driven in belief.displaced()
+            (band[0], (self._under(belief.moved(self._parts + to)) - self.plain) / PART)
+            for band, to in zip(belief.bands, PART * np.eye(size), strict=True)
         ]
         bins = problem.bins
         if bins and problem.offset > 0:
@@ -243,8 +254,37 @@ class _Trial:
             shifted[:bins] = problem.offset * self._scale[:bins]
             self._bands.append(("offset", shifted))
 
+    def about(self, belief: Belief, parts: FloatArray) -> _Trial:
+        """The same about another belief, and `parts` of its bands."""
+        return _Trial(belief, self._problem, self._noise, self._weight, parts)
+
     def _under(self, driven: DrivenCircuit) -> FloatArray:
         return self._problem.under(driven) * self._scale
+
+    def _free(self, but: str) -> tuple[FloatArray, FloatArray]:
+        """What each band but one cause's does, shape (size, k), and its part here."""
+        parts = np.zeros(len(self._bands))
+        parts[: self._parts.size] = self._parts
+        used = [cause != but for cause, _ in self._bands]
+        columns = [change for cause, change in self._bands if cause != but]
+        free = np.array(columns).reshape(-1, self._problem.size).T
+        return free, parts[used]
+
+    def taken(self, freed: FloatArray, but: str = "") -> FloatArray:
+        """Of what `freed` gave, which part of each of the belief's bands was used."""
+        used = iter(freed[self._problem.size :] / 1.96)
+        taken = np.zeros_like(self._parts)
+        for i, (cause, _, _) in enumerate(self._belief.bands):
+            if cause != but:
+                here = self._parts[i]
+                part = np.clip(next(used), here - FARTHEST, here + FARTHEST)
+                taken[i] = np.clip(part, -BAND, BAND)
+        return taken
+
+    def settled(self, freed: FloatArray, but: str = "") -> bool:
+        """Whether the bands are used as far as they are here."""
+        moved = self.taken(freed, but) - self._parts
+        return float(np.max(np.abs(moved), initial=0.0)) < SETTLED
 
     def freed(self, scaled: FloatArray, but: str = "") -> FloatArray:
         """Residuals less what the bands explain best, then how far each was used.
@@ -257,13 +297,11 @@ class _Trial:
             Shape (size + bands,): the parts of the 95 % bands used stand at the end, in
             standard deviations, so that the sum of squares weighs one with the other.
         """
-        bands = [change for cause, change in self._bands if cause != but]
-        if not bands:
-            return scaled
-        free = np.column_stack(bands)
-        prior = 1.96**2 * np.eye(len(bands))
-        taken = -np.linalg.solve(free.T @ free + prior, free.T @ scaled)
-        return np.concatenate([scaled + free @ taken, 1.96 * taken])
+        free, here = self._free(but)
+        unused = scaled - free @ here
+        prior = 1.96**2 * np.eye(here.size)
+        taken = -np.linalg.solve(free.T @ free + prior, free.T @ unused)
+        return np.concatenate([unused + free @ taken, 1.96 * taken])
 
     def misfit(self, freed: FloatArray) -> float:
         """Root mean square of each kind of evidence, or bands overused: the largest."""
@@ -276,34 +314,47 @@ class _Trial:
 
     def _told(self, slope: FloatArray, but: str) -> float:
         """What the data tell of a size, 1/step^2, each band's cause left free in it."""
-        told = float(slope @ slope)
-        bands = [change for cause, change in self._bands if cause != but]
-        if bands:
-            free = np.column_stack(bands)
-            shared = free.T @ slope
-            prior = 1.96**2 * np.eye(len(bands))
-            told -= float(shared @ np.linalg.solve(free.T @ free + prior, shared))
-        return max(told, 1e-300)
+        free, _ = self._free(but)
+        shared = free.T @ slope
+        prior = 1.96**2 * np.eye(free.shape[1])
+        told = slope @ slope - shared @ np.linalg.solve(free.T @ free + prior, shared)
+        return max(float(told), 1e-300)
 
-    def fitted(self, name: str, at: float = 0.0) -> Suspect | None:
-        """The suspect's best size, sought from `at`, where the belief is already.
+    def fitted(self, name: str) -> Suspect | None:
+        """The suspect of its best size; None where the model cannot follow it."""
+        own, trial, found, size = OWN.get(name, name), self, None, 0.0
+        for _ in range(1 + AGAIN):
+            try:
+                found, left = trial._best(name, size)
+                if trial is not self and trial.settled(left, own):
+                    break
+                size = found.size.value
+                there = replace(self._belief, deviation=Deviation(**{name: size}))
+                trial = self.about(there, trial.taken(left, own))
+            except TactileLabError:
+                break
+        return found
 
-        None where the model cannot follow it.
+    def _best(self, name: str, at: float) -> tuple[Suspect, FloatArray]:
+        """The suspect, sought from `at`, where the belief is already; what it leaves.
+
+        Raises:
+            TactileLabError: the model cannot follow it.
         """
         step, own = SUSPECTS[name], OWN.get(name, name)
+        believed = self._belief.deviation
 
         def residual(x: float) -> FloatArray:
-            return self._under(self._belief.deviating(Deviation(**{name: step * x})))
+            off = believed + Deviation(**{name: step * x})
+            moved = replace(self._belief, deviation=off).moved(self._parts)
+            return self._under(moved)
 
-        try:
-            x, left = _least(lambda x: self.freed(residual(x), own))
-            slope = (residual(x + DIFFERENCE) - residual(x)) / DIFFERENCE
-        except TactileLabError:
-            return None
+        x, left = _least(lambda x: self.freed(residual(x), own))
+        slope = (residual(x + DIFFERENCE) - residual(x)) / DIFFERENCE
         misfit = self.misfit(left)
         error = step * max(misfit, 1.0) / math.sqrt(self._told(slope, own))
         size = Estimate.of(at + step * x, error, self._problem.size - 1)
-        return Suspect(name, size, misfit)
+        return Suspect(name, size, misfit), left
 
 
 def _least(residual: Callable[[float], FloatArray]) -> tuple[float, FloatArray]:

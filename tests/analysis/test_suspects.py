@@ -99,6 +99,28 @@ def test_what_the_bench_s_bands_allow_needs_no_explanation(within):
     assert explained(Deviation(**within)) is None
 
 
+def fired(deviation, late, clock=46e-3):
+    """What is made of spikes alone, by clocks that are off by `late` s."""
+    belief = replace(BELIEF, clock=clock)
+    circuit, force = belief.deviating(deviation)
+    true = simulate(circuit, force.shifted(late).since(0.0), keep=("spikes",))
+    return explain(belief, true.duration, spike_times=true.spike_times)
+
+
+@pytest.mark.parametrize("late", [-40e-3, -7.3e-3, 7.3e-3, 40e-3])
+def test_clocks_within_a_wide_band_need_no_explanation(late):
+    assert fired(Deviation(), late) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "late"), [("V_GS", -4e-3, -20e-3), ("R1", 0.03, -10e-3)]
+)
+def test_a_cause_is_named_though_clocks_are_off_within_a_wide_band(name, size, late):
+    cause = fired(Deviation(**{name: size}), late).cause
+    assert cause.name == name
+    assert cause.size.value == pytest.approx(size, rel=0.02)
+
+
 def test_steps_of_a_converter_that_no_noise_smooths_are_no_misfit():
     code, true = 10 / 254, simulate(*BELIEF.driven, keep=("V_C1", "spikes"))
     time = (np.arange(1000) + 0.5) * true.duration / 1000
