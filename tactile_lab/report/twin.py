@@ -158,7 +158,9 @@ def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
             )
     if beside.explanation is not None:
         said.append(
-            f"It misses by more than what is stated allows. {beside.explanation.text}"
+            "It misses by more than what is stated allows, all data taken together, "
+            "though each may lie within its own tolerance. "
+            f"{beside.explanation.text}"
         )
     for residual in found.residuals:
         shifted = (

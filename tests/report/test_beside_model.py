@@ -10,6 +10,7 @@ from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.identified import identify_run
 from tactile_lab.report.results import results
+from tactile_lab.report.twin import sentences
 from tactile_lab.scene.load import load
 
 SHORT = {
@@ -76,7 +77,10 @@ def test_the_error_budget_tells_what_is_stated_and_what_is_not(as_believed):
 
 
 def test_a_surprise_is_found_out_by_the_report(tmp_path):
-    found = find(ran(tmp_path, input_bias=60e-12)).beside
+    findings = find(ran(tmp_path, input_bias=60e-12))
+    found = findings.beside
+    (said,) = (s for s in sentences(found, findings.run) if "It misses" in s)
+    assert "all data taken together, though each may lie within its own" in said
     assert found.explanation.cause.name == "input_bias"
     size = found.explanation.cause.size
     assert size.low <= 60e-12 <= size.high
