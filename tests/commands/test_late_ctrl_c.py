@@ -13,28 +13,16 @@ from tactile_lab.store.folder import read_info
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 
+SUPPORT = Path(__file__).parents[1] / "support"
+
 PROGRAM = """
-import os, signal, sys
-from threading import Event
+import sys
+from late_ctrl_c import late
 from tactile_lab.cli import main
 from tactile_lab.commands import day_one
 from tactile_lab.engine.execution import Execution
 
-run, heard = Execution.run, Event()
-
-def run_until_late(execution):
-    done, stop = run(execution), execution.stop
-
-    def heeded(*reason, **more):
-        stop(*reason, **more)
-        heard.set()
-
-    execution.stop = heeded
-    os.kill(os.getpid(), signal.SIGINT)
-    assert heard.wait(600)
-    return done
-
-Execution.run = run_until_late
+Execution.run = late(Execution.run)
 day_one._verb = lambda words: (words[0], "")  # doctor and devices have their own tests
 main(sys.argv[1:])
 """
@@ -46,7 +34,7 @@ def ended(*arguments: object, state: Path) -> "subprocess.CompletedProcess[str]"
         [sys.executable, "-c", PROGRAM, *map(str, arguments)],
         capture_output=True,
         text=True,
-        env=os.environ | {"XDG_STATE_HOME": str(state)},
+        env=os.environ | {"XDG_STATE_HOME": str(state), "PYTHONPATH": str(SUPPORT)},
     )
 
 

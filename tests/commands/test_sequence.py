@@ -1,15 +1,14 @@
 """Several runs in turn: planned before, kept on disk, gone on with after a fault."""
 
 import json
-import os
 import signal
 import socket
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
-from threading import Event
 
 import pytest
+from late_ctrl_c import late
 
 from tactile_lab.commands.status_server import StatusServer
 from tactile_lab.engine.execution import Execution
@@ -145,21 +144,7 @@ def test_ctrl_c_as_a_run_is_complete_begins_no_other(
     sequence, asked, tmp_path, monkeypatch
 ):
     """It comes when all is stored, so the run cannot be ended by it any more."""
-    run, heard = Execution.run, Event()
-
-    def run_until_late(execution):
-        done, stop = run(execution), execution.stop
-
-        def heeded(*reason, **more):
-            stop(*reason, **more)
-            heard.set()
-
-        execution.stop = heeded
-        os.kill(os.getpid(), signal.SIGINT)
-        assert heard.wait(60)
-        return done
-
-    monkeypatch.setattr(Execution, "run", run_until_late)
+    monkeypatch.setattr(Execution, "run", late(Execution.run))
     answer = sequence(asked({"scene": "demo", "times": 2}))
     assert answer.code == 130, answer.err
     assert [status for status, _ in kept(tmp_path)] == ["complete", ""]
