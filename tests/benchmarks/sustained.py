@@ -112,7 +112,7 @@ def one(rate: float, seconds: float, root: Path) -> str:
     took = time.monotonic() - began
     thread.leave()
     thread.join(5)
-    intake.end()
+    intake.end(intake.reached)
     try:
         recorder.close("faulted" if ended else "complete", intake.produced)
     except TactileLabError as error:
