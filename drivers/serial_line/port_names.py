@@ -11,10 +11,9 @@ import json
 import os
 from contextlib import suppress
 from pathlib import Path
-from urllib.parse import quote
 
 from tactile_lab.errors import RecordingError
-from tactile_lab.lab import state_folder
+from tactile_lab.lab import kept_of_port
 from tactile_lab.store.folder import replacing
 
 BY_ID = Path("/dev/serial/by-id")
@@ -46,7 +45,7 @@ class PortNames:
         self.named = named
         self.identity: str | None = None
         self._lasting: str | None = None
-        self._file = state_folder() / "ports" / f"{quote(named, safe='')}.json"
+        self._file = kept_of_port("ports", named)
         with suppress(OSError, ValueError, TypeError, KeyError):  # then nothing is kept
             kept = json.loads(self._file.read_bytes())
             self._lasting, self.identity = str(kept["lasting"]), str(kept["identity"])

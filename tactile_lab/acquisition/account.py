@@ -237,8 +237,6 @@ class Account:
         """Find the newest set-points' edges in the binned coil current."""
         if self._origin is not None:
             found = find_edges(self._steps, self._origin, shunt, self._clocks)
-            for edge in found:
-                self._clocks = self._clocks.seen(edge)
             # the first and the newest fix the clocks; those between add nothing
             del self.edges[CLUSTER:-CLUSTER]
             self.edges.extend(found)

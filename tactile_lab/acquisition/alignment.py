@@ -68,7 +68,7 @@ class Alignment:
     uncertainty: float
 
 
-@dataclass(frozen=True)
+@dataclass
 class Clocks:
     """How the two clocks stood to each other when that was last seen.
 
@@ -80,10 +80,10 @@ class Clocks:
     at: float = 0.0
     late: float = 0.0
 
-    def seen(self, edge: Edge) -> Clocks:
-        """After an edge: changed by no more than it asks for."""
+    def see(self, edge: Edge) -> None:
+        """Change by no more than an edge asks for."""
         least, most = edge.earliest - edge.sampled, edge.latest - edge.sampled
-        return Clocks(edge.earliest, min(max(self.late, least), most))
+        self.at, self.late = edge.earliest, min(max(self.late, least), most)
 
     def part(self, time: float) -> float:
         """How far they may have parted since by run time `time` s, s."""
@@ -101,7 +101,7 @@ def find_edges(
         applied: consecutive set-points, clock times in s.
         zero: clock time of run time 0, s.
         shunt: coil current, A, by the sample clock on the run's axis.
-        clocks: how they stood before; in step unless given.
+        clocks: how they stood before, and see what is found; in step unless given.
     """
     found = []
     clocks = clocks or Clocks()
@@ -119,7 +119,7 @@ def find_edges(
             at = _crossing(middle[low:high], done)
             if at is not None:
                 found.append(Edge(at, earliest, latest))
-                clocks = clocks.seen(found[-1])
+                clocks.see(found[-1])
         before = one.setpoint
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -64,7 +65,7 @@ class Intake:
         self._spike_times: list[float] = []
         self.produced = 0
         self.late = 0.0
-        self._lags: list[float] = []
+        self._least_lag = math.inf
         self._lag_at_begin: float | None = None
         self._lags_since = 0.0
         self.overrange: dict[str, float] = {}
@@ -111,7 +112,7 @@ class Intake:
         self._row, self._scale = row, scale
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._journal = detector, journal
-        self.late, self._lags, self._lag_at_begin = 0.0, [], None
+        self.late, self._least_lag, self._lag_at_begin = 0.0, math.inf, None
         self._lags_since = start
         self._means = {
             channel.signal: ChannelMean(stream, start, channel.signal)
@@ -187,10 +188,11 @@ class Intake:
         Records with gaps are dated one by one, so that nothing adds up.
         """
         streamed = self._expected * interval
-        self._lags.append(elapsed - streamed)
+        self._least_lag = min(self._least_lag, elapsed - streamed)
         if self.reached - self._lags_since < LAG_WINDOW:
             return
-        least, self._lags, self._lags_since = min(self._lags), [], self.reached
+        least, self._least_lag = self._least_lag, math.inf
+        self._lags_since = self.reached
         if self._lag_at_begin is None:
             self._lag_at_begin = least
         most = CLOCK_ERROR * streamed

@@ -38,8 +38,8 @@ class Program:
         settling: time the circuit takes to settle after one was changed, s.
         coil_lag: by which the current follows the source, s.
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
-        drive_check: compares current, shunt and field of each trial; None where no
-            force is asked for.
+        drive_check: compares current, shunt and field of each trial; None where
+            nothing drives the coil.
         asked_field: has a person read the field; None where a meter does, or nobody.
     """
 

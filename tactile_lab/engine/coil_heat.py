@@ -10,14 +10,15 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import quote
 
+from tactile_lab.acquisition import events
+from tactile_lab.acquisition.ending import Ending
 from tactile_lab.bench import Bench, CoilLimits
 from tactile_lab.errors import LimitError
-from tactile_lab.lab import state_folder
+from tactile_lab.lab import kept_of_port
 from tactile_lab.planning.heat import cool_down
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock, replacing
@@ -41,7 +42,7 @@ class CoilHeat:
     def __init__(self, port: str, limits: CoilLimits) -> None:
         self._limits = limits
         self._longest = self.after(limits.heat)
-        self.path = state_folder() / "coils" / f"{quote(port, safe='')}.json"
+        self.path = kept_of_port("coils", port)
 
     @classmethod
     def of(cls, scene: Scene, bench: Bench) -> CoilHeat | None:
@@ -128,6 +129,31 @@ class CoilHeat:
                 f"{self.path} cannot be written ({reason}). Let XDG_STATE_HOME name a "
                 "folder that can."
             ) from reason
+
+    def kept_while(
+        self,
+        drive: Callable[[], Ending],
+        left: Callable[[Ending], float],
+        emit: Callable[[events.Event], None],
+    ) -> Ending:
+        """Drive the coil, and keep how it is left unless another program has it.
+
+        Args:
+            drive: does it.
+            left: time until the coil counts as cold, s, after it ended so.
+            emit: told where that cannot be kept; the coil's state comes first.
+
+        Raises:
+            LimitError: the file cannot be written, and nothing was driven.
+        """
+        with self.heating() as alone:
+            ending = drive()
+            if alone:  # else its port was taken, too
+                try:
+                    self.keep(left(ending))
+                except LimitError as reason:
+                    emit(events.Message("warning", str(reason)))
+            return ending
 
     @contextmanager
     def _held(self) -> Iterator[bool]:

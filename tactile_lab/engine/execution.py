@@ -31,7 +31,7 @@ from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.task import Task
-from tactile_lab.errors import LimitError, SceneError, TactileLabError
+from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.plan import plan
 from tactile_lab.planning.way import drive_for
@@ -205,20 +205,17 @@ class Execution(Task[Executed]):
         """Run, and keep for whoever comes next how warm the coil is left."""
         if self._heat is None or self.stop.requested:
             return runner.run()
-        with self._heat.heating() as alone:
-            ending = runner.run()
-            if not alone:  # its port was taken, too
-                return ending
-            left, cost = 0.0, self.plan.estimate
-            if ending.state is events.RunState.COMPLETE:
-                left = cost.cool_down
-            elif self.coil_state.setpoint is not None:  # it was switched on
-                left = self._heat.after(cost.heat)
-            try:
-                self._heat.keep(left)
-            except LimitError as reason:  # the coil's state comes first
-                self._emit(events.Message("warning", str(reason)))
-        return ending
+        left = partial(self._left_warm, self._heat)
+        return self._heat.kept_while(runner.run, left, self._emit)
+
+    def _left_warm(self, heat: CoilHeat, ending: Ending) -> float:
+        """Time until the coil counts as cold, s."""
+        cost = self.plan.estimate
+        if ending.state is events.RunState.COMPLETE:
+            return cost.cool_down
+        if self.coil_state.setpoint is None:  # it was never switched on
+            return 0.0
+        return heat.after(cost.heat)
 
     def _begin_record(self, stream: Stream | None) -> Recorder:
         """Start the record; codes can be scaled from now on."""

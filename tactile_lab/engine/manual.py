@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import statistics
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -111,26 +112,21 @@ class ManualControl(Task[Ending]):
         if self._heat is None:
             return self._followed()
         try:
-            with self._heat.heating() as alone:
-                ending = self._followed()
-                if alone:
-                    self._keep(self._heat, ending)
-                return ending
+            return self._heat.kept_while(
+                self._followed, partial(self._left_warm, self._heat), self._emit
+            )
         except LimitError as reason:
             return Ending.refused(str(reason))
 
-    def _keep(self, heat: CoilHeat, ending: Ending) -> None:
-        """Keep how warm the coil is left; as hot as may be where it may still flow."""
+    def _left_warm(self, heat: CoilHeat, ending: Ending) -> float:
+        """Time until the coil counts as cold, s; the longest if it may still flow."""
         limits = self._limits
         used = limits.heat
         if ending.off.verified:
             end = self._since(self.bench.clock.now())
             flowed = Waveform.stairs(np.array(self._steps), end)
             used = heat_along(flowed, limits, heat_left(self._left, limits))[0]
-        try:
-            heat.keep(heat.after(min(used, limits.heat)))
-        except LimitError as reason:  # the coil's state comes first
-            self._emit(events.Message("warning", str(reason)))
+        return heat.after(min(used, limits.heat))
 
     def _since(self, time: float) -> float:
         return time - self._began

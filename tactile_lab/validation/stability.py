@@ -11,14 +11,7 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.quantity import show
-from tactile_lab.validation.contest import (
-    Method,
-    Row,
-    Truth,
-    judge,
-    methods,
-    truth,
-)
+from tactile_lab.validation.contest import Method, Row, Truth, judge, methods, truth
 from tactile_lab.validation.extremes import Extreme, extremes, formula
 from tactile_lab.validation.problem import Problem, spent
 from tactile_lab.validation.table import markdown, provenance
