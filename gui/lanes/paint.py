@@ -7,10 +7,11 @@ wider antialiased polylines cost tens of times more.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ from tactile_lab.trace import FloatArray, Trace, middle
 
 FAR = 1e5
 """Pixels beyond which coordinates are clamped: Qt's rasteriser loses precision."""
+
+FEW = 8
+"""Gaps up to which strokes are drawn one by one, which costs less than one path."""
 
 
 @dataclass(frozen=True)
@@ -128,10 +132,11 @@ def trace(painter: QPainter, frame: Frame, shown: Trace, line: QPen) -> None:
     """Draw a decimated trace, broken at gaps."""
     if shown.empty:
         return
-    x, y = zigzag(shown)
-    starts = 2 * np.flatnonzero(shown.gap)
-    if np.array_equal(shown.low, shown.high):
-        x, y, starts = shown.time, shown.low, starts // 2
+    starts = np.flatnonzero(shown.gap)
+    if shown.low is shown.high or np.array_equal(shown.low, shown.high):
+        x, y = shown.time, shown.low
+    else:
+        (x, y), starts = zigzag(shown), 2 * starts
     polyline(painter, frame.x(x), frame.y(y), line, starts)
 
 
@@ -144,17 +149,21 @@ def polyline(
 ) -> None:
     """Draw a line through pixels; a new stroke begins at each index in `starts`."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    if starts is None or starts.size <= 1:
-        draw = partial(painter.drawPolyline, polygon(x, y))
+    breaks = [] if starts is None else starts[1:].tolist()
+    draw: list[Callable[[], None]]
+    if len(breaks) <= FEW:
+        ends = pairwise([0, *breaks, x.size])
+        draw = [partial(painter.drawPolyline, polygon(x[a:b], y[a:b])) for a, b in ends]
     else:  # in one call: lines broken a hundred times cost as much as whole ones
         joined = np.ones(x.size, np.bool_)
-        joined[starts[1:] - 1] = False
+        joined[np.array(breaks) - 1] = False
         path = pg.arrayToQPath(x, y, joined, finiteCheck=False)
-        draw = partial(painter.drawPath, path)
+        draw = [partial(painter.drawPath, path)]
     fine = painter.deviceTransform().m11()
     if fine <= 1:
         painter.setPen(line)
-        draw()
+        for stroke in draw:
+            stroke()
         return
     painter.setPen(_hairline(line.color().name(), line.style()))
     # jagged lines fill an area: they may leave no gaps between their columns
@@ -163,7 +172,8 @@ def polyline(
     for number in range(count):
         by = (number - (count - 1) / 2) / fine
         painter.translate(by, by)
-        draw()
+        for stroke in draw:
+            stroke()
         painter.translate(-by, -by)
 
 
