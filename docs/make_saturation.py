@@ -17,7 +17,8 @@ from typing import Literal
 
 import numpy as np
 
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.arrays import FloatArray
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.validation.table import markdown, provenance
 from tactile_lab.waveform import Waveform

@@ -10,15 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.report.canvas import draw, save
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 SPECIMENS = 3
 """As many as in the paper's inset."""

@@ -9,11 +9,11 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.analysis.decay import Decay, fit_decay
 from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
@@ -106,11 +106,11 @@ class Bipolar(Levels):
             return
         from tactile_lab.model.simulate import simulate
 
-        def theory(circuit: Circuit) -> NDArray[np.float64]:
+        def theory(circuit: Circuit) -> FloatArray:
             found = simulate(circuit, run.force, keep=("I_DS",), until=run.duration)
             return found.sample("I_DS", np.clip(trace.time, 0.0, found.duration))
 
-        lines: list[tuple[str, Mark, str, NDArray[np.float64]]]
+        lines: list[tuple[str, Mark, str, FloatArray]]
         lines = [("Eq. (8)", "dotted", "model", theory(run.circuit))]
         with suppress(NotIdentifiableError):
             tau = _changes(run, held)[0]

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.analysis.adaptation import Adaptation
 from tactile_lab.analysis.adrian import ADRIAN, MARK
 from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 from tactile_lab.analysis.spike_train import within
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
@@ -20,8 +20,6 @@ from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 
 class Hold(ForceProtocol):

@@ -11,9 +11,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tactile_lab.analysis.response import Gain, gain
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_STATED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, QuantityError
-from tactile_lab.measurement import FloatArray, MeasuredTrial, Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import (
     Duration,

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.analysis.phase_locking import LOCKED, strongest_frequency
 from tactile_lab.analysis.spike_train import within
+from tactile_lab.arrays import FloatArray
 from tactile_lab.columns import read_columns
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, SceneError
@@ -23,7 +23,6 @@ from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.stimulus.indentation import on_indentation
 from tactile_lab.trial import Trial, Trials
 
-FloatArray = NDArray[np.float64]
 Length = Annotated[float, Unit("m", above=0.0)]
 Speed = Annotated[float, Unit("m/s", above=0.0)]
 PushForce = Annotated[float, Unit("N", above=0.0)]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from tactile_lab.analysis.estimate import Estimate, Line
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
@@ -193,12 +193,12 @@ def _bracket(
     )
 
 
-def _temperatures(found: list[ForceBracket]) -> NDArray[np.float64] | None:
+def _temperatures(found: list[ForceBracket]) -> FloatArray | None:
     known = [b.kelvin for b in found if b.kelvin is not None]
     return np.array(known) if len(known) == len(found) else None
 
 
-def _slope(found: list[ForceBracket], x: NDArray[np.float64]) -> Estimate | None:
+def _slope(found: list[ForceBracket], x: FloatArray) -> Estimate | None:
     """Change of the critical force with `x`, N per its unit; None where x stands still.
 
     A force that moves by less than a step may not be seen at all: a step over the range

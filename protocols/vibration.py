@@ -7,7 +7,6 @@ from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from tactile_lab.analysis.phase_locking import (
@@ -16,6 +15,7 @@ from tactile_lab.analysis.phase_locking import (
     phases_of,
 )
 from tactile_lab.analysis.spike_train import within
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, QuantityError
 from tactile_lab.measurement import Measurement
@@ -26,7 +26,6 @@ from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
 from tactile_lab.stimulus.indentation import on_indentation
 from tactile_lab.trial import Trial, Trials
 
-FloatArray = NDArray[np.float64]
 PushForce = Annotated[float, Unit("N", above=0.0)]
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.columns import read_columns, read_text
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.quantity import show
@@ -39,8 +40,8 @@ class Calibration:
         whole: the rows are those the head's hash was made of.
     """
 
-    current: NDArray[np.float64]
-    value: NDArray[np.float64]
+    current: FloatArray
+    value: FloatArray
     unit: Literal["T", "N"]
     path: Path
     head: Mapping[str, str] = field(default_factory=dict)
@@ -133,7 +134,7 @@ class Calibration:
             doubts.append(f"{said}, and was used nevertheless (allow_other_coil).")
         return tuple(doubts)
 
-    def at(self, current: ArrayLike) -> NDArray[np.float64]:
+    def at(self, current: ArrayLike) -> FloatArray:
         """The value at `current` A (any shape).
 
         Raises:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 from tactile_lab.errors import SceneError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from tactile_lab.arrays import FloatArray
 
 LARGEST_FILE = 256 * 2**20
 """Bytes; a scene's force table may be long, but not endless."""
@@ -69,7 +68,7 @@ def read_cells(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 def read_columns(
     path: Path, headers: Sequence[tuple[str, ...]]
-) -> tuple[tuple[str, ...], NDArray[np.float64], Sequence[int]]:
+) -> tuple[tuple[str, ...], FloatArray, Sequence[int]]:
     """Numeric columns of a CSV file.
 
     Args:
@@ -110,7 +109,7 @@ def read_columns(
 
 def _plain_columns(
     path: Path, headers: Sequence[tuple[str, ...]]
-) -> tuple[tuple[str, ...], NDArray[np.float64], Sequence[int]] | None:
+) -> tuple[tuple[str, ...], FloatArray, Sequence[int]] | None:
     """The same of a file of numbers and nothing else, a hundred times as fast.
 
     None where anything else is in it, which `read_columns` then finds or passes over.

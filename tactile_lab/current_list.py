@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 FINEST = 0.005
 """Step of a list as a part of the current's range, below which finer points add only

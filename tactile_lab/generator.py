@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import FINEST, CurrentList
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import show
@@ -143,7 +143,7 @@ class Generator(Protocol):
         """Give `volts` V from now on, whatever it gave before; no stream may run."""
         ...
 
-    def load(self, volts: NDArray[np.float64], each: float) -> None:
+    def load(self, volts: FloatArray, each: float) -> None:
         """Take a waveform, to be played once; no stream may run.
 
         Args:

@@ -14,11 +14,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 FINE = 2e-5
 """Largest deviation of the answer's straight pieces, as a part of the peak."""

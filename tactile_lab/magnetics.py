@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.calibration import Calibration, CalibrationFile
 from tactile_lab.errors import LimitError, ParameterError
 from tactile_lab.lag import Lag
@@ -41,7 +42,7 @@ class ForceUncertainty:
     absolute: float
     relative: float
 
-    def of(self, force: ArrayLike) -> NDArray[np.float64]:
+    def of(self, force: ArrayLike) -> FloatArray:
         """Half of the 95 % band of `force` N (any shape), N."""
         newtons = np.asarray(force, dtype=np.float64)
         return np.asarray(np.hypot(self.absolute, self.relative * newtons))
@@ -141,7 +142,7 @@ class Magnet(SceneTable):
         assert self.calibration is not None
         return 1.0 if self.calibration.unit == "N" else self.newtons_per_tesla
 
-    def field(self, current: ArrayLike) -> NDArray[np.float64]:
+    def field(self, current: ArrayLike) -> FloatArray:
         """Field of the electromagnet, T, at `current` A (any shape)."""
         amperes = np.asarray(current, dtype=np.float64)
         if self.calibration is None:
@@ -150,7 +151,7 @@ class Magnet(SceneTable):
             return self.calibration.at(amperes)
         return self.force(amperes) / self.newtons_per_tesla
 
-    def force(self, current: ArrayLike) -> NDArray[np.float64]:
+    def force(self, current: ArrayLike) -> FloatArray:
         """Drive force F(I) - F(0), N, at `current` A (any shape)."""
         amperes = np.asarray(current, dtype=np.float64)
         if self.calibration is None:
@@ -234,7 +235,7 @@ class Magnet(SceneTable):
         field, after = self.lag.follow(setpoint, before)
         return self.force_for(field, beyond="hold"), after
 
-    def _inverse(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _inverse(self, force: FloatArray) -> FloatArray:
         assert self.calibration is not None
         amperes = self.calibration.current
         newtons = self.force(amperes)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tactile_lab.analysis.adaptation import Adaptation, fit_adaptation
 from tactile_lab.analysis.converter import step_bias
 from tactile_lab.analysis.spike_train import Response, respond
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
@@ -26,7 +27,6 @@ from tactile_lab.waveform import Waveform
 if TYPE_CHECKING:
     from tactile_lab.analysis.circuit_adaptation import CircuitAdaptation
 
-FloatArray = NDArray[np.float64]
 
 CUT_OFF = "spikes could not be told all of the time: their channel left its range"
 """Why a trial has no latency, rate or fit."""

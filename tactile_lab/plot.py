@@ -15,12 +15,11 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import PREFIXES, count, prefix_of
-
-FloatArray = NDArray[np.float64]
 
 MOST_TICKS = 150
 """More spikes than that run into one another: their density is drawn."""

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tactile_lab.arrays import FloatArray
+
 Flags = NDArray[np.bool_]
 
 HOLDS = 0.01

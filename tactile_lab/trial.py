@@ -7,11 +7,10 @@ from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_origin
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import ParameterError, TactileLabError, fault_in
 from tactile_lab.waveform import Waveform
@@ -85,10 +84,10 @@ class Outcome:
     trial: Trial
     index: int
     start: float
-    spike_times: NDArray[np.float64]
-    current: NDArray[np.float64]
+    spike_times: FloatArray
+    current: FloatArray
     rest: dict[str, float] = field(default_factory=dict)
-    traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    traces: dict[str, FloatArray] = field(default_factory=dict)
     skipped: int = 0
     codes: dict[str, float] = field(default_factory=dict)
     drift: float | None = None

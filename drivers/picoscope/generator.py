@@ -10,9 +10,9 @@ from __future__ import annotations
 import ctypes
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.picoscope.unit import ScopeUnit
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import LimitError
 from tactile_lab.generator import GeneratorCapability
 from tactile_lab.quantity import show
@@ -66,7 +66,7 @@ class PicoGenerator:
             NO_TRIGGER, 0,
         )  # fmt: skip
 
-    def load(self, volts: NDArray[np.float64], each: float) -> None:
+    def load(self, volts: FloatArray, each: float) -> None:
         """Take a waveform, to be played once; no stream may run.
 
         Args:
@@ -134,7 +134,7 @@ class PicoGenerator:
         return phase
 
 
-def _check(volts: NDArray[np.float64]) -> None:
+def _check(volts: FloatArray) -> None:
     most = CAPABILITY.amplitude
     if not np.all(np.abs(volts) <= most * (1 + 1e-9)):
         raise LimitError(

@@ -13,7 +13,7 @@ from gui.parts import STRETCH, column, label, line, line_edit, push, row
 from gui.plots.small_plot import SmallPlot
 from gui.review.conclusion import Concluded
 from gui.review.live_plots import loop_plot
-from tactile_lab.trace import FloatArray
+from tactile_lab.arrays import FloatArray
 
 MAGNET = (
     ("r", "Distance magnet to pole face"),

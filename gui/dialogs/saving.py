@@ -24,8 +24,9 @@ from gui.look.fonts import sized
 from gui.look.tokens import LIGHT, Tokens
 from gui.session.log import Severity
 from gui.setup.parameter import FieldError
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import TactileLabError
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels

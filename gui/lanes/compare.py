@@ -15,7 +15,8 @@ import numpy as np
 from gui.lanes.expected import Stretch, starts
 from gui.lanes.lane import Lane
 from gui.lanes.source import Member, Source
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.arrays import FloatArray
+from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
     from gui.lanes.view import TimeView

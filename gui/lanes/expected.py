@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gui.lanes.phase import Phase
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.arrays import FloatArray
+from tactile_lab.trace import Trace
 from tactile_lab.trial import Trial
 from tactile_lab.waveform import Waveform
 

@@ -30,7 +30,8 @@ from PySide6.QtGui import (
 )
 
 from gui.look.fonts import sized
-from tactile_lab.trace import FloatArray, Trace, middle
+from tactile_lab.arrays import FloatArray
+from tactile_lab.trace import Trace, middle
 
 FAR = 1e5
 """Pixels beyond which coordinates are clamped: Qt's rasteriser loses precision."""

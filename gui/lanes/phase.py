@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.spikes.rate import LEAST_SILENCE, SILENCE, begins
-from tactile_lab.trace import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

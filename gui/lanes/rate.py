@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.spikes.rate import NEVER, begins
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 
 def rate_of(

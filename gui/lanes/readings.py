@@ -10,8 +10,9 @@ from gui.lanes.expected import starts
 from gui.lanes.lane import Lane
 from gui.lanes.source import Source
 from gui.plots.numbers import number
+from tactile_lab.arrays import FloatArray
 from tactile_lab.spikes.rate import LEAST_SILENCE, NEVER, SILENCE, begins, rate_at
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 NEAR = 0.02
 """So much is read on either side of a time, s."""

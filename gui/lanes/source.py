@@ -17,9 +17,10 @@ from gui.lanes.lane import Lane
 from gui.lanes.phase import Phase, phase
 from gui.lanes.rate import rate_of
 from gui.lanes.twin import TwinTraces
+from tactile_lab.arrays import FloatArray
 from tactile_lab.pyramid import Pyramid
 from tactile_lab.signals import AVERAGED
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
     from gui.lanes.view import TimeView

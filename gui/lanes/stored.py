@@ -11,6 +11,7 @@ import numpy as np
 from gui.lanes.expected import Stretch, settled
 from gui.lanes.source import Source
 from gui.lanes.twin import MARGIN, Look, TwinTraces
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
@@ -20,7 +21,7 @@ from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
 from tactile_lab.store.spike_shapes import threshold_of
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 FINER = 2
 """Cells a pixel that are read."""

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.pyramid import Pyramid
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 MARGIN = 0.5
 """Part of a view's width that is looked at closely on either side of it."""

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pyqtgraph as pg
 
-from tactile_lab.plot import FloatArray, Series, grid
+from tactile_lab.arrays import FloatArray
+from tactile_lab.plot import Series, grid
 
 COLOURS = pg.colormap.get("viridis")
 SHADES = 9

@@ -22,16 +22,8 @@ from gui.look.tokens import Tokens
 from gui.plots.axis import Line, RoundAxis, stroke
 from gui.plots.cells import cell_at, item, levels, shades
 from gui.plots.numbers import nice_range
-from tactile_lab.plot import (
-    FloatArray,
-    Guide,
-    Panel,
-    Plot,
-    Series,
-    grid,
-    y_scale,
-    z_scale,
-)
+from tactile_lab.arrays import FloatArray
+from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
 
 PANEL, SMALL = 200, 130
 """Height of a panel, and of one that is low in the report, px."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from gui.session.fit import FittedRate
 from tactile_lab.analysis.spike_train import within
-from tactile_lab.measurement import FloatArray, MeasuredTrial
+from tactile_lab.arrays import FloatArray
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.plot import Mark, Panel, Plot, Series
 from tactile_lab.quantity import count
 

@@ -46,11 +46,11 @@ from gui.review.live_plots import (
 from gui.review.wording import unbroken
 from gui.session.fit import Fit, FittedRate
 from gui.session.steps import cells
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import count
-from tactile_lab.trace import FloatArray
 
 HEAD, ROW = 52, 26
 """Heights of the table's head and of a row, px."""

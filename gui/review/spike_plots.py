@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import count, show
 from tactile_lab.spikes.rate import NEVER, begins
 from tactile_lab.store.spike_shapes import SpikeShapes
-from tactile_lab.trace import FloatArray
 
 MOST_BINS = 60
 """Most bins of the histogram."""

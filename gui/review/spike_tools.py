@@ -20,12 +20,12 @@ from gui.review.spike_plots import (
 )
 from gui.review.spikes import SpikesView
 from gui.session.session import Session
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import shapes_of_run
 from tactile_lab.quantity import show
 from tactile_lab.spikes.rate import begins
 from tactile_lab.store.spike_shapes import SpikeShapes
-from tactile_lab.trace import FloatArray
 
 LOOKED = 500
 """Milliseconds after which it is looked anew what there is to show."""

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import QWidget
 from shiboken6 import isValid
 
 from gui.look.theme import Theme
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
-from tactile_lab.trace import FloatArray
 
 POINTS = 72
 """Points of the force, and places a spike can be drawn at."""

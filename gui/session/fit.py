@@ -18,9 +18,10 @@ from gui.plots.numbers import number
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.rate_force import onset, slopes
 from tactile_lab.analysis.spike_pairs import match
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial
-from tactile_lab.trace import FloatArray, Trace
+from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
     from tactile_lab.engine.engine import Engine

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gui.skin.film import Film
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.press import press
 from tactile_lab.skin.skin import Skin

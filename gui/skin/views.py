@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtGui import QColor
 
@@ -12,7 +11,7 @@ from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.plots.axis import Line, RoundAxis, guarded, stroke
 from gui.skin.film import pixels
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.skin.layout import Array
 
 MM = 1e3
@@ -160,7 +159,7 @@ class Raster(View):
         self.dots.setBrush(QColor(tokens.V_K))
         self.now.setPen(stroke(tokens.accent, self.devicePixelRatio()))
 
-    def show_dots(self, time: FloatArray, taxel: NDArray[np.float64]) -> None:
+    def show_dots(self, time: FloatArray, taxel: FloatArray) -> None:
         """Show these spikes."""
         self.dots.setData(time, taxel)
 

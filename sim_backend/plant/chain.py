@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.plant.pieces import FloatArray
+from tactile_lab.arrays import FloatArray
 
 SETTLED = 14.0
 """Time constants after which what remains is below a millionth."""

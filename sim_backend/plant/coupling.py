@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim_backend.plant.pieces import FloatArray, Pieces
+from sim_backend.plant.pieces import Pieces
+from tactile_lab.arrays import FloatArray
 
 CUTOFF = 1.0
 """Frequency of the high-pass, Hz."""

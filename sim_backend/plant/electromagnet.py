@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.plant.pieces import FloatArray, Pieces, join
+from sim_backend.plant.pieces import Pieces, join
 from sim_backend.plant.step_response import Core, Moment, StepResponse
 from sim_backend.plant.winding import Winding
+from tactile_lab.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

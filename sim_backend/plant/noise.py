@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.plant.pieces import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.waveform import Waveform
 
 STEP = 2e-3

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tactile_lab.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,11 @@ from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.plant.electromagnet import Electromagnet
 from sim_backend.plant.noise import NoiseSource, SensorNoise
 from sim_backend.plant.options import PlantOptions
-from sim_backend.plant.pieces import FloatArray, Pieces
+from sim_backend.plant.pieces import Pieces
 from sim_backend.plant.render import noise_table
 from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
 from sim_backend.plant.sensor import NEEDS, SimulatedSensor
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.magnetics import Magnet

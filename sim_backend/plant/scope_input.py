@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from sim_backend.plant.chain import Pulse
 from sim_backend.plant.options import PlantOptions
-from sim_backend.plant.pieces import FloatArray, Pieces
+from sim_backend.plant.pieces import Pieces
 from sim_backend.plant.render import NOISE_UNIT, add_pulses, digitise
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Channel
 
 BUFFERED = ("V_C1", "V_C2", "V_K")

@@ -15,7 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
-from sim_backend.plant.pieces import FloatArray, Pieces, join
+from sim_backend.plant.pieces import Pieces, join
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.advance import Outputs, State, advance, rest
 from tactile_lab.model.circuit import Circuit

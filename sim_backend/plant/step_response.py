@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.plant.pieces import FloatArray, Pieces
+from sim_backend.plant.pieces import Pieces
+from tactile_lab.arrays import FloatArray
 
 ACCURACY = 1e-4
 """Largest deviation of the linear pieces from the exponentials, per step."""

@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.alignment import (
@@ -23,6 +22,7 @@ from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import FoundSpikes
 from tactile_lab.acquisition.journal import Journal
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Reading, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
@@ -53,7 +53,7 @@ class Rate:
         self.value = 0.0
         self._last: float | None = None
 
-    def feed(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def feed(self, times: FloatArray) -> FloatArray:
         """Rate right after each spike, Hz, for spike times in s, increasing."""
         if times.size == 0:
             return np.empty(0)
@@ -294,7 +294,7 @@ class Account:
         fields, self._fields = self._fields, []
         return [Reading(one.time - start, one.value) for one in fields]
 
-    def applied_since(self, begin: float) -> NDArray[np.float64]:
+    def applied_since(self, begin: float) -> FloatArray:
         """Current applied since clock time `begin`: shape (n, 2), s after it and A."""
         rows = np.array(self._applied).reshape(-1, 2)
         self._steps, self._applied = [], array("d")

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
+from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import CurrentList
 from tactile_lab.trace import Trace
 
@@ -186,7 +186,7 @@ def _longer(points: CurrentList, began: float, seen: Trace) -> float:
 
 
 def _best(
-    points: CurrentList, began: float, seen: Trace, shifts: NDArray[np.float64]
+    points: CurrentList, began: float, seen: Trace, shifts: FloatArray
 ) -> tuple[float, float]:
     """The shift, s, with which the list is most like what was seen, and how unlike."""
     mean = seen.mean.astype(np.float64)
@@ -265,7 +265,7 @@ def _mean_time(edges: Sequence[Edge]) -> float:
     return float(np.mean([edge.sampled for edge in edges]))
 
 
-def _crossing(time: NDArray[np.float64], done: NDArray[np.float64]) -> float | None:
+def _crossing(time: FloatArray, done: FloatArray) -> float | None:
     """When `done` first passes one half, between two bins; None if it never does."""
     past = np.flatnonzero(done >= 0.5)
     if past.size == 0 or past[0] == 0:

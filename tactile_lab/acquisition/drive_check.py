@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.acquisition.asked_field import NOTABLE
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Reading, shunt_agrees
 from tactile_lab.magnetics import ROUGH
 from tactile_lab.quantity import show
@@ -52,12 +52,12 @@ class DriveCheck:
         self._expected = expected
         self._calibrated = calibrated
         self._told: set[str] = set()
-        self._changing: list[tuple[NDArray[np.float64], float]] = []
+        self._changing: list[tuple[FloatArray, float]] = []
 
     def doubts(
         self,
         trial: Trial,
-        current: NDArray[np.float64],
+        current: FloatArray,
         shunt: Callable[[float, float], float | None],
         readings: Iterable[Reading],
     ) -> list[str]:
@@ -100,7 +100,7 @@ class DriveCheck:
         self._told.update(what for what, _ in new)
         return [f"{trial.label}: {text}" for _, text in new]
 
-    def _field(self, pairs: list[tuple[NDArray[np.float64], float]]) -> str:
+    def _field(self, pairs: list[tuple[FloatArray, float]]) -> str:
         """What to say of readings, T, beside the current at each of `LAGS`, A."""
         flowed = np.array([currents for currents, _ in pairs])
         believed = np.vectorize(self._expected)(flowed).mean(axis=0)
@@ -119,7 +119,7 @@ class DriveCheck:
         )
 
 
-def _moving(current: NDArray[np.float64], length: float) -> tuple[float, float]:
+def _moving(current: FloatArray, length: float) -> tuple[float, float]:
     """From the first current that flows until field and shunt are at rest again, s.
 
     Nothing is known of what comes after a trial of that length.

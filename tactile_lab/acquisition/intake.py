@@ -13,6 +13,7 @@ from tactile_lab.acquisition.alignment import CLOCK_ERROR
 from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Block, Reading, Stream
 from tactile_lab.errors import SamplesLostError
 from tactile_lab.signals import AVERAGED
@@ -157,7 +158,7 @@ class Intake:
         taken, self._readings = self._readings, []
         return taken
 
-    def spikes_between(self, start: float, end: float) -> NDArray[np.float64]:
+    def spikes_between(self, start: float, end: float) -> FloatArray:
         """Times of remembered spikes in [start, end) s on the run's axis."""
         times = self._spike_times
         return np.array(times[bisect_left(times, start) : bisect_left(times, end)])

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Block, Stream
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.voltage_source import HeldVoltage
@@ -27,7 +28,7 @@ class Journal(Protocol):
         """A stream ended so many samples after the last that came."""
         return
 
-    def spikes(self, times: NDArray[np.float64], found: NDArray[np.void]) -> None:
+    def spikes(self, times: FloatArray, found: NDArray[np.void]) -> None:
         """Store detected spikes with their times on the run's axis."""
         ...
 

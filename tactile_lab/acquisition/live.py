@@ -12,6 +12,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.pyramid import Level
 from tactile_lab.trace import Trace
@@ -137,7 +138,7 @@ class Live:
 
     def traces(
         self, start: float, end: float, points: int = 4000
-    ) -> dict[str, NDArray[np.float64]]:
+    ) -> dict[str, FloatArray]:
         """Each measured signal over [start, end) s, thinned to at most `points` means.
 
         Returns:

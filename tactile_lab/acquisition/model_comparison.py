@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.acquisition.events import CoilCurrent
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.analysis.spike_pairs import match
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import TactileLabError
 from tactile_lab.quantity import rounded
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome
-
-FloatArray = NDArray[np.float64]
 
 
 class ModelComparison:

@@ -10,15 +10,15 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.acquisition.alignment import align
 from tactile_lab.acquisition.journal import Journal
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
 
-Spikes = tuple[NDArray[np.float64], NDArray[Any]]
+Spikes = tuple[FloatArray, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Ring(Journal):
             while self._field and self._field[0][0] < oldest:
                 self._field.popleft()
 
-    def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
+    def spikes(self, times: FloatArray, found: NDArray[Any]) -> None:
         """Hold spikes."""
         with self._lock:
             self._spikes.append((times, found))

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.account import Account
@@ -28,6 +27,7 @@ from tactile_lab.acquisition.person import PLACES
 from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Bench, Stream
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive, Way
@@ -226,7 +226,7 @@ class Runner:
         )
 
     def _compare(
-        self, trial: Trial, start: float, shown: float, current: NDArray[np.float64]
+        self, trial: Trial, start: float, shown: float, current: FloatArray
     ) -> None:
         """Warn where current, shunt and field of the trial do not fit together."""
         readings = self._account.fields_since(start)

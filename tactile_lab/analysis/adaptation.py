@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.analysis.spike_train import intervals, within
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
-
-FloatArray = NDArray[np.float64]
 
 FEWEST_INTERVALS = 10
 STEEPEST = 300.0

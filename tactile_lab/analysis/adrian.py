@@ -9,7 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from tactile_lab.arrays import FloatArray
 
 MARK = "curves from printed coefficients, no data"
 
@@ -30,10 +32,10 @@ class Coefficients:
     beta: float
     gamma: float
 
-    def rate(self, time: ArrayLike) -> NDArray[np.float64]:
+    def rate(self, time: ArrayLike) -> FloatArray:
         """The curve at `time` s after the onset, Hz."""
         t = np.asarray(time, dtype=np.float64)
-        values: NDArray[np.float64] = self.alpha * np.exp(self.beta * t) + self.gamma
+        values: FloatArray = self.alpha * np.exp(self.beta * t) + self.gamma
         return values
 
 

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Followers
 from tactile_lab.deviation import Deviation, DrivenCircuit
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 PART = 0.05
 """Of a cause's 95 % band by which it is moved: so little that each spike is known

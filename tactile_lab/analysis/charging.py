@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1
 
-FloatArray = NDArray[np.float64]
 Drive = Callable[[FloatArray], FloatArray]
 """V_GS + V_P, V, at times of any shape, s."""
 

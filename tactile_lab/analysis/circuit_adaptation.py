@@ -16,15 +16,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_lab.analysis.charging import REACH, Charging, Drive
 from tactile_lab.analysis.estimate import Estimate, correlated
 from tactile_lab.analysis.spike_train import within
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
-
-FloatArray = NDArray[np.float64]
 
 FEWEST_INTERVALS = 6
 FOLLOWED = 0.03

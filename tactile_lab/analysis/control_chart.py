@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-
-FloatArray = NDArray[np.float64]
 
 WIDTH = 2.66
 """Mean moving ranges of two from the mean to a limit: three standard deviations of

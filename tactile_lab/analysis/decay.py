@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_lab.analysis.estimate import Estimate, correlated, student_95
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError, ParameterError
-
-FloatArray = NDArray[np.float64]
 
 FEWEST = 12
 SHORTEST_HOLD = 2.0

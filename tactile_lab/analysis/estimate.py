@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 from tactile_lab.quantity import PREFIXES, prefix_of, printed
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from tactile_lab.arrays import FloatArray
 
-    FloatArray = NDArray[np.float64]
 
 Z95 = 1.959963984540054
 """Two-sided 95 % quantile of a normal distribution."""

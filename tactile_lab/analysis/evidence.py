@@ -14,17 +14,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import correlated
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C
 from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 VOLTAGES = frozenset({"V_GS", "V_S", "V_th", "V_fire", "V_reset"})
 SCALES = {**dict.fromkeys(VOLTAGES, 0.01), "I_bias": 1e-10, "g31": 0.004}

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Estimate, Line
+from tactile_lab.arrays import FloatArray
 from tactile_lab.calibration import COIL, HASH, UNCERTAINTY, VALID_UNTIL, table_hash
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.quantity import show
-
-FloatArray = NDArray[np.float64]
 
 WIDEST_LOOP = 0.05
 """Half-width of the loop over the largest field that is accepted without asking."""

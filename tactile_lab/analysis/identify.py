@@ -13,20 +13,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.estimate import Z95, Estimate
 from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, Together, scatter
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import PARAMETERS, Circuit, units
 from tactile_lab.quantity import printed
 from tactile_lab.waveform import Waveform
 
-FloatArray = NDArray[np.float64]
 Displaced = Callable[[Circuit, float], Iterable[tuple[str, DrivenCircuit]]]
 Cause = tuple[str, int]
 """Name of a cause of uncertainty, and the how manieth of that name."""

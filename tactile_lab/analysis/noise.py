@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
-
-FloatArray = NDArray[np.float64]
 
 MAINS = (50.0, 60.0)
 """Frequencies of the mains, Hz."""

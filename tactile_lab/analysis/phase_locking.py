@@ -11,13 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.noise import MAINS
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
-
-FloatArray = NDArray[np.float64]
 
 FEWEST = 5
 """Spikes, and presentations of which each is left out in turn for the interval."""

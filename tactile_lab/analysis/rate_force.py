@@ -7,15 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.analysis.charging import Charging
 from tactile_lab.analysis.estimate import Z95, Estimate, correlated, student_95
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1
-
-FloatArray = NDArray[np.float64]
 
 STEP = 1e-4
 """Force over which a slope is taken, N."""

@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_lab.analysis.estimate import Estimate, correlated
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
-
-FloatArray = NDArray[np.float64]
 
 HARMONICS = 6
 """So many harmonics of the answer are told apart from noise, with points enough."""

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.belief import PART
+from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import rounded
-
-FloatArray = NDArray[np.float64]
 
 WITHIN = 0.5
 """A spike may lie off its expected place by this part of the interval around it."""

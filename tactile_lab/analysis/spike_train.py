@@ -8,11 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-
-FloatArray = NDArray[np.float64]
 
 SILENT_AFTER = 2.0
 """A train has fallen silent when its last interval passed this many times over."""

@@ -18,9 +18,10 @@ import numpy as np
 
 from tactile_lab.analysis.belief import PART, Belief
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.evidence import LEAST, FloatArray, Residuals
+from tactile_lab.analysis.evidence import LEAST, Residuals
 from tactile_lab.analysis.spike_pairs import irregularity
 from tactile_lab.analysis.twin import Measured
+from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import Deviation, DrivenCircuit
 from tactile_lab.errors import TactileLabError
 from tactile_lab.quantity import rounded, show

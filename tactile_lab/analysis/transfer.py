@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.estimate import Estimate, Line
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError, ParameterError
-
-FloatArray = NDArray[np.float64]
 
 FEWEST = 6
 SUBTHRESHOLD_END = 2.75

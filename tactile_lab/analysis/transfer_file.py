@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.columns import read_cells
 from tactile_lab.errors import SceneError
-
-FloatArray = NDArray[np.float64]
 
 VOLTAGE = ("v_gs_v", "v_gs", "vgs", "vg", "vgate", "gatev")
 CURRENT = ("i_ds_a", "i_ds", "ids", "id", "idrain", "draini")

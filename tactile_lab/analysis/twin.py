@@ -6,18 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.spike_pairs import Matched, by_cause, match, together
+from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.state import Start
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 NARROW, WITHIN = 1e-3, 8
 """A signal hardly bends within bins narrower than this, s; in others the model's mean

@@ -8,11 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.events import Event
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import CoilLimits
 from tactile_lab.trace import Trace
 
@@ -56,7 +54,7 @@ class ModelPart:
     """
 
     bins: dict[str, Trace]
-    spikes: NDArray[np.float64]
+    spikes: FloatArray
     end: float
 
 

@@ -26,6 +26,7 @@ from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
     from tactile_lab.analysis.noise import Noise
+    from tactile_lab.arrays import FloatArray
     from tactile_lab.bench import Bench, Coil, Meter, OffReport, Scope, SeenOutput
     from tactile_lab.engine.manual import FieldReading
     from tactile_lab.engine.model_parts import StoredParts
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from tactile_lab.scene.scene import Scene
     from tactile_lab.store.spike_shapes import SpikeShapes
     from tactile_lab.store.statistics import Statistics
-    from tactile_lab.trace import FloatArray
     from tactile_lab.voltage_source import VoltageSource
 
     Instrument = Coil | Scope | Meter | VoltageSource

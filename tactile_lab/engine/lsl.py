@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.acquisition import events
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import SceneError
 
@@ -97,7 +98,7 @@ class FollowedRun:
         self.uncertainty = read_within + begun.uncertainty
         self._origin, self.zero = begun.origin, offset + begun.origin
 
-    def fresh(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    def fresh(self) -> tuple[FloatArray, NDArray[np.float32]]:
         """Milliseconds not told yet: LSL's times, shape (n,), s; rows (n, 9), V."""
         self._seen, bins = self._live.fresh(self._seen)
         if not bins:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import TactileLabError
 from tactile_lab.trace import Trace
@@ -87,7 +87,7 @@ class StoredParts:
 def binned(
     result: Result,
     signal: str,
-    spikes: NDArray[np.float64],
+    spikes: FloatArray,
     start: float,
     end: float,
     count: int,

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_point
 from tactile_lab.model.need import Need, checked_tolerance
 from tactile_lab.model.solution import Solution

@@ -9,15 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model import derived, kernel, packed, spiking
-from tactile_lab.model.circuit import (
-    LARGEST,
-    LARGEST_VOLTAGE,
-    SMALLEST,
-    Circuit,
-    FloatArray,
-    units,
-)
+from tactile_lab.model.circuit import LARGEST, LARGEST_VOLTAGE, SMALLEST, Circuit, units
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.need import checked_tolerance
 from tactile_lab.model.rest_pair import rest_of_cascade

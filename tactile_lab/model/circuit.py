@@ -9,14 +9,11 @@ from functools import cache, cached_property
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.errors import ParameterError
 from tactile_lab.model import derived
 from tactile_lab.quantity import Unit
 from tactile_lab.table import INTERNAL, SceneTable
-
-FloatArray = NDArray[np.float64]
 
 SMALLEST, LARGEST = 1e-60, 1e60
 """Range of positive parameters: no product of three can overflow or underflow."""

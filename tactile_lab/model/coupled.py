@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model.circuit import LARGEST_VOLTAGE, FloatArray
+from tactile_lab.arrays import FloatArray
+from tactile_lab.model.circuit import LARGEST_VOLTAGE
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.ellipse import E_11, E_22, transform, widen
 from tactile_lab.model.integrator import (

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
-
-FloatArray = NDArray[np.float64]
 
 BOXCAR_3DB = 0.4429
 """-3 dB frequency of a mean over a window, times the window's length."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 
 E_11, E_12, E_22 = range(3)

@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model import derived
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.circuit import Circuit
 
 
 def V_P(circuit: Circuit, V_P0: float, slope: float, time: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.node_a import V_T, matrix_times
 from tactile_lab.model.tableau import ORDER, TO_SERIES_TURNED

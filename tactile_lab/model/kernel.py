@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model.circuit import LARGEST_VOLTAGE, FloatArray
+from tactile_lab.arrays import FloatArray
+from tactile_lab.model.circuit import LARGEST_VOLTAGE
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import (
     MOST_TERMS,

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.tableau import (
     DIFFERENTIATE,

@@ -7,8 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model import integrator, node_a, transistor
-from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit, FloatArray
+from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit
 from tactile_lab.model.derived import Numbers
 
 

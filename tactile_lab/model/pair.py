@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import TAU_L, V_RESET, series_at, to_series
 from tactile_lab.model.node_a import LAMBDA, TAU, V_T, B_at, V_P_at, slope_at

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import TAU_L, V_S, Q_at
 from tactile_lab.model.node_a import LAMBDA, V_T, B_at, equilibrium

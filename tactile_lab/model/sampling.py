@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, series_at
 from tactile_lab.model.node_a import TAU, V_P_at

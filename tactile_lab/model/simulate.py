@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit, FloatArray
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit
 from tactile_lab.model.need import Need, checked_tolerance
 from tactile_lab.model.state import Start, State
 from tactile_lab.waveform import Waveform

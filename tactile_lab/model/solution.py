@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.model import kernel, sampling, spiking
-from tactile_lab.model.circuit import SUBTHRESHOLD_LIMIT, Circuit, FloatArray
+from tactile_lab.model.circuit import SUBTHRESHOLD_LIMIT, Circuit
 from tactile_lab.model.equations import I_C, I_DS, T1_currents, fires_at_rest
 from tactile_lab.model.need import STAGES, Need
 from tactile_lab.model.state import State

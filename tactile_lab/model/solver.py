@@ -6,13 +6,10 @@ import math
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError, SolverError, TactileLabError
 from tactile_lab.model import kernel, spiking
-from tactile_lab.model.circuit import (
-    LARGEST_VOLTAGE,
-    Circuit,
-    FloatArray,
-)
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit
 from tactile_lab.model.need import Need
 from tactile_lab.model.packed import parameters
 from tactile_lab.model.solution import Solution

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.arrays import FloatArray
+from tactile_lab.model.circuit import Circuit
 
 RESISTOR, CAPACITOR = 0.01, 0.05
 """Two standard deviations of a resistor and of a capacitor, as a part of each."""

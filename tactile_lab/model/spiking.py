@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import (
     T_EPS,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 
 ORDER = 12
 """Nodes of the collocation and degree of its polynomial."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import DIRECT, TAU_L, V_RESET, V_S, omega, to_series
 from tactile_lab.model.node_a import DIVIDER, LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at

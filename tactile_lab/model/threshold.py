@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import Y_CRITICAL, series_at
 from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import DIRECT, PARAMETERS, V_S, omega
 from tactile_lab.model.node_a import V_T

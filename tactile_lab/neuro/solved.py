@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.state import Start
 from tactile_lab.waveform import Waveform

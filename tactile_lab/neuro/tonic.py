@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.skin.events import Events
 
@@ -37,7 +38,7 @@ def pixels(events: Events) -> NDArray[np.int64]:
     return made
 
 
-def whole_us(time: NDArray[np.float64]) -> NDArray[np.int64]:
+def whole_us(time: FloatArray) -> NDArray[np.int64]:
     """Times in s as whole microseconds."""
     return np.round(time * 1e6).astype(np.int64)
 

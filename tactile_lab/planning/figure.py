@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.simulate import Result
 from tactile_lab.planning.current import cut
 from tactile_lab.planning.outcome import joined
@@ -79,7 +79,7 @@ def _force(drive: Timeline) -> Panel:
     )
 
 
-def _lane(result: Result, name: str, times: NDArray[np.float64]) -> Panel:
+def _lane(result: Result, name: str, times: FloatArray) -> Panel:
     series = Series(x=times, y=result.sample(name, times), colour=name)
     return Panel(
         label=SIGNALS[name].title,
@@ -89,7 +89,7 @@ def _lane(result: Result, name: str, times: NDArray[np.float64]) -> Panel:
     )
 
 
-def _rate(spikes: NDArray[np.float64], drive: Timeline) -> Panel:
+def _rate(spikes: FloatArray, drive: Timeline) -> Panel:
     middles, rates = rates_between(spikes, np.array([s.start for s in drive.steps]))
     return Panel(
         label="Rate",
@@ -101,7 +101,7 @@ def _rate(spikes: NDArray[np.float64], drive: Timeline) -> Panel:
     )
 
 
-def _times(result: Result) -> NDArray[np.float64]:
+def _times(result: Result) -> FloatArray:
     """An even grid, and both sides of each reset."""
     times = np.linspace(0.0, result.duration, POINTS)
     if result.spike_times is not None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.drive import Drive
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.scene import Scene
@@ -116,7 +116,7 @@ class ModelOutcome(Outcome):
     """Whether anything of the model was asked for: what follows may depend on it."""
 
     @property
-    def spike_times(self) -> NDArray[np.float64]:
+    def spike_times(self) -> FloatArray:
         """Spikes of this trial, s from its start."""
         scene = self._model.scene
         if not scene.asked & {"spikes", "rate"}:
@@ -130,7 +130,7 @@ class ModelOutcome(Outcome):
         return spikes[(spikes >= self.start) & (spikes < end)] - self.start
 
     @property
-    def current(self) -> NDArray[np.float64]:
+    def current(self) -> FloatArray:
         """Planned current, A."""
         wave = self._model.steps[self.index].current
         if wave is None:
@@ -145,7 +145,7 @@ class ModelOutcome(Outcome):
         return {name: float(found.sample(name, at)[0]) for name in self._measured}
 
     @property
-    def traces(self) -> dict[str, NDArray[np.float64]]:
+    def traces(self) -> dict[str, FloatArray]:
         """The model's signals during the trial."""
         found = self._found(*self._measured)
         times = np.linspace(0.0, self.trial.length, TRACE_POINTS)

@@ -16,14 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
 from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
 from tactile_lab.store.folder import replacing
-
-FloatArray = NDArray[np.float64]
 
 # Any: matplotlib types the keys as some 400 literals
 STYLE: Any = {

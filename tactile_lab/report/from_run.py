@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.analysis.belief import Belief
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
@@ -30,8 +30,6 @@ from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 CELLS = 4000
 """Cells of a trace over the whole run."""
@@ -213,11 +211,11 @@ def _as_it_fell(run: Run) -> tuple[str, ...]:
 def _trial(
     row: Any,
     complete: bool,
-    spikes: NDArray[np.float64],
+    spikes: FloatArray,
     onset: float,
     force: Waveform,
     clock: float | None,
-    blind: NDArray[np.float64],
+    blind: FloatArray,
 ) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
@@ -288,13 +286,13 @@ def _field_per_ampere(scene: Scene) -> float:
     return float(high - low) / 2e-3
 
 
-def _temperature(run: Run) -> NDArray[np.float64]:
+def _temperature(run: Run) -> FloatArray:
     """Readings of the temperature, shape (n, 2), s and K."""
     rows = run.temperature
     return np.column_stack([rows["time"], rows["temperature"]])
 
 
-def _voltages(run: Run) -> dict[str, NDArray[np.float64]]:
+def _voltages(run: Run) -> dict[str, FloatArray]:
     """What source meters held, by voltage, shape (n, 2), s and V."""
     rows = run.voltages
     return {
@@ -304,7 +302,7 @@ def _voltages(run: Run) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def _field(run: Run) -> NDArray[np.float64]:
+def _field(run: Run) -> FloatArray:
     """Teslameter readings, shape (m, 2), s and T."""
     rows = run.field
     names = rows.dtype.names or ()

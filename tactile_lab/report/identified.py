@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.identify import Evidence, Identified, identify_together
+from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import Circuit
@@ -127,7 +128,7 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
 
 
 def settled(
-    force: Waveform, time: NDArray[np.float64], clock: float, lag: float
+    force: Waveform, time: FloatArray, clock: float, lag: float
 ) -> NDArray[np.bool_]:
     """Which bins lie wholly where the force is known.
 

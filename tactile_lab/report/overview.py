@@ -11,15 +11,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series, spike_train
 from tactile_lab.quantity import show
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.spikes.rate import rates_between
-
-FloatArray = NDArray[np.float64]
 
 SHARP = {"V_C2", "V_K"}
 """Signals that jump within a bin: their extremes are the trace, not their mean."""

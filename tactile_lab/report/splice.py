@@ -7,9 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.measurement import Measurement
-
-FloatArray = NDArray[np.float64]
 
 
 class ClosedTime:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import scale
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import (
@@ -28,7 +29,6 @@ from tactile_lab.report.canvas import (
     heading,
 )
 
-FloatArray = NDArray[np.float64]
 Chosen = NDArray[np.bool_]
 
 FAINTEST = 0.15

@@ -17,7 +17,8 @@ from tactile_lab.analysis.error_budget import (
 from tactile_lab.analysis.spike_pairs import Matched
 from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
-from tactile_lab.measurement import FloatArray, Measurement, RecordedSignal
+from tactile_lab.arrays import FloatArray
+from tactile_lab.measurement import Measurement, RecordedSignal
 from tactile_lab.model.temperature import temperature
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import printed, rounded

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.spike_train import SILENT_AFTER
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import count, show
 from tactile_lab.skin.events import Events
 from tactile_lab.skin.skin import Skin

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.cluster import cluster
 from tactile_lab.errors import LinkLostError, TactileLabError
 from tactile_lab.model.batch import Records, certain, records
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.model.specimen import parts
 from tactile_lab.quantity import show

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.batch import critical_forces, records
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, source_stamp
 from tactile_lab.model.specimen import outermost
 from tactile_lab.skin.contact import (

@@ -15,7 +15,7 @@ from __future__ import annotations
 import cmath
 import math
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 
 SPHERE, PUNCH, STRIP, WAVE, UNIFORM = range(5)

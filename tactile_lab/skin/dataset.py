@@ -19,8 +19,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.skin.blocks import solve_block
 from tactile_lab.skin.bound import spans
 from tactile_lab.skin.events import recording

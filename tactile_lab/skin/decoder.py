@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotFoundError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.skin.dataset import DURATION, LABELS, Dataset, touch
 from tactile_lab.skin.single import simulate_taxel
 

@@ -17,8 +17,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RecordingError, RunFolderError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.store.folder import lock
 
 EVENT = np.dtype([("time", np.float64), ("taxel", np.int32)])

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.skin.contact import COLUMNS, KIND, SHAPE_1, SHAPE_2, SPHERE, STRIP
 from tactile_lab.skin.skin import Skin

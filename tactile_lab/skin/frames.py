@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SceneError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.quantity import Pause, SampleRate
 from tactile_lab.skin.layout import Array
 from tactile_lab.table import SceneTable

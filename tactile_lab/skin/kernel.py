@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model import coupled, kernel, spiking
 from tactile_lab.model.batch import appended, begun, numbers_of, train
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import TAU_L, V_FIRE, Y_CRITICAL, Q_at
 from tactile_lab.model.node_a import LAMBDA, TAU, B_at, V_P_at, equilibrium

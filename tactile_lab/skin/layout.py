@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial import cKDTree
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SceneError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.quantity import Unit, show
 from tactile_lab.table import SceneTable
 

@@ -12,12 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError, RecordingError
-from tactile_lab.model.circuit import (
-    LARGEST_VOLTAGE,
-    SUBTHRESHOLD_LIMIT,
-    FloatArray,
-)
+from tactile_lab.model.circuit import LARGEST_VOLTAGE, SUBTHRESHOLD_LIMIT
 from tactile_lab.model.equations import fires_at_rest
 from tactile_lab.quantity import show
 from tactile_lab.skin import kernel

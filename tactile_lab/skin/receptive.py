@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.batch import records
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.plot import Mark, Panel, Plot, Series
 from tactile_lab.skin.blocks import solved
 from tactile_lab.skin.events import Events

@@ -10,9 +10,10 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.complaint import validated
 from tactile_lab.errors import ParameterError, SceneError, choices
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.need import checked_tolerance
 from tactile_lab.model.specimen import specimen
 from tactile_lab.quantity import Duration, Unit

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SceneError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.quantity import Duration, Pause, Unit, show
 from tactile_lab.skin import contact
 from tactile_lab.skin.braille import dots

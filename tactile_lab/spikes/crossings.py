@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.code_cache import kept
 
 Codes = NDArray[np.int16]
@@ -75,7 +76,7 @@ def scan(
     release: int,
     refractory: int,
     state: NDArray[np.int64],
-    times: NDArray[np.float64],
+    times: FloatArray,
     found: Spikes,
 ) -> tuple[int, int]:
     """Run the machine from `begin`; return (samples done, spikes found).

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from tactile_lab.arrays import FloatArray
 
 SILENCE = 3.0
 """Times the intervals beside it from which on a pause between spikes is a silence."""

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tactile_lab.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
-
-FloatArray = NDArray[np.float64]
 
 FINEST = 2.5e-4
 """Shortest time between two points of a smooth force, s."""

@@ -12,9 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from tactile_lab.arrays import FloatArray
+
 Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
 """The coil current between two times, s: its bins' middles, s, and means, A."""
 

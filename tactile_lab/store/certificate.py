@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import count, show
 from tactile_lab.store.folder import digest, write_info
 from tactile_lab.store.run import Run
@@ -215,16 +216,12 @@ def redetect(run: Run) -> NDArray[Any] | None:
     return np.concatenate(found)
 
 
-def unmatched(
-    one: NDArray[np.float64], other: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def unmatched(one: FloatArray, other: FloatArray) -> FloatArray:
     """Sample indices that only one of two ascending lists has, ascending."""
     return np.sort(np.concatenate([_without(one, other), _without(other, one)]))
 
 
-def _without(
-    some: NDArray[np.float64], others: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _without(some: FloatArray, others: FloatArray) -> FloatArray:
     """Those of `some` that are not in `others`."""
     if others.size == 0:
         return some

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent, drain_current
 from tactile_lab.store.folder import SCENE
 from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
-
-FloatArray = NDArray[np.float64]
 
 DERIVED = ("force", "rate", "I_DS")
 STEP = 1e-3

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import show
 from tactile_lab.store.stored_run import StoredRun
-
-FloatArray = NDArray[np.float64]
 
 NEAR_END = 0.98
 """Part of a channel's full scale from which on it is taken to be at its end."""

@@ -9,9 +9,9 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
 from tactile_lab.store.columns import SampleColumn
@@ -114,7 +114,7 @@ class Recorder:
         """
         self._do(partial(self._align, offset, drift, uncertainty))
 
-    def spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
+    def spikes(self, times: FloatArray, found: NDArray[Any]) -> None:
         """Store spikes detected on line.
 
         Args:
@@ -276,7 +276,7 @@ class Recorder:
         self._counter.align(offset, drift, uncertainty)
         self._replace_last("segments", self._counter.segment)
 
-    def _add_spikes(self, times: NDArray[np.float64], found: NDArray[Any]) -> None:
+    def _add_spikes(self, times: FloatArray, found: NDArray[Any]) -> None:
         samples = self._counter.stored(found["sample"])
         columns = (samples, times, found["amplitude"], found["width"])
         self._waiting["spikes"] += zip(*columns, strict=True)

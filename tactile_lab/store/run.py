@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab import notebook
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError, RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent
 from tactile_lab.quantity import show
@@ -151,7 +151,7 @@ class Run(StoredRun):
         end: float | None,
         signals: Sequence[str] | None,
         rate: float | None,
-    ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
+    ) -> tuple[FloatArray, dict[str, FloatArray]]:
         if signals is None:
             force = "force" in derivable(self)
             signals = (*self.signals, "force") if force else self.signals

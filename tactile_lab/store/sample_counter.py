@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Stream
 from tactile_lab.errors import RecordingError
 
@@ -67,12 +67,12 @@ class SampleCounter:
         self._expected += samples
         self.taken += samples
 
-    def stored(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stored(self, samples: FloatArray) -> FloatArray:
         """Indices in the record of (fractional) indices in the stream."""
         streamed = np.array([begin[0] for begin in self._begins])
         stored = np.array([begin[1] for begin in self._begins])
         which = np.searchsorted(streamed, samples, side="right") - 1
-        found: NDArray[np.float64] = samples - streamed[which] + stored[which]
+        found: FloatArray = samples - streamed[which] + stored[which]
         return found
 
     def align(self, offset: float, drift: float, uncertainty: float) -> None:

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import show
 from tactile_lab.store.derived import derivable, derivation
 from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.layout import BIN
@@ -20,8 +21,6 @@ PIECE = 1 << 20
 """Samples read at a time."""
 ROWS = 1 << 18
 """Samples handed on at a time, of each signal."""
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.run import Run
-from tactile_lab.trace import FloatArray
 
 BEFORE, AFTER = 4.0, 10.0
 """What is read around a spike, in widths of an ordinary one."""

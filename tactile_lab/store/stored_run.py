@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count, show
 from tactile_lab.spikes.detection import Detection
@@ -33,7 +34,6 @@ from tactile_lab.waveform import Waveform
 if TYPE_CHECKING:
     from tactile_lab.scene.scene import Scene
 
-FloatArray = NDArray[np.float64]
 Records = NDArray[Any]
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.cluster import code_digests
 from tactile_lab.errors import TactileLabError
 from tactile_lab.model.circuit import Circuit
@@ -18,7 +19,7 @@ from tactile_lab.planning.preview import DEFAULT_TOLERANCE
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.studies.axes import Axis, changed
-from tactile_lab.studies.design import FloatArray, by_point
+from tactile_lab.studies.design import by_point
 from tactile_lab.studies.study import Study
 
 ADDRESS = 16

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from tactile_lab.analysis.control_chart import mean_and_error
 from tactile_lab.analysis.estimate import Estimate, student_95
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import count, plus_minus, printed, show
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import Gathered
-
-FloatArray = NDArray[np.float64]
 
 CURVES = 8
 """Most curves in one panel."""

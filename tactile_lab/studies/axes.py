@@ -10,15 +10,11 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import QuantityError, SceneError
 from tactile_lab.quantity import SIFloat, parse, show
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
-
-FloatArray = NDArray[np.float64]
 
 MOST_VALUES = 1_000_000
 """Most values of one axis."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.batch import (
     certain,
@@ -16,7 +17,7 @@ from tactile_lab.model.batch import (
     rests,
     spike_trains,
 )
-from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit, FloatArray
+from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit
 from tactile_lab.spikes.trains import Trains
 from tactile_lab.studies.specification import Silence, Specification
 from tactile_lab.waveform import Waveform

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Conclusion, Table
-from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit, FloatArray
+from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.quantity import show
 from tactile_lab.spikes.trains import Trains

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tactile_lab.arrays import FloatArray
+
 Value = float | FloatArray
 """Of one point: a number, or a row of numbers, shape (n,)."""
 

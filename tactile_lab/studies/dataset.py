@@ -12,6 +12,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.column import Column, Rows
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 DATA = "data.zarr"
 MADE_OF = "made_of"
 """Attribute that tells of which study a data set is; see `study_digest`."""
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SceneError
 from tactile_lab.studies.axes import Axis
 
@@ -22,7 +23,6 @@ BYTES, LEAST_TIME = 48, 30e-6
 TORNADO = (0.1586552539314571, 0.8413447460685429)
 """Low and high of a tornado: one standard deviation of a normal spread."""
 
-FloatArray = NDArray[np.float64]
 Numbers = Sequence[int] | NDArray[np.intp]
 
 

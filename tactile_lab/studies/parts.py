@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.model.circuit import FloatArray
+from tactile_lab.arrays import FloatArray
 from tactile_lab.studies.behaviour import Behaviour, behaviour
 from tactile_lab.studies.chosen import Chosen, checks_of
 from tactile_lab.studies.specification import STEP, Specification

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.complaint import validated
 from tactile_lab.errors import QuantityError, SceneError, choices, nearest
 from tactile_lab.plugins import study_names, study_path
@@ -95,7 +96,7 @@ class Limits:
         ]
         return " and ".join(parts)
 
-    def hold(self, column: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def hold(self, column: FloatArray) -> NDArray[np.bool_]:
         """Which numbers lie between, of the same shape; NaN never does."""
         low = -np.inf if self.least is None else self.least
         high = np.inf if self.most is None else self.most

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import TactileLabError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.simulate import simulate
 from tactile_lab.validation import general, rivals, spice
 from tactile_lab.validation.exact_firing import exact_firing

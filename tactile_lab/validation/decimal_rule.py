@@ -6,8 +6,8 @@ from decimal import Decimal
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.model.tableau import differentiation, radau_nodes
 
 NODES = 32
@@ -104,7 +104,7 @@ def _refined(c: Decimal) -> Decimal:
     return (x + 1) / 2
 
 
-def solved(matrix: NDArray[np.float64], right: Numbers) -> Numbers | None:
+def solved(matrix: FloatArray, right: Numbers) -> Numbers | None:
     """A correction good to some ten digits of itself; iterating gives all."""
     largest = max(abs(x) for x in right)
     if largest == 0:

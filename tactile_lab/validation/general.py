@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.validation.problem import (
     Answer,
     Deadline,

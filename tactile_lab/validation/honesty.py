@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.arrays import FloatArray
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.state import Start
 from tactile_lab.validation.reference import reference

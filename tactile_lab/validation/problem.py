@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
-from tactile_lab.model.circuit import Circuit, FloatArray
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.equations import V_P as closed_V_P
 from tactile_lab.model.equations import rest_point

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at, Q_gain
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at

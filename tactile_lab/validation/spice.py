@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
-from tactile_lab.model.circuit import FloatArray
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem
 
 RESET_RESISTANCE = 100.0

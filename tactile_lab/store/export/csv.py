@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.store.export.content import (
     UNITS,
     Table,
@@ -15,15 +16,7 @@ from tactile_lab.store.export.content import (
     tables,
     unit,
 )
-from tactile_lab.store.export.lines import (
-    CodeText,
-    FloatArray,
-    Text,
-    fixed,
-    lines,
-    steps,
-    written,
-)
+from tactile_lab.store.export.lines import CodeText, Text, fixed, lines, steps, written
 from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run

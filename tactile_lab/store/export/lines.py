@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.store.signal import StoredSignal
 
 Text = NDArray[np.uint8]
-FloatArray = NDArray[np.float64]
 
 NUMBER = "%.12g"
 """Twelve digits: far below one code, and no noise of binary fractions."""

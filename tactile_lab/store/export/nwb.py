@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivation
@@ -192,7 +192,7 @@ def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
         module.add(series)
 
 
-def _times(time: NDArray[np.float64]) -> dict[str, Any]:
+def _times(time: FloatArray) -> dict[str, Any]:
     """A start and a rate where times, s, are even; else each of them."""
     steps = np.diff(time)
     if steps.size and np.ptp(steps) < EVEN * steps.mean():

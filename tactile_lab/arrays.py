@@ -1,0 +1,8 @@
+"""What arrays are called in signatures; shapes and units stand in docstrings."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
