@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from tactile_lab.bench import CoilCapability, ScopeCapability
+from tactile_lab.bench import CoilCapability
 from tactile_lab.errors import SceneError
 from tactile_lab.generator import AnalogueInput
 from tactile_lab.instruments.dialects import (
@@ -25,6 +25,7 @@ from tactile_lab.instruments.registry import (
     ThermometerDriver,
     VoltageSourceDriver,
 )
+from tactile_lab.scope import ScopeCapability
 
 if TYPE_CHECKING:
     from drivers.coil.source import CoilSource

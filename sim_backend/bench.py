@@ -9,13 +9,14 @@ from sim_backend.plant.noise import SensorNoise
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
 from sim_backend.world import WiredInputs, World
-from tactile_lab.bench import Bench, Channel, Followers
+from tactile_lab.bench import Bench, Followers
 from tactile_lab.clock import Clock, RealClock, SimulatedClock
 from tactile_lab.engine.bench import equipped
 from tactile_lab.instruments.registry import far_end
 from tactile_lab.model.specimen import specimen
 from tactile_lab.planning.needs import Needs
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scope import Channel
 from tactile_lab.voltage_source import SOURCED
 
 NO_FOLLOWERS = Followers(input_bias=0.0, bandwidth=0.0)

@@ -9,9 +9,9 @@ from typing import Any
 from sim_backend.plant.plant import Plant
 from sim_backend.plant.scope_input import BUFFERED
 from sim_backend.plant.scope_source import Acquisition, Codes
-from tactile_lab.bench import Channel
 from tactile_lab.clock import Clock
 from tactile_lab.scene.tables import Simulated
+from tactile_lab.scope import Channel
 
 
 class WiredInputs:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from tactile_lab.bench import Stream
 from tactile_lab.errors import SamplesLostError
+from tactile_lab.scope import Stream
 
 LAG = 0.01
 """Rise of the lag that is taken for a loss on a real computer, s, or `SAMPLES`."""

@@ -17,10 +17,10 @@ from drivers.picoscope.sample_count import SampleCount
 from drivers.picoscope.sdk import INPUTS, RANGES, TIME_UNITS
 from drivers.picoscope.setup import configure, ring_samples, streaming_interval
 from drivers.picoscope.unit import ScopeUnit
-from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import LinkLostError, RefusedError, SamplesLostError
 from tactile_lab.instruments.channels import check_channels, described
+from tactile_lab.scope import Block, Channel, ScopeCapability, Stream
 
 GUARANTEED = (31.25e6, 15.625e6, 7.8125e6, 7.8125e6)
 """Streaming rate for 1 to 4 inputs that Pico guarantees on any USB port, S/s."""

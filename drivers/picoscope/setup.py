@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from drivers.picoscope import status
 from drivers.picoscope.sdk import COUPLINGS, INPUTS, RANGES, TIME_UNITS
 from drivers.picoscope.unit import ScopeUnit
-from tactile_lab.bench import Channel
 from tactile_lab.errors import LimitError
+from tactile_lab.scope import Channel
 
 _LEAST_RING, _MOST_RING = 1 << 16, 1 << 23
 _SHORTEST = 8e-9

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from drivers.picoscope import status
 from drivers.picoscope.sdk import ENUMERATE, INFORMATION, INPUTS, bind, load
 from drivers.picoscope.sdk_calls import LibraryCalls
-from tactile_lab.bench import Channel
 from tactile_lab.errors import LimitError, NotFoundError, RefusedError
+from tactile_lab.scope import Channel
 
 _MOST_ACKNOWLEDGEMENTS = 4
 

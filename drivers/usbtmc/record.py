@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.usbtmc.link import UsbtmcLink
-from tactile_lab.bench import Channel, Stream
 from tactile_lab.errors import BadReplyError
 from tactile_lab.instruments.scope_dialect import ScopeDialect
+from tactile_lab.scope import Channel, Stream
 
 SHIFT = 8
 """Low bits of every code that are 0: bytes are put in the high half."""

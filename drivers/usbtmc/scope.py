@@ -11,7 +11,6 @@ import numpy as np
 from drivers.opened import Opened
 from drivers.usbtmc.link import UsbtmcLink
 from drivers.usbtmc.record import SHIFT, RecordReader, number, tell
-from tactile_lab.bench import Block, Channel, ScopeCapability, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import (
     BadReplyError,
@@ -22,6 +21,7 @@ from tactile_lab.errors import (
 )
 from tactile_lab.instruments.channels import check_channels, described
 from tactile_lab.instruments.scope_dialect import ScopeDialect
+from tactile_lab.scope import Block, Channel, ScopeCapability, Stream
 
 _MOST_ERRORS = 20
 _SETTLING, _PATIENCE = 0.2, 3.0

@@ -9,11 +9,11 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QWidget
 
 from gui.parts import STRETCH, Combo, column, empty, label, push, row, say
 from gui.setup.parameter import toml
-from tactile_lab.bench import Channel
 from tactile_lab.errors import QuantityError, SceneError
 from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.quantity import exact, parse, printed, show, typed
 from tactile_lab.scene.bench_file import BenchSpec
+from tactile_lab.scope import Channel
 from tactile_lab.table import dumped
 
 

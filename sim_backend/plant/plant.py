@@ -23,11 +23,11 @@ from sim_backend.plant.render import noise_table
 from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
 from sim_backend.plant.sensor import NEEDS, SimulatedSensor
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.temperature import temperature
+from tactile_lab.scope import Channel
 from tactile_lab.waveform import Waveform
 
 MEMORY = 0.2

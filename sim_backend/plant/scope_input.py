@@ -16,7 +16,7 @@ from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import Pieces
 from sim_backend.plant.render import NOISE_UNIT, add_pulses, digitise
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Channel
+from tactile_lab.scope import Channel
 
 BUFFERED = ("V_C1", "V_C2", "V_K")
 """Nodes of the circuit that are measured through a voltage follower."""

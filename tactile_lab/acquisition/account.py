@@ -23,10 +23,11 @@ from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import FoundSpikes
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Reading, Stream
+from tactile_lab.bench import Reading
 from tactile_lab.clock import Clock
 from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import plus_minus, show
+from tactile_lab.scope import Stream
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.trace import Trace
 from tactile_lab.trial import Outcome, Trial

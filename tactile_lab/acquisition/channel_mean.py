@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_lab.bench import Block, Reading, Stream
+from tactile_lab.bench import Reading
 from tactile_lab.errors import LimitError
 from tactile_lab.quantity import show
+from tactile_lab.scope import Block, Stream
 from tactile_lab.signals import FIELD_AVERAGING, SIGNALS
 
 FULL = 0.95

@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from tactile_lab.acquisition.asked_field import NOTABLE
+from tactile_lab.analysis.wiring import shunt_agrees
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Reading, shunt_agrees
+from tactile_lab.bench import Reading
 from tactile_lab.magnetics import ROUGH
 from tactile_lab.quantity import show
 from tactile_lab.trial import Trial

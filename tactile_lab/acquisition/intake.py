@@ -14,8 +14,9 @@ from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import Live
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Block, Reading, Stream
+from tactile_lab.bench import Reading
 from tactile_lab.errors import SamplesLostError
+from tactile_lab.scope import Block, Stream
 from tactile_lab.signals import AVERAGED
 
 if TYPE_CHECKING:  # compiled code, which a run without spikes does not load

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Block, Stream
+from tactile_lab.scope import Block, Stream
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.voltage_source import HeldVoltage
 

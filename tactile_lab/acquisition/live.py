@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.pyramid import Level
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.trace import Trace
 
 BIN = 1e-3

@@ -10,8 +10,8 @@ from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.drive_check import DriveCheck
 from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import Channel
 from tactile_lab.drive import Drive
+from tactile_lab.scope import Channel
 from tactile_lab.trial import Trial, Trials
 
 SETTLED = 10.0

@@ -15,7 +15,6 @@ from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.acquisition.search import REST, SpikeSearch
 from tactile_lab.acquisition.stop import Lease, StopRequest
-from tactile_lab.bench import Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import (
     InstrumentError,
@@ -23,6 +22,7 @@ from tactile_lab.errors import (
     RefusedError,
     TactileLabError,
 )
+from tactile_lab.scope import Stream
 
 PULSE = 0.25
 """Longest time between two signs of life of the loop, s."""

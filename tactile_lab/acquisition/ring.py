@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tactile_lab.acquisition.alignment import align
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
+from tactile_lab.scope import Block, Stream
 
 Spikes = tuple[FloatArray, NDArray[Any]]
 

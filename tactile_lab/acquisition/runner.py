@@ -28,7 +28,7 @@ from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
 from tactile_lab.acquisition.stop import Lease, StopRequest
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Bench, Stream
+from tactile_lab.bench import Bench
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive, Way
 from tactile_lab.errors import (
@@ -38,6 +38,7 @@ from tactile_lab.errors import (
     SamplesLostError,
     TactileLabError,
 )
+from tactile_lab.scope import Stream
 from tactile_lab.trial import Outcome, Trial
 
 BASELINE = 0.1

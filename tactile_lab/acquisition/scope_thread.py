@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
-from tactile_lab.bench import Block, Channel, Scope, Stream
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError, RecordingError
+from tactile_lab.scope import Block, Channel, Scope, Stream
 
 QUEUE = 256
 """Blocks that may wait for the deciding loop."""

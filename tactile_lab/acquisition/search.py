@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from tactile_lab.bench import Stream
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
+from tactile_lab.scope import Stream
 from tactile_lab.spikes.detection import Detection
 
 if TYPE_CHECKING:  # compiled code, which a run without spikes does not load

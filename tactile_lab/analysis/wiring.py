@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_lab.analysis.estimate import Z95, Estimate
-from tactile_lab.bench import shunt_agrees
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ROUGH
 from tactile_lab.model.circuit import Circuit
@@ -28,8 +27,17 @@ DEAD = 0.02
 """A channel whose voltage is below this part of what it should be is not connected."""
 GAIN_ERROR = 0.1
 """A gain further from 1 than this is no calibration but a mistake."""
+SHUNT = 0.05
+"""Part of the current by which the shunt may differ from the source's read-back."""
+SHUNT_NOTABLE = 0.02
+"""The least difference of them that is remarked on, A."""
 LEAK = 0.3
 """A shunt that shows more where none flows, A, carries another signal."""
+
+
+def shunt_agrees(seen: float, amperes: float) -> bool:
+    """Whether what a shunt shows, A, is the current that the source reads back, A."""
+    return abs(seen - amperes) <= SHUNT * abs(amperes) + SHUNT_NOTABLE
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import Bench, Stream
+from tactile_lab.bench import Bench
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.coil_heat import CoilHeat
@@ -36,6 +36,7 @@ from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.plan import plan
 from tactile_lab.planning.way import drive_for
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scope import Stream
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.certificate import Certificate, write_certificate
 from tactile_lab.store.folder import RunFolder, Status

@@ -27,11 +27,12 @@ from tactile_lab.quantity import count
 if TYPE_CHECKING:
     from tactile_lab.analysis.noise import Noise
     from tactile_lab.arrays import FloatArray
-    from tactile_lab.bench import Bench, Coil, Meter, OffReport, Scope, SeenOutput
+    from tactile_lab.bench import Bench, Coil, Meter, OffReport, SeenOutput
     from tactile_lab.engine.manual import FieldReading
     from tactile_lab.engine.model_parts import StoredParts
     from tactile_lab.engine.monitor import Monitor
     from tactile_lab.scene.scene import Scene
+    from tactile_lab.scope import Scope
     from tactile_lab.store.spike_shapes import SpikeShapes
     from tactile_lab.store.statistics import Statistics
     from tactile_lab.voltage_source import VoltageSource

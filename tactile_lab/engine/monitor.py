@@ -22,7 +22,7 @@ from tactile_lab.acquisition.ring import Held, Ring
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.analysis.noise import Noise, noise
-from tactile_lab.bench import Bench, Block
+from tactile_lab.bench import Bench
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
@@ -32,6 +32,7 @@ from tactile_lab.errors import RecordingError, SceneError
 from tactile_lab.planning.plan import plan
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scope import Block
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.recorder import Recorder

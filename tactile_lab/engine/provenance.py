@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import Bench, Stream
+from tactile_lab.bench import Bench
 from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import Plan
 from tactile_lab.plugins import ships
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
+from tactile_lab.scope import Stream
 from tactile_lab.store.folder import INPUTS, SCENE, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.table import dumped

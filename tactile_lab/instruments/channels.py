@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tactile_lab.bench import Channel, ScopeCapability
 from tactile_lab.errors import LimitError
+from tactile_lab.scope import Channel, ScopeCapability
 
 COUPLINGS = ("AC", "DC")
 

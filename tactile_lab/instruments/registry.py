@@ -18,14 +18,7 @@ from typing import Protocol as Interface
 
 from pydantic import AfterValidator
 
-from tactile_lab.bench import (
-    Channel,
-    Coil,
-    CoilCapability,
-    Meter,
-    Scope,
-    ScopeCapability,
-)
+from tactile_lab.bench import Coil, CoilCapability, Meter
 from tactile_lab.clock import Clock
 from tactile_lab.errors import (
     LimitError,
@@ -36,6 +29,7 @@ from tactile_lab.errors import (
 )
 from tactile_lab.instruments.channels import check_channels
 from tactile_lab.plugins import module_from_file, plugged_in, registered
+from tactile_lab.scope import Channel, Scope, ScopeCapability
 from tactile_lab.voltage_source import VoltageSource, VoltageSourceCapability
 
 DRIVERS, FAR_ENDS = "tactile_lab.drivers", "tactile_lab.far_ends"

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tactile_lab.bench import ScopeCapability
 from tactile_lab.instruments.serial_dialect import Dialect, Lines, Strict, frozen
+from tactile_lab.scope import ScopeCapability
 
 Numbers = Annotated[tuple[float, ...], BeforeValidator(frozen)]
 

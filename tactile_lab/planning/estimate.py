@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_lab.bench import Channel, CoilLimits
+from tactile_lab.bench import CoilLimits
 from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.planning.heat import cool_down, heat_along
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scope import Channel
 from tactile_lab.waveform import Waveform
 
 BYTES_PER_SAMPLE = 2

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 
-from tactile_lab.bench import Channel
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.instruments.registry import (
     BY_PERSON,
@@ -21,6 +20,7 @@ from tactile_lab.instruments.registry import (
 from tactile_lab.planning.ranges import Extremes, expected, fitted, widened
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scope import Channel
 from tactile_lab.signals import AVERAGED, SIGNALS
 from tactile_lab.voltage_source import why_not
 

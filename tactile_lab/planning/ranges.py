@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactile_lab.bench import Channel
 from tactile_lab.errors import SolverError
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
+from tactile_lab.scope import Channel
 
 NODES = ("V_C1", "V_C2", "V_K")
 """Voltages of the circuit between 0 V and its supply."""

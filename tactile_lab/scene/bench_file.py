@@ -13,7 +13,7 @@ from typing import Annotated, Any, cast
 from pydantic import AfterValidator, Field, ValidationInfo
 from typing_extensions import TypedDict
 
-from tactile_lab.bench import Channel, CoilLimits, Followers
+from tactile_lab.bench import CoilLimits, Followers
 from tactile_lab.errors import choices
 from tactile_lab.instruments.registry import (
     BY_PERSON,
@@ -25,6 +25,7 @@ from tactile_lab.instruments.registry import (
 )
 from tactile_lab.magnetics import Magnet
 from tactile_lab.quantity import Unit, Voltage
+from tactile_lab.scope import Channel
 from tactile_lab.signals import AVERAGED
 from tactile_lab.table import INTERNAL, SceneTable
 from tactile_lab.voltage_source import SOURCED, VoltageLimits

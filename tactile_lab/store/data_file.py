@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tactile_lab.bench import Stream
+from tactile_lab.scope import Stream
 from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.durable import Durable
 from tactile_lab.store.folder import DATA

@@ -26,8 +26,8 @@ import h5py
 import hdf5plugin
 import numpy as np
 
-from tactile_lab.bench import Stream
 from tactile_lab.errors import RecordingError
+from tactile_lab.scope import Stream
 from tactile_lab.signals import SIGNALS
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.folder import SCHEMA

@@ -12,8 +12,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Block, Stream
 from tactile_lab.errors import RecordingError
+from tactile_lab.scope import Block, Stream
 from tactile_lab.store.columns import SampleColumn
 from tactile_lab.store.data_file import DataFile
 from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.bench import Stream
 from tactile_lab.errors import RecordingError
+from tactile_lab.scope import Stream
 
 Segment = tuple[int, float, float, float, float, float]
 """A row of `layout.RECORDS["segments"]`."""

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from sim_backend.bench import open_bench
 from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.scene.load import load
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.signals import FIELD_AVERAGING
 from tactile_lab.store.run import Run
 

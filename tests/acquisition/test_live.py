@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactile_lab.acquisition.live import CAPACITY, Live
-from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.scope import Block, Channel, Stream
 
 CHANNELS = (
     Channel(signal="V_C1", input="A", range=5.0, offset=-4.0),

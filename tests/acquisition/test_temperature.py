@@ -12,7 +12,6 @@ from sim_backend.plant.plant import Plant
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.thermometer import SensorFault
 from tactile_lab.acquisition.events import RunState, TemperatureRead
-from tactile_lab.bench import Channel
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.jobs import InstrumentAnswer
 from tactile_lab.errors import SceneError
@@ -24,6 +23,7 @@ from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
+from tactile_lab.scope import Channel
 from tactile_lab.store.folder import read_info
 from tactile_lab.store.run import Run
 

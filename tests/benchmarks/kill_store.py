@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from provenance import provenance
 
-from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.errors import RunFolderError
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.detector import detect, detector_of
 from tactile_lab.store.folder import DATA, RunFolder

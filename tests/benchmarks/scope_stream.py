@@ -29,9 +29,9 @@ from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
-from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock, SimulatedClock
 from tactile_lab.errors import SamplesLostError
+from tactile_lab.scope import Channel
 
 EMULATOR = Path(__file__).parents[1] / "drivers" / "ps3000a_emulator.c"
 INPUTS = "ABCD"

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from provenance import provenance
 
-from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder

@@ -33,9 +33,9 @@ from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.live import Live
 from tactile_lab.acquisition.scope_thread import ScopeThread
-from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import TactileLabError
+from tactile_lab.scope import Channel
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.detector import detector_of
 from tactile_lab.store.certificate import write_certificate

@@ -19,10 +19,10 @@ from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault
 from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
 from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
-from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.dialects import scope_dialect
+from tactile_lab.scope import Channel
 
 RECORDS = 6
 WIRED = (Channel(signal="V_K", input="1", range=4.0),)

@@ -35,8 +35,8 @@ from gui.state import WindowState
 from gui.window import Window
 from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.live import Live
-from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.engine.events import Samples, TaskEvent
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.trace import Trace
 
 SLEEPING = QEventLoop.ProcessEventsFlag.WaitForMoreEvents

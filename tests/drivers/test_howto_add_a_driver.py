@@ -20,7 +20,6 @@ from sim_backend.usbtmc.bus import SimulatedBus
 from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
 from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
-from tactile_lab.bench import Channel
 from tactile_lab.cli import main
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.engine.bench import open_bench
@@ -32,6 +31,7 @@ from tactile_lab.planning.plan import plan
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
+from tactile_lab.scope import Channel
 from tactile_lab.store.run import Run
 
 SLOW = {

@@ -12,7 +12,6 @@ from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
-from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
     InstrumentError,
@@ -23,6 +22,7 @@ from tactile_lab.errors import (
     SamplesLostError,
     TactileLabError,
 )
+from tactile_lab.scope import Channel
 
 FOUR = tuple(
     Channel(signal=signal, input=name, range=5.0)

@@ -13,9 +13,9 @@ from drivers.picoscope.setup import streaming_interval
 from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
-from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError
+from tactile_lab.scope import Block, Channel
 
 SINE = Voltages(
     {

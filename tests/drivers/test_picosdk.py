@@ -16,9 +16,9 @@ from drivers.picoscope.sdk import ENVIRONMENT, PROTOTYPES, bind, candidates, loa
 from drivers.picoscope.sdk_calls import LibraryCalls
 from sim_backend.picoscope.sdk import FakePs3000a, StreamingReady
 from sim_backend.plant.scope_source import Acquisition, Codes
-from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import NotFoundError, RefusedError
+from tactile_lab.scope import Channel
 
 ONE = (Channel(signal="V_K", input="A", range=5.0),)
 

@@ -15,7 +15,6 @@ import pytest
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import ENVIRONMENT, load
 from sim_backend.picoscope.sdk import FUNCTIONS
-from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
     LimitError,
@@ -23,6 +22,7 @@ from tactile_lab.errors import (
     RefusedError,
     SamplesLostError,
 )
+from tactile_lab.scope import Block, Channel
 
 SOURCE = Path(__file__).with_name("ps3000a_emulator.c")
 TWO = (

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.picoscope.sample_count import SampleCount
-from tactile_lab.bench import Stream
 from tactile_lab.errors import SamplesLostError
+from tactile_lab.scope import Stream
 
 RATE = 1e6
 

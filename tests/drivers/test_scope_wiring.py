@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from drivers.picoscope.scope import PicoScope
-from tactile_lab.bench import Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError
 from tactile_lab.instruments.channels import check_channels, described
+from tactile_lab.scope import Channel
 
 # known before the scope is opened, so a bench can be refused before that
 CAPABILITY = PicoScope(clock=SimulatedClock()).capability

@@ -15,7 +15,6 @@ from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault
 from sim_backend.usbtmc.function import INTERFACE, UsbtmcFunction
 from sim_backend.usbtmc.rigol_ds1000z import SimulatedDs1000z
-from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
     BadReplyError,
@@ -27,6 +26,7 @@ from tactile_lab.errors import (
     SceneError,
 )
 from tactile_lab.instruments.dialects import dialect_ids, parse_dialect, scope_dialect
+from tactile_lab.scope import Block, Channel
 
 ROW = scope_dialect("rigol-ds1000z")
 TRIO = (

@@ -7,12 +7,12 @@ from benches import WITH_GAPS
 from tactile_lab.acquisition import events, runner
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.acquisition.ring import Ring
-from tactile_lab.bench import Block, Channel, Stream
 from tactile_lab.engine.monitor import Monitor
 from tactile_lab.errors import RecordingError, SceneError
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.store.certificate import certify
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from engine_answers import answered, pid_of
 
-from tactile_lab.bench import Bench, Meter, Scope
+from tactile_lab.bench import Bench, Meter
 from tactile_lab.clock import RealClock
 from tactile_lab.engine import process
 from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.jobs import check
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.memory import forget_code
+from tactile_lab.scope import Scope
 
 forks = pytest.mark.skipif(not process.FORKS, reason="engines are forked on Linux only")
 

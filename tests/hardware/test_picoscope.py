@@ -18,9 +18,9 @@ from checklist import by_hand, fact, needs
 
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import RANGES
-from tactile_lab.bench import Channel
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import InstrumentError, LimitError
+from tactile_lab.scope import Channel
 
 pytestmark = needs("picoscope", "a PicoScope")
 

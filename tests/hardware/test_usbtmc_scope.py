@@ -17,9 +17,9 @@ from checklist import fact, needs
 
 from drivers.usb_presence import present
 from drivers.usbtmc.scope import UsbtmcScope
-from tactile_lab.bench import Block, Channel
 from tactile_lab.clock import RealClock
 from tactile_lab.instruments.dialects import scope_dialect
+from tactile_lab.scope import Block, Channel
 
 pytestmark = needs("usbtmc", "a USBTMC oscilloscope")
 

@@ -9,13 +9,13 @@ from sim_backend.bench import plant_of
 from sim_backend.plant.noise import NoiseSource, SensorNoise
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
-from tactile_lab.bench import Channel
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.specimen import specimen
 from tactile_lab.model.temperature import at_temperature, temperature
 from tactile_lab.planning.plan import plan
 from tactile_lab.scene.load import load
+from tactile_lab.scope import Channel
 from tactile_lab.waveform import Waveform
 
 V_K = Channel(signal="V_K", input="C", range=5.0)

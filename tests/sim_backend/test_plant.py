@@ -21,9 +21,9 @@ from plant_world import (
 
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
-from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.scope import Channel
 
 
 def test_at_rest_the_inputs_show_the_circuits_rest_point() -> None:

@@ -18,9 +18,9 @@ from plant_world import (
 
 from sim_backend.plant import sensor
 from sim_backend.plant.options import PlantOptions
-from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.simulate import simulate
+from tactile_lab.scope import Channel
 from tactile_lab.waveform import Waveform
 
 

@@ -15,8 +15,8 @@ from plant_world import (
 )
 
 from sim_backend.plant.options import PlantOptions
-from tactile_lab.bench import Channel
 from tactile_lab.errors import ParameterError
+from tactile_lab.scope import Channel
 
 
 def test_a_follower_compresses_the_spike() -> None:

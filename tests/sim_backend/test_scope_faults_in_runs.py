@@ -13,10 +13,10 @@ from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import Event, Message, RunState
-from tactile_lab.bench import Block
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
+from tactile_lab.scope import Block
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tactile_lab.bench import Block, Channel, Stream
+from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.detector import detector_of
 from tactile_lab.store.folder import RunFolder

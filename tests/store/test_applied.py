@@ -3,8 +3,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from tactile_lab.bench import Block
 from tactile_lab.report.driven import shunt_over_source
+from tactile_lab.scope import Block
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES, applied_current
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder

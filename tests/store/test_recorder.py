@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tactile_lab.bench import Block
 from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.scope import Block
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout

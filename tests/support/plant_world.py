@@ -4,9 +4,9 @@ import numpy as np
 
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.plant import Plant
-from tactile_lab.bench import Channel
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.scope import Channel
 
 FULL, SHIFT = 32512, 8
 MAGNET = Magnet(r=6e-3)
