@@ -52,7 +52,7 @@ class ErrorBudget:
 def spike_time_budget(twin: Twin, belief: Belief) -> ErrorBudget | None:
     """That of the predicted spikes, s; None where none were matched.
 
-    Noise is how irregularly the measured spikes lie about the predicted ones.
+    Noise is what the irregularity of the intervals has added up to at a spike.
     """
     matched = twin.spikes
     if matched is None or not matched.offsets.size:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_lab.analysis.belief import PART
+from tactile_lab.analysis.estimate import Z95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import rounded
 
@@ -54,12 +55,22 @@ class Matched:
 
     @property
     def scatter(self) -> float:
-        """How irregularly measured spikes lie about the predicted ones, 95 %, s.
+        """How far noise takes a spike from where it is predicted, 95 %, s: the median.
 
-        From second differences of the offsets, which no slow drift of them enters; not
-        a number with less than three pairs.
+        An interval that noise makes longer makes all later spikes of its burst late, so
+        that the n-th lies off by the root of n times as much as one interval. That is
+        told by how the offset changes from one interval to the next, into which no slow
+        drift enters; not a number without three spikes in a burst.
         """
-        return irregularity(self.offsets)
+        gaps = np.diff(self.measured)
+        begins = np.append(True, gaps > SILENCE * _interval(self.measured)[:-1])
+        burst, at = np.cumsum(begins), np.arange(begins.size)
+        inside = burst[2:] == burst[:-2]
+        if not inside.any():
+            return float("nan")
+        changes = np.abs(np.diff(self.offsets, 2)[inside])
+        one = Z95 * float(np.median(changes)) / 0.6745 / math.sqrt(2)
+        return one * math.sqrt(np.median(at - at[begins][burst - 1] + 1))
 
     @property
     def within(self) -> float:

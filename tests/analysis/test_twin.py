@@ -155,6 +155,19 @@ def test_after_a_silence_the_offset_begins_anew():
     assert found.missed == found.extra == 0
 
 
+def test_what_noise_makes_of_intervals_adds_up_over_a_burst():
+    rng, burst = np.random.default_rng(1), 0.1 * np.arange(1, 21)
+    predicted = np.concatenate([burst, burst + 5, burst + 10])
+    late = [np.cumsum(rng.normal(0, 1e-3, burst.size)) for _ in range(400)]
+    told = [
+        match(predicted + np.concatenate(late[i : i + 3]), predicted).scatter
+        for i in range(0, 399, 3)
+    ]
+    # of half of the spikes, the first ten of each burst, 95 % lie within
+    lies = np.abs(np.array(late))[:, [9, 10]]
+    assert np.median(told) == pytest.approx(np.percentile(lies, 95), rel=0.1)
+
+
 @given(TRAIN, st.data())
 def test_a_lost_spike_is_missed_and_a_false_one_is_extra(times, data):
     lost = data.draw(st.integers(0, times.size - 1))
