@@ -230,7 +230,7 @@ def _gate(
 
     half, _ = _bands(run, run.trace("V_C1"), known)
     try:
-        gate = explaining_V_GS(circuit, V_C1, half / Z95)
+        gate = explaining_V_GS(circuit, V_C1, half / Z95, run.displaced)
     except NotIdentifiableError as reason:
         said = f"{str(reason)[0].upper()}{str(reason)[1:]}."
         return Conclusion((said,), {"V_GS": None})

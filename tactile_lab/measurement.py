@@ -169,8 +169,8 @@ class Measurement:
             shape (m, 2), s and V.
         traces: decimated signals, the derived I_DS and the model's V_C1 among them.
         circuit: the sensor as it is believed to be, to compare with, or None.
-        bias_uncertainty: half of the 95 % band of the current a measuring follower
-            draws from C2, A.
+        displaced: the circuit with each thing that is not known of it, such as the
+            follower's input bias or its temperature, at the end of its 95 % band.
         lag_uncertainty: the same of the lags of coil and core together, s; None where
             the bench does not state it.
         searched: whether spikes were looked for.
@@ -194,7 +194,7 @@ class Measurement:
     voltages: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
-    bias_uncertainty: float = 0.0
+    displaced: tuple[Circuit, ...] = ()
     lag_uncertainty: float | None = None
     searched: bool = True
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
@@ -242,7 +242,7 @@ class Measurement:
         hold = begin + FOLLOWED - trial.start, trial.hold[1]
         try:
             found = fit_circuit_adaptation(
-                self.circuit, trial.spike_times, hold, self.bias_uncertainty
+                self.circuit, trial.spike_times, hold, self.displaced
             )
         except NotIdentifiableError as error:
             return None, str(error)

@@ -13,7 +13,8 @@ Eq. (15) with this V_P(t) is the rate that is drawn.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,7 +70,7 @@ def fit_circuit_adaptation(
     circuit: Circuit,
     spike_times: ArrayLike,
     hold: tuple[float, float],
-    bias_uncertainty: float = 0.0,
+    displaced: Sequence[Circuit] = (),
 ) -> CircuitAdaptation:
     """Fit tau, V_GS and V_P to the spikes within a hold.
 
@@ -77,11 +78,11 @@ def fit_circuit_adaptation(
         circuit: as it is believed to be; its V_GS and tau are where the fit starts.
         spike_times: s.
         hold: (start, end) of the constant force, s, on the same axis.
-        bias_uncertainty: half of the 95 % band of the current that a measuring follower
-            draws from C2, A.
+        displaced: the circuit with each thing that is not known of it at the end of its
+            95 % band.
 
     Intervals hold the scatter of V_C2 at firing, as far as neighbours err alike too,
-    and what the bias leaves open.
+    and what is not known of the circuit.
 
     Raises:
         NotIdentifiableError: fewer than 6 intervals, a rate that does not fall, a T1
@@ -106,9 +107,8 @@ def fit_circuit_adaptation(
         Estimate.of(float(v), float(e), freedom)
         for v, e in zip(theta, errors, strict=True)
     ]
-    if bias_uncertainty:
-        other = _Law(replace(circuit, I_bias=circuit.I_bias + bias_uncertainty))
-        moved = other.fit(times, length, theta)[0] - theta
+    for other in displaced:
+        moved = _Law(other).fit(times, length, theta)[0] - theta
         found = [f.widened(abs(float(m))) for f, m in zip(found, moved, strict=True)]
     V_GS, V_P, log_tau = found
     tau = math.exp(log_tau.value)

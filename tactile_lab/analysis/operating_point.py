@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from tactile_lab.errors import NotIdentifiableError
@@ -22,7 +23,7 @@ def V_GS_of_onset(
     silent: Waveform,
     fires: Waveform,
     force_error: float = 0.0,
-    bias_uncertainty: float = 0.0,
+    displaced: Sequence[Circuit] = (),
 ) -> tuple[float, float]:
     """Least and largest V_GS with which the model agrees with two trials from rest, V.
 
@@ -34,8 +35,8 @@ def V_GS_of_onset(
         silent: strongest force, N(t), that gave no spike.
         fires: weakest force, N(t), that gave one.
         force_error: of both forces alike (95 %), N; widens the interval.
-        bias_uncertainty: half of the 95 % band of the current that a measuring follower
-            draws from C2, A; widens it likewise.
+        displaced: the circuit with each thing that is not known of it at the end of its
+            95 % band; widens it likewise.
 
     Raises:
         NotIdentifiableError: none within 0.15 V of the believed V_GS agrees.
@@ -46,12 +47,9 @@ def V_GS_of_onset(
             f"the weakest force that fired asks for a V_GS above {show(low, 'V', 6)}, "
             f"the strongest silent one for less than {show(high, 'V', 6)}"
         )
-    moved = 0.0
-    if bias_uncertainty:
-        biased = replace(circuit, I_bias=circuit.I_bias + bias_uncertainty)
-        moved = _edge(biased, fires) - low
+    moved = [_edge(other, fires) - low for other in displaced]
     half = (high - low) / 2
-    wider = math.hypot(half, circuit.k_F * force_error, moved) - half
+    wider = math.hypot(half, circuit.k_F * force_error, *moved) - half
     return low - wider, high + wider
 
 

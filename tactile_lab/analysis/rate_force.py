@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -131,7 +131,7 @@ def fit_rate_law(
     circuit: Circuit,
     V_P: Callable[[FloatArray], FloatArray],
     trains: Sequence[FloatArray],
-    bias_uncertainty: float = 0.0,
+    displaced: Sequence[Circuit] = (),
 ) -> RateLaw:
     """Fit V_GS and the scale of V_P to the intervals of several holds.
 
@@ -139,8 +139,8 @@ def fit_rate_law(
         circuit: as it is believed to be.
         V_P: as it is believed to be at times of any shape, s, V.
         trains: spike times within each hold, s on the same axis.
-        bias_uncertainty: half of the 95 % band of the current that a measuring follower
-            draws from C2, A.
+        displaced: the circuit with each thing that is not known of it at the end of its
+            95 % band.
 
     Raises:
         NotIdentifiableError: a T1 that saturates, fewer than 4 intervals, or fewer than
@@ -159,8 +159,10 @@ def fit_rate_law(
             "slope"
         )
 
-    def fitted(bias: float) -> tuple[Charging, FloatArray, FloatArray, FloatArray]:
-        charging = Charging(replace(circuit, I_bias=circuit.I_bias + bias))
+    def fitted(
+        circuit: Circuit,
+    ) -> tuple[Charging, FloatArray, FloatArray, FloatArray]:
+        charging = Charging(circuit)
 
         def residual(theta: FloatArray) -> FloatArray:
             reached = charging.charged(
@@ -178,14 +180,15 @@ def fit_rate_law(
             np.asarray(solved.jac),
         )
 
-    charging, theta, left, jacobian = fitted(0.0)
+    charging, theta, left, jacobian = fitted(circuit)
     alike = correlated(left)
     freedom = max(1, int(left.size / alike) - 2)
     scatter = math.sqrt(float(np.sum(left**2)) / max(left.size - 2, 1))
     covariance = scatter**2 * alike * np.linalg.pinv(jacobian.T @ jacobian)
-    moved = fitted(bias_uncertainty)[1] - theta if bias_uncertainty else np.zeros(2)
-    # one cause moves both: it correlates them
-    half = student_95(freedom) ** 2 * covariance + np.outer(moved, moved)
+    half = student_95(freedom) ** 2 * covariance
+    for other in displaced:
+        moved = fitted(other)[1] - theta
+        half += np.outer(moved, moved)  # one cause moves both: it correlates them
     error = np.sqrt(np.diag(half))
     V_GS, scale = (
         Estimate(float(v), float(e) / Z95, float(v - e), float(v + e))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -311,19 +311,23 @@ def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:
     return float(np.hypot(sine, cosine) / np.sinc(frequency * step))
 
 
-def explaining_V_GS(circuit: Circuit, V_C1: float, error: float) -> Estimate:
+def explaining_V_GS(
+    circuit: Circuit, V_C1: float, error: float, displaced: Sequence[Circuit] = ()
+) -> Estimate:
     """V_GS that explains a rest V_C1, Eqs. (8) and (16), with its uncertainty.
 
     Args:
         circuit: all else.
         V_C1: at rest, V.
         error: standard uncertainty of V_C1 with the channel's calibration, V.
+        displaced: the circuit with each thing that is not known of it at the end of its
+            95 % band.
 
     Raises:
         NotIdentifiableError: no V_GS gives that V_C1.
     """
 
-    def at(volts: float) -> float:
+    def at(volts: float, circuit: Circuit = circuit) -> float:
         current = (circuit.V_S - volts) / circuit.R1 - volts / circuit.R2
         if current <= 0 or volts <= 0:
             raise NotIdentifiableError(
@@ -334,4 +338,5 @@ def explaining_V_GS(circuit: Circuit, V_C1: float, error: float) -> Estimate:
 
     middle = at(V_C1)
     sensitivity = abs(at(V_C1 - 1e-4) - middle) / 1e-4
-    return Estimate.of(middle, sensitivity * error, 10_000)
+    moved = (abs(at(V_C1, other) - middle) for other in displaced)
+    return Estimate.of(middle, sensitivity * error, 10_000).widened(*moved)

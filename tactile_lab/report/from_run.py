@@ -75,7 +75,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             circuit=scene.circuit,
             belief=_belief(run, scene),
             compared=scene.compared,
-            bias_uncertainty=_bias_uncertainty(scene),
+            displaced=scene.displaced,
             lag_uncertainty=scene.bench.magnet.lag_uncertainty,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
@@ -127,12 +127,6 @@ def _clock(run: Run, scene: Scene) -> float | None:
     if scene.bench.coil is not None:  # it acted within one update before it told
         clock = math.hypot(clock, coil_capability(scene.bench.coil).update_interval)
     return clock
-
-
-def _bias_uncertainty(scene: Scene) -> float:
-    """Of the current that the follower at V_C2 draws, A."""
-    followers = scene.bench.followers
-    return 0.0 if followers is None else followers.input_bias_uncertainty
 
 
 def _conditions(info: Mapping[str, Any]) -> dict[str, str]:

@@ -128,8 +128,9 @@ def circuit_fits_table(run: Measurement) -> Table:
         rows=tuple(rows),
         note="Fitted to the charge of C2 from spike to spike and to the silence after "
         "the last one, from when the applied force was there; all other parts of the "
-        "circuit as given. ±: 95 %, the follower's input bias within. Last spike: by "
-        "the law, from the trial's start.",
+        "circuit as given. ±: 95 %, the follower's input bias within, and the "
+        "temperature where the scene says how well it is known. Last spike: by the "
+        "law, from the trial's start.",
     )  # fmt: skip
 
 

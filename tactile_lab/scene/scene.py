@@ -10,6 +10,7 @@ from typing import Any
 
 import tomli_w
 
+from tactile_lab.deviation import Deviation
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.state import Start
 from tactile_lab.scene.bench_file import BenchSpec, is_file
@@ -57,6 +58,14 @@ class Scene:
         if followers is None:
             return self.sensor.circuit
         return replace(self.sensor.circuit, I_bias=followers.input_bias)
+
+    @property
+    def displaced(self) -> tuple[Circuit, ...]:
+        """`circuit` with each thing not known of it at the end of its 95 % band."""
+        followers, kelvin = self.bench.followers, self.sensor.temperature_uncertainty
+        bias = 0.0 if followers is None else followers.input_bias_uncertainty
+        off = Deviation(input_bias=bias), Deviation(temperature=kelvin or 0.0)
+        return tuple(one.circuit(self.circuit) for one in off if one != Deviation())
 
     @property
     def sensor_alone(self) -> Scene:

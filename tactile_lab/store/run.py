@@ -57,7 +57,7 @@ class Run(StoredRun):
             fit_circuit_adaptation,
         )
 
-        row, followers = self.trials[trial], self.scene.bench.followers
+        row = self.trials[trial]
         start, end = (float(row["start"] + row[n]) for n in ("hold_start", "hold_end"))
         if not start < end:
             raise NotIdentifiableError("the trial has no hold")
@@ -66,7 +66,7 @@ class Run(StoredRun):
             self.scene.circuit,
             self.spikes["time"],
             (max(start, arrived) + FOLLOWED, end),
-            0.0 if followers is None else followers.input_bias_uncertainty,
+            self.scene.displaced,
         )
 
     def to_xarray(

@@ -21,6 +21,7 @@ from tactile_lab.calibration import read_calibration
 from tactile_lab.errors import LimitError, NotIdentifiableError, SceneError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_V_C1
+from tactile_lab.model.temperature import at_temperature, temperature
 
 DAY = datetime.date(2026, 11, 21)
 
@@ -199,6 +200,15 @@ def test_the_rest_voltage_gives_v_gs_back(V_GS):
     assert gate.value == pytest.approx(V_GS, abs=1e-6)
     assert gate.low < V_GS < gate.high
     assert 2e-3 < gate.error < 50e-3
+
+
+def test_what_is_not_known_of_the_temperature_is_in_v_gs():
+    warmer = at_temperature(Circuit(), temperature(Circuit()) + 1.0)
+    rest = rest_V_C1(warmer)
+    sure = explaining_V_GS(Circuit(), rest, 2e-4)
+    open_ = explaining_V_GS(Circuit(), rest, 2e-4, [warmer])
+    assert not sure.low < 1.4 < sure.high
+    assert open_.low < 1.4 < open_.high
 
 
 def test_an_impossible_rest_voltage_is_refused():

@@ -1,12 +1,11 @@
 """The circuit's own adaptation law, fitted to spikes and to the silence after them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.circuit_adaptation import fit_circuit_adaptation
+from tactile_lab.deviation import Deviation
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1
@@ -92,12 +91,18 @@ def test_its_intervals_cover_the_truth():
     assert found.tau.half < 1.5
 
 
-def test_an_unknown_input_bias_is_in_the_interval():
-    times = held(replace(Circuit(), I_bias=20e-12))
+@pytest.mark.parametrize(
+    "off", [Deviation(input_bias=20e-12), Deviation(temperature=1.0)]
+)
+def test_what_is_not_known_of_the_circuit_is_in_the_intervals(off):
+    other = off.circuit(Circuit())
+    times = held(other)
     sure = fit_circuit_adaptation(Circuit(), times, HOLD)
-    open_ = fit_circuit_adaptation(Circuit(), times, HOLD, bias_uncertainty=20e-12)
-    assert not sure.tau.low < 8.69 < sure.tau.high
-    assert open_.tau.low < 8.69 < open_.tau.high
+    open_ = fit_circuit_adaptation(Circuit(), times, HOLD, displaced=[other])
+    for name, truth in (("tau", 8.69), ("V_GS", 1.4)):
+        missed, found = getattr(sure, name), getattr(open_, name)
+        assert not missed.low < truth < missed.high
+        assert found.low < truth < found.high
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,10 @@ def test_what_the_bias_leaves_open_is_in_it():
         true = replace(believed, I_bias=believed.I_bias + bias)
         silent, fires = bracket(true, low=rng.uniform(0.05, 0.06), width=7e-4)
         low, high = V_GS_of_onset(
-            believed, push(silent), push(fires), bias_uncertainty=20e-12
+            believed,
+            push(silent),
+            push(fires),
+            displaced=[replace(believed, I_bias=believed.I_bias + 20e-12)],
         )
         inside += low < believed.V_GS < high
     assert 35 <= inside

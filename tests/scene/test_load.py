@@ -1,11 +1,13 @@
 """Scene files become validated scenes in SI, and resolve to text that loads again."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tactile_lab.errors import SceneError
+from tactile_lab.model.temperature import at_temperature, temperature
 from tactile_lab.scene.load import load, load_bench, resolve
 
 PULSES = '[protocol]\nname = "pulses"\n'
@@ -78,6 +80,15 @@ def test_preset_first_then_single_keys(scene_file):
     assert preset.circuit.V_GS == 1.54141
     over = load(scene_file(PULSES + '[sensor]\npreset = "fig5b"\nV_GS = "1.5 V"\n'))
     assert over.circuit.V_GS == 1.5
+
+
+def test_what_is_stated_to_be_uncertain_of_the_circuit_is_known_to_fits():
+    bias, warm = load("demo", ['sensor.temperature_uncertainty="2 K"']).displaced
+    believed = load("demo").circuit
+    assert bias == replace(believed, I_bias=believed.I_bias + 20e-12)
+    assert warm == at_temperature(believed, temperature(believed) + 2)
+    alone = ['sensor.temperature_uncertainty="0 K"', 'bench.followers.bandwidth="0 Hz"']
+    assert load("demo", alone).displaced == (bias,)
 
 
 def test_explicit_thresholds_override_what_firing_sets(scene_file):
