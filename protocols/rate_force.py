@@ -157,9 +157,11 @@ def _beside_eq15(run: Measurement) -> Conclusion:
     ]
     if not ratios:
         return Conclusion()
+    told = f"The highest rate is {ratios[0]:.2f}"
+    if len(ratios) > 1:
+        told = f"The highest rates are {min(ratios):.2f} to {max(ratios):.2f}"
     said = (
-        f"The highest rates are {min(ratios):.2f} to {max(ratios):.2f} of what Eq. "
-        "(15) gives for the current at the end of the ramp, which knows "
-        f"{_unknown(run)}."
+        f"{told} of what Eq. (15) gives for the current at the end of the ramp, which "
+        f"knows {_unknown(run)}."
     )
     return Conclusion((said,), {"peak_rate_over_eq15": ratios})

@@ -25,6 +25,7 @@ from tactile_lab.analysis.spike_train import within
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.quantity import count
 
 FEWEST_INTERVALS = 6
 FOLLOWED = 0.03
@@ -91,16 +92,15 @@ def fit_circuit_adaptation(
     if circuit.saturation:
         raise NotIdentifiableError("T1 saturates: V_C1 alone does not tell its current")
     times = within(spike_times, hold) - hold[0]
-    count = times.size - 1
-    if count < FEWEST_INTERVALS:
-        raise NotIdentifiableError(
-            f"{max(count, 0)} intervals in the hold, {FEWEST_INTERVALS} are needed"
-        )
+    number = times.size - 1
+    if number < FEWEST_INTERVALS:
+        seen = count(max(number, 0), "interval")
+        raise NotIdentifiableError(f"{seen} in the hold, {FEWEST_INTERVALS} are needed")
     length = hold[1] - hold[0]
     law = _Law(circuit)
     theta, residual, jacobian, scatter = law.fit(times, length)
     alike = correlated(residual)
-    freedom = max(1, int(count / alike) - theta.size)
+    freedom = max(1, int(number / alike) - theta.size)
     inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     errors = scatter * np.sqrt(alike * np.diag(inverse))
     found = [
@@ -128,7 +128,7 @@ def fit_circuit_adaptation(
         V_P=V_P,
         scatter=scatter,
         rms=rms,
-        intervals=count,
+        intervals=number,
         silent_from=None if silent is None else silent + hold[0],
         hold=hold,
         circuit=circuit,

@@ -48,7 +48,7 @@ OWN = {"input_bias": "follower"}
 """Name of the cause of uncertainty where it is not the suspect's own."""
 SYSTEMATIC = 0.03
 """Of one code: what the mean of dithered codes is off by, alike at each level."""
-DITHERED = 0.25
+DITHERED = 0.1
 """Of one code: noise smooths a converter's steps where they leave less than this."""
 FEWEST = 3
 """Fewer data than this tell nothing."""

@@ -129,6 +129,16 @@ def test_steps_of_a_converter_that_no_noise_smooths_are_no_misfit():
     assert explain(BELIEF, true.duration, V_C1=seen) is None
 
 
+def test_steps_of_a_converter_that_noise_smooths_half_are_no_misfit():
+    """A long hold in codes of 39 mV under 5 mV of noise was told as one of 4.5."""
+    code, true = 10 / 254, simulate(*BELIEF.driven, keep=("V_C1", "spikes"))
+    time = (np.arange(1000) + 0.5) * true.duration / 1000
+    volts, left = true.sample("V_C1", time), 0.22 * code
+    volts += left * np.sin(2 * np.pi * volts / code)
+    seen = Measured("V_C1", time, volts, resolution=code, offset=3e-3, steps=left)
+    assert explain(BELIEF, true.duration, V_C1=seen) is None
+
+
 def test_a_cause_is_named_though_the_follower_is_not_quite_as_stated():
     found = explained(Deviation(V_GS=4e-3, input_bias=15e-12))
     assert found.cause.name == "V_GS"
