@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from lane_stack import stack
 from PySide6.QtWidgets import QApplication
 from served_source import Source
 
@@ -20,6 +21,8 @@ from gui.session.session import Session
 from gui.state import WindowState
 from gui.window import Window
 from tactile_lab.engine.request import Request
+
+__all__ = ["stack"]
 
 LONGEST = 90.0
 """Seconds a condition is waited for: a busy machine is slow, not wrong."""

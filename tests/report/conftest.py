@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from modelled_runs import rate_force
 
 from protocols.pulses import Pulses
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.waveform import Waveform
+
+__all__ = ["rate_force"]
 
 STEP = 2e-4
 

@@ -1,4 +1,4 @@
-"""What a figure shows: margins, and texts that do not run into each other."""
+"""What a figure shows: margins, texts clear of each other, no time without a trial."""
 
 import itertools
 
@@ -7,6 +7,9 @@ import pytest
 
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.report.canvas import draw
+from tactile_lab.report.findings import find
+from tactile_lab.report.overview import overview
+from tactile_lab.report.splice import ClosedTime
 
 
 def axes(*series, **panel):
@@ -51,3 +54,30 @@ def test_a_logarithmic_axis_has_numbers_that_do_not_run_into_each_other():
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
     numbers = upper.get_xticklabels(which="both")
     assert not any(t.get_text() and t.get_visible() for t in numbers)
+
+
+def test_a_figure_closes_up_over_recoveries(rate_force):
+    shown = overview(find(rate_force).run)
+    force, voltage, *_ = shown.panels
+    cuts = [g for g in force.guides if g.to is None]
+    assert len(cuts) == 3
+    duration = shown.x_limits[1]
+    assert duration == pytest.approx(rate_force.duration - 150.0)
+    holds = [g.at - 0.25 for g in force.guides if g.to is not None]
+    assert holds == pytest.approx([0.0, 2.0, 4.0, 6.0])
+    pushed = force.series[0]
+    assert pushed.x[-1] == pytest.approx(duration)
+    assert np.interp(4.5, pushed.x, pushed.y) == pytest.approx(0.15)
+    V_C1 = next(s for s in voltage.series if s.name == "V_C1")
+    known = V_C1.x[np.isfinite(V_C1.x)]
+    assert np.all(np.diff(known) > -1e-9)
+    assert known[-1] <= duration
+    *_, last = draw(shown, "a run").axes
+    assert "recoveries left out" in last.get_xlabel()
+
+
+def test_a_run_without_recoveries_is_left_as_it_is(demo):
+    axis, time = ClosedTime(demo), np.linspace(0, demo.duration, 7)
+    assert axis.cuts == ()
+    assert axis.closed(time).tolist() == time.tolist()
+    assert axis.shown(time).all()

@@ -1,0 +1,86 @@
+"""What a report concludes from a push and a pull."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+from modelled_runs import modelled
+
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.report.findings import find
+from tactile_lab.report.results import as_json
+from tactile_lab.waveform import Waveform
+
+CODE = 4.0 / 254
+
+
+def pushed_and_pulled(seed, *, late=0.06):
+    """A `bipolar` run of +-80 mN as an 8 bit scope shows it; forces come `late` s."""
+    steps = []
+    for level in (0.08, -0.08):
+        pulse = Waveform.pulse(level, ramp=0.25, hold=5.0, rest=4.0)
+        wave = Waveform(np.append(0.0, pulse.time + late), np.append(0.0, pulse.value))
+        steps.append((f"{level * 1e3:g} mN", level, wave, False))
+    quiet = ("rest", None, Waveform.through([(0.0, 0.0), (0.5, 0.0)]), False)
+    run = modelled("bipolar", [quiet, *steps], searched=False, bins=2000)
+    held = tuple(replace(t, hold=t.level and (0.25, 5.25)) for t in run.trials)
+    V_C1, rng = run.traces[0], np.random.default_rng(seed)
+    noisy = V_C1.mean[:, None] + rng.normal(0, 5e-3, (2000, 100))
+    shown = 2.5 + CODE * np.rint((noisy - 2.5) / CODE).mean(axis=1)
+    seen = replace(V_C1, mean=shown, code=CODE, samples=100)
+    return replace(run, trials=held[1:], traces=(seen,))
+
+
+def test_bipolar_s_intervals_hold_though_the_converter_has_steps():
+    truth = {}
+    for seed in range(6):
+        run = pushed_and_pulled(seed)
+        values = find(run).conclusion.plain
+        tau = values["tau_s"]
+        assert tau["low_95"] < 8.69 < tau["high_95"]
+        assert tau["high_95"] - tau["low_95"] < 0.5
+        for change in values["I_DS_changes"]:
+            level = change["level_N"]
+            if level not in truth:
+                truth[level] = _changed_by_eq_8(run, level)
+            off = change["change_A"] - truth[level]
+            assert abs(off) < change["change_uncertainty_A_95"]
+            assert abs(off) < 0.03 * abs(truth[level])
+
+
+def _changed_by_eq_8(run, level):
+    """From before the push to when the force is there, node A having followed."""
+    trial = next(t for t in run.trials if t.level == level)
+    made = simulate(Circuit(), run.force, keep=("V_P",))
+    ends = np.array([trial.start, run.applied_edge(trial)])
+    before, after = np.exp(made.sample("V_P", ends) / (5.646 * 0.025))
+    return 24.69e-9 * (after - before)
+
+
+def test_numbers_from_samples_beyond_the_range_are_refused():
+    run = pushed_and_pulled(0)
+    push, pull = run.trials
+    late = np.array([[pull.start + 0.5, pull.start + 1.0]])
+    cut = replace(run.traces[0], overrange=late)
+    found = find(replace(run, traces=(cut,)))
+    (change,) = found.conclusion.values["I_DS_changes"]
+    assert change["level_N"] == 0.08
+    assert "-80 mN: V_C1 left its channel's range" in found.conclusion.missing[0]
+    assert found.conclusion.values["tau_s"].low < 8.69
+    whole = np.array([[push.start, run.duration]])
+    lost = find(replace(run, traces=(replace(cut, overrange=whole),)))
+    assert not lost.conclusion.values
+    assert len(lost.missing) == 2
+    told = json.loads(as_json(lost))
+    assert told["overrange_s"] == {"V_C1": whole.tolist()}
+
+
+def test_bipolar_without_a_rest_before_it_says_so():
+    run = pushed_and_pulled(0)
+    late = tuple(replace(t, start=t.start - 0.5) for t in run.trials)
+    kept = run.traces[0].time >= 0.8
+    time, mean = (v[kept] for v in (run.traces[0].time - 0.5, run.traces[0].mean))
+    cut = replace(run.traces[0], time=time, mean=mean)
+    found = find(replace(run, trials=late, traces=(cut,))).conclusion
+    assert "current at rest is not known" in found.missing[0]

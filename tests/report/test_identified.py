@@ -1,0 +1,65 @@
+"""The model beside a run of plain values, and what is identified with it."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from modelled_runs import modelled, pulse
+
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.report.findings import find
+from tactile_lab.report.identified import identify_run, identify_runs, settled
+from tactile_lab.report.twin import sentences
+from tactile_lab.report.write import write
+from tactile_lab.waveform import Waveform
+
+
+def test_a_model_that_stays_cool_beside_a_sensor_that_warms_says_so(rate_force):
+    time = np.linspace(0, rate_force.duration, 20)
+    warming = np.column_stack([time, 291.65 + 15 * time / time[-1]])
+    beside = find(rate_force).beside
+    said = sentences(beside, replace(rate_force, temperature=warming))
+    assert any(
+        "read from 291.65 K to 306.65 K; the model stays at 290.11 K" in t for t in said
+    )
+    assert not any("read from" in text for text in sentences(beside, rate_force))
+
+
+def test_the_twin_is_reported(rate_force, tmp_path):
+    report = write(tmp_path, rate_force)
+    values = json.loads(report.results.read_text())["twin"]
+    assert values["voltages"]["V_C1"]["rms_V"] < 2e-3
+    assert values["spikes"]["missed"] == values["spikes"]["extra"] == 0
+    page = report.html.read_text(encoding="utf-8")
+    assert re.search(r"V_C1: measured less model is .{1,8} mV on average", page)
+
+
+def test_runs_that_do_not_share_a_value_are_named():
+    runs = [
+        replace(modelled("pulses", [pulse(0.15)], circuit=Circuit(V_GS=V_GS)), run=name)
+        for name, V_GS in (("S1", 1.40), ("S2", 1.38))
+    ]
+    found = identify_runs(runs, ("V_GS",))
+    assert any("S2 alone gives V_GS" in text for text in found.warnings)
+
+
+def test_identification_leaves_out_the_field_s_lag(rate_force):
+    steps = np.array([1.0, 1.0, 2.0, 2.0])
+    force = Waveform(np.r_[0.0, steps, 3.0], np.array([0, 0, 0.1, 0.1, 0, 0]))
+    time = np.arange(0.005, 3, 0.01)
+    late = ~settled(force, time, 0.0, 0.03)
+    assert late.sum() == 8
+    assert np.all((time[late] - np.floor(time[late])) < 0.04)
+    # clocks that err make it early as well
+    blurred = ~settled(force, time, 0.02, 0.03)
+    assert np.all(time[blurred] > np.floor(time[blurred] + 0.03) - 0.03)
+    assert blurred.sum() > late.sum() + 2
+    # V_C1 that comes some milliseconds late, as behind a real core
+    trace = rate_force.trace("V_C1")
+    lagging = replace(trace, mean=np.interp(trace.time - 4e-3, trace.time, trace.mean))
+    run = replace(rate_force, traces=(lagging,), searched=False)
+    found = identify_run(run, ("V_GS", "tau")).estimates
+    assert found["tau"].value == pytest.approx(8.69, rel=0.05)
+    assert found["V_GS"].value == pytest.approx(1.4, abs=2e-3)

@@ -1,0 +1,80 @@
+"""What a run cannot answer is said, and the rest is kept."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.hold import Hold
+from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.plugins import protocol_class
+from tactile_lab.report.findings import find
+from tactile_lab.report.write import write
+
+
+def test_a_trial_whose_spikes_could_not_be_told_has_a_count_and_no_rate():
+    train = MeasuredTrial(
+        label="120 mN", level=0.12, start=0.0, duration=2.0, hold=(0.25, 1.5),
+        spike_times=np.array([0.3, 0.4, 0.5]),
+    )  # fmt: skip
+    assert train.response.latency == 0.3
+    blind = replace(train, unsearched=True)
+    assert blind.response.spikes == 3
+    assert (blind.response.latency, blind.response.peak_rate) == (None, None)
+    assert "left its range" in blind.why_not
+
+
+def test_a_run_without_current_has_no_twin(rate_force):
+    assert find(replace(rate_force, belief=None)).beside is None
+
+
+def test_too_few_spikes_to_fit_are_said(rate_force, tmp_path):
+    held = replace(rate_force, protocol=Hold(), trials=rate_force.trials[2:3])
+    report = write(tmp_path, held)
+    film, said = report.findings.missing
+    assert said.startswith("No time constant of an exponential: not identifiable: ")
+    found = json.loads(report.results.read_text(encoding="utf-8"))
+    assert found["missing"] == [film, said]
+    assert found["conclusion"]["time_constant_s"] is None
+    assert found["trials"][0]["spikes"] > 3, "what there is, is kept"
+    assert "Not determined" in report.html.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("protocol", "says"),
+    [
+        ("hold", "spikes were not looked for"),
+        ("rate_force", "spikes were not looked for"),
+        ("repeat", "spikes were not looked for"),
+        ("threshold_search", "spikes were not looked for"),
+        ("bipolar", "No drain current"),
+        ("sine_sweep", "No gain"),
+    ],
+)
+def test_a_run_without_its_signal_says_so_and_claims_nothing(
+    rate_force, protocol, says
+):
+    blind = replace(
+        rate_force, protocol=protocol_class(protocol)(), searched=False, traces=()
+    )
+    found = find(blind)
+    assert says in found.missing[0]
+    assert not found.conclusion.sentences
+
+
+def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_path):
+    first, second = rate_force.traces
+    ragged = replace(
+        first,
+        time=np.sort(np.random.default_rng(0).uniform(0, 8, first.time.size)),
+    )
+    broken = replace(
+        rate_force, traces=(ragged, second), circuit=replace(Circuit(), V_S=1e-3)
+    )
+    report = write(tmp_path, broken)
+    assert any("No I_DS" in text for text in report.findings.missing)
+    assert "Not determined" in report.html.read_text(encoding="utf-8")
+    assert sum(t.response.spikes for t in report.findings.run.results) > 30
+    assert report.html.exists()

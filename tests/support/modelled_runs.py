@@ -1,0 +1,90 @@
+"""Runs of a protocol as the model answers them, without a bench."""
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.belief import Belief
+from tactile_lab.magnetics import Magnet
+from tactile_lab.measurement import MeasuredTrial, RecordedSignal
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
+from tactile_lab.plugins import protocol_class
+from tactile_lab.report.run_data import RunData
+from tactile_lab.waveform import Waveform
+
+NEWTONS_PER_AMPERE = 0.2
+
+
+MAGNET = Magnet(r=6e-3)
+
+
+def means(found, signal, time):
+    """Of bins about these times, as a scope's samples give them."""
+    step = time[1] - time[0]
+    inside = time[:, None] + step * (np.arange(8) - 3.5) / 8
+    return found.sample(signal, inside).mean(axis=1)
+
+
+def modelled(protocol, steps, *, circuit=None, bins=2000, parameters=None, **entries):
+    """A run of (label, level, force, pause) steps as the model answers them."""
+    circuit = circuit or Circuit()
+    force, starts = None, []
+    for _, _, wave, _ in steps:
+        starts.append(0.0 if force is None else force.end)
+        force = wave if force is None else force.then(wave)
+    found = simulate(circuit, force, keep=("V_C1", "V_C2", "spikes"))
+    time = (np.arange(bins) + 0.5) * force.end / bins
+    trials = []
+    for start, (label, level, wave, pause) in zip(starts, steps, strict=True):
+        inside = (found.spike_times >= start) & (found.spike_times < start + wave.end)
+        trials.append(
+            MeasuredTrial(
+                label=label,
+                level=level,
+                start=start,
+                duration=wave.end,
+                spike_times=found.spike_times[inside] - start,
+                hold=None if level is None else (0.25, 0.25 + 1.0),
+                pause=pause,
+            )
+        )
+    traces = tuple(
+        RecordedSignal(signal=s, time=time, mean=means(found, s, time))
+        for s in ("V_C1", "V_C2")
+    )
+    plain = {
+        "title": protocol,
+        "protocol": protocol_class(protocol)(**(parameters or {})),
+        "run": "a run",
+        "status": "complete",
+        "simulated": True,
+        "bench": "test",
+        "duration": force.end,
+        "trials": tuple(trials),
+        "force": force,
+        "current": np.column_stack([force.time, force.value / NEWTONS_PER_AMPERE]),
+        "traces": traces,
+        "circuit": Circuit(),
+        "belief": Belief(
+            Circuit(), MAGNET, force.scaled(1 / MAGNET.newtons_per_ampere)
+        ),
+    }
+    return RunData(**{**plain, **entries})
+
+
+def pulse(level, rest=0.5):
+    label = f"{level * 1e3:g} mN"
+    return (label, level, Waveform.pulse(level, ramp=0.25, hold=1.0, rest=rest), False)
+
+
+def recovery(seconds=50.0):
+    quiet = Waveform.through([(0.0, 0.0), (seconds, 0.0)])
+    return ("recovery", None, quiet, True)
+
+
+@pytest.fixture(scope="session")
+def rate_force():
+    steps = []
+    for level in (0.085, 0.11, 0.15, 0.2):
+        steps += [pulse(level), recovery()]
+    return modelled("rate_force", steps[:-1])
