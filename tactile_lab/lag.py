@@ -10,7 +10,6 @@ Between two points of a piecewise-linear u both are straight lines and exponenti
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,39 +58,75 @@ class Lag:
             return wave, (last, last)
         fast, slow = self._apart()
         first = float(wave.value[0])
-        y, z = before or (first, first)
-        fine = FINE * max(wave.peak, abs(y), abs(z), 1e-12)
-        pieces: list[tuple[float, float, float, float, float]] = []
-        bends: list[FloatArray] = []
-        ends = [(wave.start, z)]
-        for start, end, u, to in wave.segments():
-            lasts = end - start
-            if lasts == 0:
-                continue
-            slope = (to - u) / lasts
-            line = u - slope * (fast + slow)
-            one = (y - u + slope * fast) if fast > 0 else 0.0
-            apart = fast / (fast - slow) if slow > 0 else 1.0
-            two = z - line - one * apart if slow > 0 else 0.0
-            pieces.append((start, line, slope, one * apart, two))
-            for size, lag in ((one * apart, fast), (two, slow)):
-                if abs(size) > fine:
-                    bends.append(start + _bends(abs(size) / fine, lag, lasts))
-            y = to - slope * fast + one * _left(lasts, fast)
-            left = one * apart * _left(lasts, fast), two * _left(lasts, slow)
-            z = to - slope * (fast + slow) + sum(left)
-            if max(map(abs, left)) < fine / 100:  # settled, and 0 A is no field
-                y, z = to - slope * fast, to - slope * (fast + slow)
-            ends.append((end, z))
-        known = np.array(ends)
-        if not bends:
-            return Waveform(*known.T), (y, z)
-        between = np.setdiff1d(np.concatenate(bends), known[:, 0])
-        inner = _values(pieces, between, (fast, slow))
-        time = np.concatenate([known[:, 0], between])
-        order = np.argsort(time)
-        value = np.concatenate([known[:, 1], inner])
-        return Waveform(time[order], value[order]), (y, z)
+        before = before or (first, first)
+        fine = FINE * max(wave.peak, *map(abs, before), 1e-12)
+        lasts = np.diff(wave.time)
+        pieces = lasts > 0  # the others are jumps
+        start, end, lasts = wave.time[:-1][pieces], wave.time[1:][pieces], lasts[pieces]
+        u, to = wave.value[:-1][pieces], wave.value[1:][pieces]
+        slope = (to - u) / lasts
+        line = u - slope * (fast + slow)
+        straight = to - slope * fast, to - slope * (fast + slow)
+        left = _left(lasts, fast), _left(lasts, slow)
+        decays, ends, after = self._decays(
+            before, (u - slope * fast, line), straight, left, fine / 100
+        )
+        times = np.append(wave.start, end)
+        known = np.append(before[1], ends)
+        inner = [
+            _bends(start, end, np.abs(sizes) / fine, lag)
+            for sizes, lag in zip(decays, (fast, slow), strict=True)
+            if lag > 0
+        ]
+        between = np.setdiff1d(np.concatenate(inner), times)
+        if not between.size:
+            return Waveform(times, known), after
+        piece = np.searchsorted(start, between, side="right") - 1
+        since = between - start[piece]
+        value = line[piece] + slope[piece] * since
+        for sizes, lag in zip(decays, (fast, slow), strict=True):
+            value += sizes[piece] * _left(since, lag)
+        times = np.concatenate([times, between])
+        order = np.argsort(times)
+        return Waveform(times[order], np.concatenate([known, value])[order]), after
+
+    def _decays(
+        self,
+        before: tuple[float, float],
+        begun: tuple[FloatArray, FloatArray],
+        straight: tuple[FloatArray, FloatArray],
+        left: tuple[FloatArray, FloatArray],
+        settled: float,
+    ) -> tuple[tuple[FloatArray, FloatArray], FloatArray, tuple[float, float]]:
+        """What decays in each straight piece: each begins where the last one ended.
+
+        Args:
+            before: current and field just before the first piece, A.
+            begun: where the straight lines of current and field begin, A.
+            straight: where they end, A.
+            left: what of the decays of either lag is left at the end of each.
+            settled: decays smaller than this at the end of a piece are over, A.
+
+        Returns:
+            Sizes at each begin of the decays by either lag, in the field, A; the
+            field at each end, A; and both of them after the last.
+        """
+        fast, slow = self._apart()
+        apart = fast / (fast - slow) if slow > 0 else 1.0
+        y, z = before
+        sizes, ends = [], []
+        columns = (one.tolist() for one in (*begun, *straight, *left))
+        for y_from, z_from, y_to, z_to, of_fast, of_slow in zip(*columns, strict=True):
+            one = y - y_from if fast > 0 else 0.0
+            quick = one * apart
+            two = z - z_from - quick if slow > 0 else 0.0
+            sizes.append((quick, two))
+            y, z = y_to + one * of_fast, z_to + (quick * of_fast + two * of_slow)
+            if abs(quick * of_fast) < settled and abs(two * of_slow) < settled:
+                y, z = y_to, z_to  # 0 A is no field
+            ends.append(z)
+        first, second = np.array(sizes).reshape(-1, 2).T
+        return (first, second), np.array(ends), (y, z)
 
     def led(self, wave: Waveform, fine: float) -> Waveform:
         """What the source must be set to that the field follows `wave`, A.
@@ -130,36 +165,32 @@ class Lag:
         return self.coil, self.eddy
 
 
-def _values(
-    pieces: list[tuple[float, float, float, float, float]],
-    time: FloatArray,
-    lags: tuple[float, float],
-) -> FloatArray:
-    """Line and decays of the piece that each time lies in."""
-    start, line, slope, one, two = np.array(pieces).T
-    at = np.searchsorted(start, time, side="right") - 1
-    since = time - start[at]
-    value: FloatArray = line[at] + slope[at] * since
-    for size, lag in zip((one, two), lags, strict=True):
-        if lag > 0:
-            value += size[at] * np.exp(-since / lag)
-    return value
-
-
-def _left(since: float, lag: float) -> float:
+def _left(since: FloatArray, lag: float) -> FloatArray:
     """What `since` s leave of a lag's decay."""
-    return math.exp(-since / lag) if lag > 0 else 0.0
+    return np.exp(-since / lag) if lag > 0 else np.zeros(since.size)
 
 
-def _bends(size: float, lag: float, lasts: float) -> FloatArray:
-    """Times at which chords stay within 1 of ``size exp(-t/lag)``, up to `lasts` s.
+def _bends(
+    start: FloatArray, end: FloatArray, size: FloatArray, lag: float
+) -> FloatArray:
+    """Times at which chords stay within 1 of each ``size exp(-t/lag)`` above 1.
 
     A chord of length l is off by l^2 |f''|/8: the times lie evenly in exp(-t/2 lag).
+
+    Args:
+        start: of the decays, s.
+        end: of each, s.
+        size: of each.
+        lag: s.
     """
-    end = min(lasts, lag * math.log(4 * size))
-    covered = -math.expm1(-end / (2 * lag))
-    count = math.ceil(2 * math.sqrt(size / 8) * covered)
-    part = np.arange(1, count + 1) / max(count, 1) * covered
+    bent = size > 1
+    start, end, size = start[bent], end[bent], size[bent]
+    bends = np.minimum(end - start, lag * np.log(4 * size))
+    covered = -np.expm1(-bends / (2 * lag))
+    counts = np.ceil(2 * np.sqrt(size / 8) * covered).astype(int)
+    nth = np.arange(1, counts.sum() + 1) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = nth * np.repeat(covered / np.maximum(counts, 1), counts)
+    times = np.repeat(start, counts) - 2 * lag * np.log1p(-part)
     # what is left then would be stretched over the rest of a long piece
-    gone = min(lasts, lag * math.log(1e4 * size))
-    return np.append(-2 * lag * np.log1p(-part), gone)
+    gone = np.minimum(end, start + lag * np.log(1e4 * size))
+    return np.concatenate([times, gone])
