@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 from drivers.coil import guard_process
+from drivers.serial_line.link import GAP_MARGIN
 from drivers.serial_line.port import port_settings
 from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.guard_log import default_log
@@ -186,16 +187,22 @@ def guard_settings(
     lines = [*row.stop_lines, row.set_line(0.0), *row.off]
     # somebody may have put the source under its front panel's control
     again = [*row.optional, *lines]
+    said = [line + end for line in (wire.preamble, *lines)]
+    rest = 0.0
+    if wire.min_gap:  # a port takes a line at once and sends it character by character
+        longest = max(map(len, (*said, row.identify))) * wire.character_time
+        rest = wire.min_gap + GAP_MARGIN + longest
     return {
         "owner": os.getpid(),
         "silence": SILENCE,
         "ports": ports,
         "node": guard_process.node(ports[0]),
         "settings": port_settings(ports[0], wire),
-        "ask_name": wire.preamble + end + row.identify + end,
+        "ask_name": [line + end for line in (wire.preamble, row.identify)],
         "identity": identity,
-        "send": wire.preamble + end + end.join(lines) + end,
-        "again": wire.preamble + end + end.join(again) + end,
+        "send": said,
+        "again": [line + end for line in (wire.preamble, *again)],
+        "rest": rest,
         "query": row.on_query + end,
         "reply_end": wire.reply_end,
         "off_match": row.off_match,

@@ -146,6 +146,14 @@ def send_on(port: serial.SerialBase) -> None:
         switch(True)
 
 
+def send(port: serial.SerialBase, told: dict[str, Any], lines: list[str]) -> None:
+    """Send lines, with the rest before each without which the source hears none."""
+    for line in lines:
+        if told["rest"]:
+            time.sleep(told["rest"])
+        port.write(line.encode("ascii"))
+
+
 def switch_off(
     told: dict[str, Any], ports: list[serial.SerialBase], log: GuardLog
 ) -> str | None:
@@ -170,11 +178,11 @@ def switch_off(
                 with port:
                     send_on(port)
                     if told["identity"] is not None and node(name) != told["node"]:
-                        port.write(told["ask_name"].encode("ascii"))
+                        send(port, told, told["ask_name"])
                         wanted = re.escape(told["identity"])
                         _heard(port, told, f"^{wanted}$", "another instrument")
-                    port.write(told[lines].encode("ascii"))
-                    port.write(told["query"].encode("ascii"))
+                    send(port, told, told[lines])
+                    send(port, told, [told["query"]])
                     text = _heard(port, told, told["off_match"], "not verified off")
                     log.write(f"output verified off ({text!r}) at {name}")
                     return str(name)

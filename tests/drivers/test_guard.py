@@ -9,7 +9,8 @@ import time
 import pytest
 from patient import patient
 
-from drivers.coil.guard import SILENCE, Guard
+from drivers.coil import guard_process
+from drivers.coil.guard import SILENCE, Guard, guard_settings
 from drivers.coil.source import CoilSource
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
@@ -174,6 +175,24 @@ def test_off_though_a_person_took_the_source_to_its_front_panel(
     wait_until_off(source)
     assert source.setpoint == 0.0
     assert "output verified off" in log_of(tmp_path)
+
+
+def test_a_source_that_wants_a_rest_before_each_line_is_switched_off(
+    served, tmp_path, monkeypatch
+):
+    """It heard the first line of four and no question, for a minute."""
+    source, server = served
+    monkeypatch.setattr(guard_process, "PATIENCE", 20.0)
+    server.far_end.gap = 0.02
+    row = patient(coil_dialect("kepco-bop"), timeout=0.3, min_gap=0.1)
+    source.set_current(0.3)
+    source.switch(True)
+    log = tmp_path / "guard.log"
+    told = guard_settings((server.url,), None, row, row.serial, log)
+    ports = guard_process.prepared(told)
+    off_at = guard_process.switch_off(told, ports, guard_process.GuardLog(str(log)))
+    assert off_at == server.url, log.read_text()
+    assert not source.output_on and source.setpoint == 0.0
 
 
 STARVED = """
