@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
+from weakref import WeakSet
 
 Predicate = Callable[[], bool]
 
@@ -49,6 +50,10 @@ class Clock(Protocol):
     @contextmanager
     def taking_part(self, name: str) -> Iterator[None]:
         """Take part in this clock from the calling thread for the block's length."""
+        ...
+
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread that takes part; time does not pass before it does."""
         ...
 
 
@@ -87,6 +92,10 @@ class RealClock:
         """Real threads need no turn: time passes for all of them."""
         yield
 
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread."""
+        thread.start()
+
 
 @dataclass(eq=False)
 class _Participant:
@@ -116,6 +125,7 @@ class SimulatedClock:
     _running: _Participant | None = None
     _mine: threading.local = field(default_factory=threading.local)
     _outside: threading.Condition = field(init=False)
+    _joined: WeakSet[threading.Thread] = field(default_factory=WeakSet)
 
     def __post_init__(self) -> None:
         self._outside = threading.Condition(self._lock)
@@ -161,6 +171,8 @@ class SimulatedClock:
         with self._lock:
             self._participants.append(me)
             me.waiting, me.wake = True, self._now
+            self._joined.add(threading.current_thread())
+            self._outside.notify_all()
             if self._running is None:
                 self._pass_turn()
             me.turn.wait_for(lambda: me.runs)
@@ -172,6 +184,16 @@ class SimulatedClock:
                 self._participants.remove(me)
                 self._running = None
                 self._pass_turn()
+
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread that takes part, and return once it has joined.
+
+        On a busy computer it may come to that late: waiting for nobody yet, time would
+        jump past whatever it was started for.
+        """
+        thread.start()
+        with self._outside:
+            self._outside.wait_for(lambda: thread in self._joined)
 
     def _wait(self, wake: float | None, ready: Predicate | None) -> None:
         me: _Participant | None = getattr(self._mine, "participant", None)

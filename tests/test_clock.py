@@ -54,6 +54,21 @@ def test_simulated_threads_interleave_by_time_whatever_the_scheduler_does():
     assert all(log == logs[0] for log in logs)
 
 
+def test_time_waits_for_a_thread_that_is_slow_to_begin():
+    """It jumped past what the thread was started for, on a busy computer alone."""
+    clock, begun = SimulatedClock(), []
+
+    def late():
+        time.sleep(0.05)
+        with clock.taking_part("late"):
+            begun.append(clock.now())
+
+    with clock.taking_part("starter"):
+        clock.start(threading.Thread(target=late))
+        clock.sleep_until(5.0)
+    assert begun == [0.0]
+
+
 def test_simulated_hour_takes_no_hour():
     clock = SimulatedClock()
     begin = time.monotonic()

@@ -91,7 +91,7 @@ class ListPlayer:
         thread = threading.Thread(
             target=self._play, args=(self._round, begun), name="list", daemon=True
         )
-        thread.start()
+        self._clock.start(thread)
 
     def stop(self) -> bool:
         """End the list; whether one was chosen."""

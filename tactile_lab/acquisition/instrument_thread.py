@@ -46,7 +46,7 @@ class InstrumentThread(ABC):
 
     def start(self) -> None:
         """Start the thread; it opens its instrument at once."""
-        self._thread.start()
+        self.clock.start(self._thread)
 
     @property
     def settled(self) -> bool:
