@@ -74,6 +74,7 @@ class Outcome:
             where it left its channel's range.
         traces: decimated measured signals by name: shape (n, 2), s and SI unit.
         skipped: coil set-points that were skipped because they came too late.
+        source_late: whether the source's answers held them up, not this computer.
         codes: one code of the converter for each measured signal, SI; empty where it
             is not known, as in a plan.
         drift: change of the rest V_C1 since the first trial that looked at it, V, less
@@ -89,6 +90,7 @@ class Outcome:
     rest: dict[str, float] = field(default_factory=dict)
     traces: dict[str, FloatArray] = field(default_factory=dict)
     skipped: int = 0
+    source_late: bool = False
     codes: dict[str, float] = field(default_factory=dict)
     drift: float | None = None
 

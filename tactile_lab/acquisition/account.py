@@ -149,10 +149,14 @@ class Account:
             self.journal.outcome(outcome)
         self.emit(events.TrialEnded(outcome))
         if outcome.skipped:
+            why = (
+                "the source answered late. Check the link to it."
+                if outcome.source_late
+                else "this computer was busy. Relieve it."
+            )
             self.warn(
                 f"{outcome.trial.label}: {outcome.skipped} coil set-points came too "
-                "late and were skipped. The run holds what was applied. Relieve the "
-                "computer, or use a faster link to the source."
+                f"late and were skipped. The run holds what was applied. Why: {why}"
             )
 
     def pause(self, start: float, end: float) -> None:

@@ -109,6 +109,10 @@ class CoilThread(InstrumentThread):
         list: the list of this trial, playing or played, or None.
         generator: plays lists into the source's analogue input; None where it is not
             wired.
+        skipped: set-points that came so late that the next was due by what the source
+            promises, which is what a plan counts on, until now.
+        source_late: whether the source's answers held them up since `play`, more than
+            this computer.
     """
 
     def __init__(
@@ -122,7 +126,8 @@ class CoilThread(InstrumentThread):
         self.coil = coil
         self.off: OffReport | None = None
         self.switched_on = self.live = False
-        self.skipped = 0
+        self.skipped, self.source_late = 0, False
+        self._promised = coil.update_interval  # it is measured as it is opened
         self.last: Applied | None = None
         self.measured: float | None = None
         self._stop = stop
@@ -158,6 +163,7 @@ class CoilThread(InstrumentThread):
     def play(self, current: Waveform, until: float) -> None:
         """Play `current` (A against clock time, s) from now until `until` s."""
         self._waveform, self._until, self.list = current, until, None
+        self.source_late = False
         self._next = self.clock.now()
         self.clock.notify()
 
@@ -263,10 +269,11 @@ class CoilThread(InstrumentThread):
             self._note(Applied(now, heard, commanded, measured, ratio, answered=acted))
         elif now - last.time >= READ_BACK_EVERY and self._rests(waveform, now):
             self._note(self._read_back(now, last.setpoint))
-        interval = self.coil.update_interval
-        late = int((self.clock.now() - self._next) / interval)
-        self.skipped += max(0, late - 1)
-        self._next += interval * max(1, late)
+        interval, done, due = self.coil.update_interval, self.clock.now(), self._next
+        if (late := int((done - due) / max(interval, self._promised)) - 1) > 0:
+            self.skipped += late
+            self.source_late |= bool(done - now > now - due)
+        self._next += interval * max(1, int((done - due) / interval))
         arrived = self.last and abs(self.last.setpoint - setpoint) <= RESOLUTION
         if now >= self._until and arrived:
             self._waveform = None

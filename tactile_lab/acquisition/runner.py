@@ -222,6 +222,7 @@ class Runner:
             rest=rest,
             traces=self._live.traces(shown, ended),
             skipped=0 if coil is None else coil.skipped - skipped,
+            source_late=coil is not None and coil.source_late,
             codes=self._codes(),
             drift=drift,
         )

@@ -71,7 +71,8 @@ def drive_for(
         raise SceneError(f"bench {scene.bench.name} has no [coil].")
     wanted = wanted_current(trial, magnet, coil)
     asked = None if trial.current is not None else cut(trial.force, trial.length)
-    interval = update_interval or coil_capability(coil).update_interval
+    promised = coil_capability(coil).update_interval
+    interval = max(update_interval or promised, _finest(wanted, promised))
     steps = _set_points(wanted, asked, magnet, coil, before, interval)
     way, enough = scene.coil.way, scene.force_accuracy
     if asked is None or asked.peak == 0 or way == "set-points":
@@ -116,12 +117,7 @@ def _set_points(
     before: float,
     interval: float,
 ) -> Drive:
-    """Played by set-points, one each `interval` s.
-
-    Raises:
-        LimitError: there are too many of them.
-    """
-    _refuse_too_many(wanted, interval)
+    """Played by set-points, one each `interval` s."""
     played, warning = limited(wanted, coil.limits.slew, interval, before)
     played = cut(played, wanted.end)
     why = f"one each {show(interval, 's', 3)}"
@@ -139,19 +135,25 @@ def _set_points(
     return Drive(played, error=error, why=why, warning=warning)
 
 
-def _refuse_too_many(wanted: Waveform, interval: float) -> None:
+def _finest(wanted: Waveform, promised: float) -> float:
+    """Least time between two set-points, s: a link may be faster than it promises.
+
+    Raises:
+        LimitError: there are too many even at what it promises, s.
+    """
     changes = np.diff(wanted.value) != 0
     moving = float(np.diff(wanted.time)[changes].sum())
     for seconds, most, what in (
         (moving, MOST_MOVING, "changes its force"),
         (wanted.end, MOST_SET_POINTS, "lasts"),
     ):
-        if seconds > most * interval:
+        if seconds > most * promised:
             raise LimitError(
                 f"A trial {what} for {show(seconds, 's')}; at one set-point each "
-                f"{show(interval, 's', 3)}, {show(most * interval, 's', 2)} is the "
+                f"{show(promised, 's', 3)}, {show(most * promised, 's', 2)} is the "
                 "most. Ask for a shorter ramp, hold or rest, or for more trials."
             )
+    return max(moving / MOST_MOVING, wanted.end / MOST_SET_POINTS)
 
 
 def _lists(scene: Scene) -> ListCapability:

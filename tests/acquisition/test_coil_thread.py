@@ -86,6 +86,31 @@ def test_a_read_back_does_not_delay_a_ramp_that_comes(playing) -> None:
         played(thread, clock, BACK)
 
 
+@pytest.mark.parametrize(("held_up", "is_late"), [(0.03, False), (0.2, True)])
+def test_on_a_fast_link_nothing_is_late_that_the_plan_counts_on(
+    playing, monkeypatch, held_up: float, is_late: bool
+) -> None:
+    """By the hundred they were called too late, and a faster link was asked for."""
+    thread, clock = playing
+    coil = thread.coil
+    set_current, slow = coil.set_current, [held_up]
+
+    def held(current: float) -> float:
+        if slow:
+            clock.sleep_until(clock.now() + slow.pop())
+        return set_current(current)
+
+    monkeypatch.setattr(coil, "_interval", 4e-4)
+    monkeypatch.setattr(coil, "set_current", held)
+    before = thread.skipped
+    thread.play(RAMP.shifted(clock.now()), clock.now() + 0.25)
+    clock.wait_for(lambda: False, clock.now() + 0.6)
+    assert thread.skipped - before <= 5  # by its own intervals it were hundreds
+    assert (thread.skipped > before) is thread.source_late is is_late
+    monkeypatch.undo()
+    played(thread, clock, BACK)
+
+
 @pytest.mark.parametrize("dialect", ["kepco-bop", "keithley-2420", "aim-tti-pl"])
 def test_a_step_is_dated_when_the_source_took_it(
     dialect: str, monkeypatch: pytest.MonkeyPatch

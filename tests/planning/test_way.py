@@ -1,12 +1,15 @@
 """By which way the coil plays a force, why, and how far the force errs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benches import generator_bench
 
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.lag import Lag
 from tactile_lab.planning.plan import plan, text
+from tactile_lab.planning.way import drive_for
 from tactile_lab.planning.ways import ways_used
 from tactile_lab.scene.load import load
 from tactile_lab.waveform import Waveform
@@ -60,6 +63,21 @@ def test_a_way_that_cannot_be_gone_is_refused_with_its_reason(tmp_path):
     )
     with pytest.raises(SceneError, match="plays none"):
         plan(load(str(scene)))
+
+
+def test_a_run_on_a_link_faster_than_promised_takes_what_its_plan_allowed():
+    """At a set-point each 0.4 ms a sine of 250 s ended the run: too many of them."""
+    asked = "protocol.lowest=0.02 Hz", "protocol.count=1", "protocol.cycles=5"
+    scene = load("sine_sweep", (*asked, "protocol.highest=0.02 Hz"))
+    trial = next(
+        step.trial
+        for step in plan(scene, preview=False).timeline.steps
+        if step.trial.length > 200
+    )
+    drive = drive_for(trial, scene, 0.0, update_interval=4e-4)
+    assert drive.way == "set-points" and drive.error < 1e-3
+    with pytest.raises(LimitError, match="changes its force for"):
+        drive_for(replace(trial, force=Waveform.pulse(0.1, ramp=3e4, hold=1)), scene, 0)
 
 
 def test_where_no_way_is_near_enough_the_nearest_is_taken_and_said():

@@ -67,6 +67,7 @@ def test_set_points_that_came_too_late_are_told_and_stored(tmp_path: Path) -> No
         assert stored.trials["skipped"].sum() > 0
     log = (done.folder / "log.jsonl").read_text(encoding="utf-8")
     assert "coil set-points came too late and were skipped" in log
+    assert "the source answered late" in log and "computer" not in log
 
 
 @pytest.mark.parametrize(
