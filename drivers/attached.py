@@ -100,7 +100,12 @@ def try_out(
 ) -> dict[str, str]:
     """Open the instrument at `address` as a run would, read its settings, close it.
 
-    No current is set and no output switched on. The bytes go to `transcript`.
+    No output is switched on; the set-point of one that is off goes to 10 mA or 10 mV
+    and back. The bytes go to `transcript`.
+
+    Returns:
+        Settings and readings by name, and as `not_tried` what of the row only a run
+        will show to be right.
 
     Raises:
         SceneError: no such row, or the transcript cannot be written.
@@ -128,8 +133,8 @@ def try_out(
     try:
         device.open()
         found = device.settings()
-        if isinstance(device, CoilSource):
-            device.rehearse()
+        if isinstance(device, CoilSource | SourceMeter):
+            found["not_tried"] = ", ".join(device.rehearse())
         elif isinstance(device, Teslameter):
             found["field_T"] = f"{device.read().value:.6g}"
         elif isinstance(device, Thermometer):

@@ -36,6 +36,9 @@ STEADY = 0.2
 SAME_RANGE = 0.1
 """Part of a range by which its name may differ from what it reaches: 2 V from 2.1 V."""
 
+REHEARSED = 0.01
+"""Set-point that shows, with the output off, whether a row's lines are right, V."""
+
 DEVIATING_READINGS = 3
 """Readings in a row that must differ before it counts."""
 
@@ -117,6 +120,23 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
         """
         with self._met():
             return self.identity
+
+    def rehearse(self) -> list[str]:
+        """Say what a run says beyond `open`: is a row understood?
+
+        With the output off, the set-point goes to `REHEARSED` and back. One that is on
+        holds a sensor's voltage: it is measured, and not touched.
+
+        Returns:
+            What of the row could not be tried.
+
+        Raises:
+            InstrumentError: a line is refused, or a question not answered.
+        """
+        if not self._on:
+            return self._wire.rehearse(REHEARSED)
+        self._wire.measured()
+        return [self.dialect.set, *self.dialect.on]
 
     def step_to(self, volts: float) -> bool:
         """Step towards `volts`, V, as far as slew allows; whether it is there.

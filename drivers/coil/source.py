@@ -19,6 +19,9 @@ from tactile_lab.errors import InstrumentError, InterlockError, LimitError, Unsa
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
 
+REHEARSED = 0.01
+"""Set-point that shows, with the output off, whether a row's lines are right, A."""
+
 
 class CoilSource(SerialInstrument[CoilWire]):
     """A current source behind a serial port.
@@ -170,15 +173,24 @@ class CoilSource(SerialInstrument[CoilWire]):
             self.safe_off()
             raise
 
-    def rehearse(self) -> None:
+    def rehearse(self) -> list[str]:
         """Say what a run says beyond `open`, with the output off: is a row understood?
+
+        The set-point goes to `REHEARSED` and back.
+
+        Returns:
+            What of the row can be tried with the output on alone.
 
         Raises:
             InstrumentError: a line is refused, or a question not answered.
         """
+        row = self.dialect
         self._prepare()
-        if self.dialect.measures_when_off:
+        if row.measures_when_off:
             self._wire.voltage()
+        untried = self._wire.rehearse(REHEARSED)
+        modes = {"[list]": row.list, "[analogue]": row.analogue}
+        return untried + [name for name, mode in modes.items() if mode is not None]
 
     def set_current(self, current: float) -> float:
         """Step towards `current`, A, as far as slew allows; what was commanded, A.

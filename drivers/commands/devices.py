@@ -46,7 +46,7 @@ def command(
     """List serial ports, scopes and what answers there.
 
     USB serial adapters are asked for the instrument's name with the harmless *IDN?.
-    Nothing is set and no output is switched on.
+    No output is switched on, and nothing set but by --dialect.
     """
     from drivers.attached import attached
 

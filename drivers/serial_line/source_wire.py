@@ -6,7 +6,7 @@ import re
 from typing import TypeVar
 
 from drivers.serial_line.conversation import Conversation
-from tactile_lab.errors import BadReplyError, RefusedError
+from tactile_lab.errors import BadReplyError, NoReplyError, RefusedError
 from tactile_lab.instruments.serial_dialect import SourceDialect
 
 S = TypeVar("S", bound=SourceDialect)
@@ -16,6 +16,9 @@ RECONNECT = 1.0
 
 VERIFICATIONS = 3
 """Times the state to leave it in is commanded and read back before giving up."""
+
+NOT_UNDERSTOOD = r"^\s*-1\d\d\b"
+"""SCPI's errors of a line that an instrument does not know or cannot read."""
 
 
 class SourceWire(Conversation[S]):
@@ -88,5 +91,53 @@ class SourceWire(Conversation[S]):
         if abs(found - wanted) > within:
             raise RefusedError(
                 f"The source reports a {what} of {found:g} after being set to "
-                f"{wanted:g}; the output stays off. Check its own limits."
+                f"{wanted:g}; the output stays off. Check its own limits, and the "
+                f'lines of its dialect "{self.dialect.id}".'
             )
+
+    def rehearse(self, small: float) -> list[str]:
+        """Try with the output off what a run says with it on: is a row understood?
+
+        Args:
+            small: set-point that is set, read back and taken back to 0, A or V.
+
+        Returns:
+            Lines that can be tried with the output on alone.
+
+        Raises:
+            RefusedError: a line is not understood, or another set-point read back.
+            BadReplyError: what is measured is no number.
+        """
+        row = self.dialect
+        for value in (small, 0.0):
+            self.command(row.set_line(value))
+            self.confirm("set-point", row.set_query, value, small / 2)
+        untried = [*row.on]
+        for line, pattern in (
+            (row.measure_voltage, row.voltage_match),
+            (row.measure_current, row.current_match),
+        ):
+            if self._tells(line):
+                self.number(line, pattern)
+            elif line not in untried:
+                untried.append(line)
+        return untried
+
+    def _tells(self, line: str) -> bool:
+        """Whether it answers what it measures while its output is off.
+
+        Raises:
+            RefusedError: it does not know the question.
+        """
+        try:
+            self.link.query(line)
+            return True
+        except (NoReplyError, BadReplyError):
+            self.link.resynchronise()
+            for error in self._empty_errors(self.link.query):
+                if re.search(NOT_UNDERSTOOD, error):
+                    raise RefusedError(
+                        f"The {self.dialect.role} does not understand {line!r} of its "
+                        f'dialect "{self.dialect.id}": {error}.'
+                    ) from None
+            return False

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -221,6 +221,8 @@ class SourceDialect(SerialDialect):
         join: text that joins a line and the error query into one; "": two lines.
     """
 
+    sets: ClassVar[Literal["i", "v"]]
+    """What its set-point is, as `set` has it; the other is its compliance."""
     digits: int = Field(default=5, ge=2, le=8)
     limit: str
     limit_query: str
@@ -247,6 +249,14 @@ class SourceDialect(SerialDialect):
         """A set-point as the wire carries it; never a negative zero."""
         return round(value, self.digits) + 0.0
 
+    def set_line(self, value: float) -> str:
+        """Line that sets A or V; never an exponent, never a negative zero."""
+        return self.set.format(**{self.sets: self.fixed(value)})
+
+    def limit_line(self, value: float) -> str:
+        """Line that sets the compliance, V or A."""
+        return self.limit.format(**{"v" if self.sets == "i" else "i": value})
+
     def _try_lines(self, lines: Iterable[str], where: str) -> None:
         """Refuse lines that are longer than a line may be."""
         for line in (part for one in lines for part in self.verified(one)):
@@ -271,6 +281,7 @@ class CoilDialect(SourceDialect):
     """
 
     role: Literal["coil"]
+    sets: ClassVar[Literal["i", "v"]] = "i"
     polarity: Literal["both", "positive"]
     current: Current
     voltage: Voltage
@@ -331,18 +342,10 @@ class CoilDialect(SourceDialect):
                     f'{name} = "{most:g} {unit}" or less.'
                 )
 
-    def set_line(self, current: float) -> str:
-        """Line that sets `current` (A); never an exponent, never a negative zero."""
-        return self.set.format(i=self.fixed(current))
-
     @property
     def stop_lines(self) -> tuple[str, ...]:
         """Lines that end a list that may be playing; () without list mode."""
         return () if self.list is None else self.list.stop
-
-    def limit_line(self, voltage: float) -> str:
-        """Line that sets the compliance `voltage` (V)."""
-        return self.limit.format(v=voltage)
 
     def promised_interval(self, baud: int | None = None) -> float:
         """Update interval to plan with, s: wire time, gap and latency with margin."""

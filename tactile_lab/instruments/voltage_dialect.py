@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -40,6 +40,7 @@ class VoltageDialect(SourceDialect):
     """
 
     role: Literal["voltage source"]
+    sets: ClassVar[Literal["i", "v"]] = "v"
     current: Current
     ranges: Annotated[tuple[VoltageRange, ...], BeforeValidator(frozen)] = Field(
         min_length=1
@@ -64,14 +65,6 @@ class VoltageDialect(SourceDialect):
                 f"Dialect {where}: a template cannot be filled in ({reason!r}); set "
                 "and range take {v} for the voltage, limit takes {i} for the current."
             ) from reason
-
-    def set_line(self, volts: float) -> str:
-        """Line that sets `volts`, V; never an exponent, never a negative zero."""
-        return self.set.format(v=self.fixed(volts))
-
-    def limit_line(self, current: float) -> str:
-        """Line that sets the compliance `current`, A."""
-        return self.limit.format(i=current)
 
     def range_lines(self, volts: float) -> tuple[str, ...]:
         """Lines that choose the range that reaches `volts`, V."""

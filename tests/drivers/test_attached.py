@@ -50,13 +50,16 @@ def test_a_stranger_gets_the_plain_row_only():
     assert fits == ("keithley-2400", "keithley-2400-voltage")
 
 
-def test_trying_out_sets_nothing_and_writes_every_byte(served, tmp_path):
+def test_trying_out_switches_nothing_on_and_writes_every_byte(served, tmp_path):
     path = tmp_path / "talk.txt"
     settings = try_out(served["coil"], "kepco-bop", transcript=path)
     assert settings["output"] == "off" and settings["setpoint_A"] == "0"
+    assert settings["not_tried"] == "OUTP 1, [list], [analogue]"
     sent = [one.data for one in read_transcript(path) if one.sent]
     assert not any(b"OUTP 1" in data for data in sent)
-    assert {data for data in sent if data.startswith(b"CURR ")} == {
+    sets = [data for data in sent if data.startswith(b"CURR ")]
+    assert sets.count(b"CURR 0.01000;:SYST:ERR?\n") == 1
+    assert set(sets[sets.index(b"CURR 0.01000;:SYST:ERR?\n") + 1 :]) == {
         b"CURR 0.00000;:SYST:ERR?\n"
     }
 
@@ -94,30 +97,49 @@ def test_a_port_that_is_gone_tells_those_there_are(monkeypatch):
     assert "(there now: /dev/ttyUSB1)" in problem
 
 
+@pytest.fixture
+def keithleys():
+    bench = ServedBench(coil="tcp:0", voltage_source="tcp:0", coil_row="keithley-2400")
+    bench.start()
+    yield bench.addresses
+    bench.close()
+
+
+KEITHLEY, GATE = ("coil", "keithley-2400"), ("voltage_source", "keithley-2400-voltage")
+KEPCO, METER = ("coil", "kepco-bop"), ("field_meter", "lakeshore-425")
+
+
 @pytest.mark.parametrize(
-    ("role", "line"),
+    ("row", "line"),
     [
-        ("coil", 'set = "CURX {i:.5f}"'),
-        ("coil", 'limit = "VOLX {v:.3f}"'),
-        ("coil", 'measure_voltage = "MEAS:VOLX?"'),
-        ("teslameter", 'field = "RDGFIELX?"'),
+        (KEPCO, 'set = "CURX {i:.5f}"'),
+        (KEPCO, 'set = "VOLT {i:.5f}"'),  # it is taken, and sets something else
+        (KEPCO, 'limit = "VOLX {v:.3f}"'),
+        (KEPCO, 'measure_voltage = "MEAS:VOLX?"'),
+        (METER, 'field = "RDGFIELX?"'),
+        (KEITHLEY, 'measure_current = ":REAX?"'),  # it may refuse the right one, too
+        (KEITHLEY, 'set = ":SENS:VOLT:PROT {i:.5f}"'),
+        (GATE, 'measure_voltage = ":REAX?"'),
+        (GATE, 'set = ":SENS:CURR:PROT {v:.5f}"'),
     ],
+    ids=lambda value: value if isinstance(value, str) else value[1],
 )
-def test_a_row_with_a_wrong_line_is_found_out(served, tmp_path, role, line):
+def test_a_row_with_a_wrong_line_is_found_out(request, tmp_path, row, line):
     """It passed, and the first run with it failed."""
-    folder, name = {
-        "coil": ("coil", "kepco-bop"),
-        "teslameter": ("field_meter", "lakeshore-425"),
-    }[role]
+    folder, name = row
+    is_keithley = row in (KEITHLEY, GATE)
+    ports = request.getfixturevalue("keithleys" if is_keithley else "served")
+    port = ports["teslameter" if row is METER else folder]
     shipped = resources.files("tactile_lab.instruments") / "rows" / folder
     text = (shipped / f"{name}.toml").read_text(encoding="utf-8")
     key = line.split(" ")[0]
     file = tmp_path / "mine.toml"
-    file.write_text(re.sub(rf"^{key} = .*$", line, text, flags=re.MULTILINE))
+    file.write_text(re.sub(rf"^{key} = .*$", lambda _: line, text, flags=re.MULTILINE))
     assert line in file.read_text()
-    try_out(served[role], name)
+    right = try_out(port, name)
+    assert (":READ?" in right.get("not_tried", "")) is is_keithley
     with pytest.raises(InstrumentError):
-        try_out(served[role], str(file))
+        try_out(port, str(file))
 
 
 def test_picosdk_is_asked_where_usb_cannot_be_looked_at(monkeypatch):
