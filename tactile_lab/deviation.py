@@ -7,6 +7,7 @@ what the bench leaves open, and the search for what explains a misfit as its sus
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Annotated, NamedTuple
 
 from tactile_lab.magnetics import Magnet
@@ -84,7 +85,13 @@ class Deviation(SceneTable):
         if self.lag:
             eddy = max(magnet.eddy_lag + self.lag, 0.0)
             magnet = replace(magnet, eddy_lag=eddy)
-        force = magnet.lagged_force(setpoint)[0]
+        force = _force(magnet, setpoint)
         return DrivenCircuit(
             self.circuit(circuit), force.scaled(1 + self.force) if self.force else force
         )
+
+
+@lru_cache(maxsize=8)
+def _force(magnet: Magnet, setpoint: Waveform) -> Waveform:
+    """The force, N: most of what is tried of a sensor leaves it as it was."""
+    return magnet.lagged_force(setpoint)[0]
