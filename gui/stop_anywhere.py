@@ -8,7 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent
+from PySide6.QtGui import (
+    QDrag,
+    QDragEnterEvent,
+    QGuiApplication,
+    QKeyEvent,
+    QKeySequence,
+    QMouseEvent,
+)
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from gui.dialogs.closing import Closing
@@ -25,7 +32,8 @@ class StopAnywhere(QObject):
 
     - F12 is STOP.
     - Esc is STOP while anything drives the coil. In the question asked on closing it
-      keeps running. Else it closes what is open; where nothing is, it is STOP.
+      keeps running. Else it closes what is open, the uppermost first, or lets go of
+      what is dragged; where nothing is open, it is STOP.
     - A key that acts once acts once, however long it is held down.
     - A press on a button STOP acts, also where it would only close a menu.
     - No dialog is modal, whoever opens it: Qt keeps from a covered window every click,
@@ -54,9 +62,8 @@ class StopAnywhere(QObject):
         self.keys, self._once = HeldKeys(), once
         self._window, self._stops = window, stops
         self._closing, self._session = closing, session
-        application = QApplication.instance()
-        if application is not None:
-            application.installEventFilter(self)
+        self._drags = False
+        self._see_first()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Act, and keep the event from what is open; whether that was done."""
@@ -65,12 +72,23 @@ class StopAnywhere(QObject):
             watched.setWindowModality(Qt.WindowModality.NonModal)
             return False
         if isinstance(event, QKeyEvent):
-            return self._take_key(event)
-        if isinstance(event, QMouseEvent) and self._meant_for_stop(event):
-            return self._act("STOP in the window")
+            return self._take_key(watched, event)
+        if isinstance(event, QMouseEvent):
+            self._drags &= event.type() == QEvent.Type.MouseMove
+            if self._meant_for_stop(event):
+                return self._act("STOP in the window")
+        elif isinstance(event, QDragEnterEvent):
+            self._see_first()
         return False
 
-    def _take_key(self, event: QKeyEvent) -> bool:
+    def _see_first(self) -> None:
+        """Come before the filter with which Qt takes all keys while one drags."""
+        self._drags = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
+        application = QApplication.instance()
+        if application is not None:
+            application.installEventFilter(self)
+
+    def _take_key(self, watched: QObject, event: QKeyEvent) -> bool:
         held, stops = self.keys.is_held(event), event.key() in STOP_KEYS
         if held and (stops or _written(event) in self._once):
             event.accept()  # and so it is not asked for as a shortcut either
@@ -79,27 +97,34 @@ class StopAnywhere(QObject):
             return False
         if event.key() == Qt.Key.Key_F12:
             return self._act("STOP by F12")
-        return self._escape()
+        return self._escape(watched)
 
     def _act(self, reason: str) -> bool:
         self._session.stop(reason)
+        QDrag.cancel()
         while (menu := QApplication.activePopupWidget()) is not None and menu.close():
             pass
         return True
 
-    def _escape(self) -> bool:
+    def _escape(self, watched: QObject) -> bool:
         if self._closing.isVisible():
             self._closing.keep.click()
             return True
         if not self._session.busy:
-            cards = [c for c in self._window.findChildren(Overlay) if c.isVisible()]
-            if cards:
-                cards[-1].hide()
+            window = _window_of(watched)
+            mains = [stop.window() for stop in self._stops]
+            if self._drags or QApplication.activePopupWidget() or window not in mains:
+                return False  # Qt lets go of what is dragged, and closes what has keys
+            if left := self._open():
+                left[-1].close()
                 return True
-            main = any(stop.isActiveWindow() for stop in self._stops)
-            if not main or QApplication.activePopupWidget():
-                return False  # Qt closes it
         return self._act("STOP by Esc")
+
+    def _open(self) -> list[QWidget]:
+        """Cards and dialogs that need not have the keyboard, the uppermost last."""
+        cards = self._window.findChildren(Overlay)
+        beside = [w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog)]
+        return [one for one in (*cards, *beside) if one.isVisible()]
 
     def _meant_for_stop(self, event: QMouseEvent) -> bool:
         """Whether it presses STOP while a menu would take the press."""
@@ -114,3 +139,15 @@ class StopAnywhere(QObject):
 
 def _written(event: QKeyEvent) -> str:
     return QKeySequence(event.keyCombination()).toString()
+
+
+def _window_of(watched: QObject) -> QWidget | None:
+    """The window that a key is sent to: Qt sends it to that first, then to a widget.
+
+    The active window need not be it: Qt lets that be while a menu is open, and does
+    not make up for it after.
+    """
+    if isinstance(watched, QWidget):
+        return watched.window()
+    windows = QApplication.topLevelWidgets()
+    return next((one for one in windows if one.windowHandle() == watched), None)

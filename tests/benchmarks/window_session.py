@@ -53,6 +53,10 @@ LEFT_ALONE = (
 """Buttons that are pressed on purpose, lead out of the window, or move what is kept."""
 
 
+NOTHING = {"state": "", "buttons": {}, "open": [], "dialogs": [], "keyboard": ""}
+"""What is known before the program has told anything."""
+
+
 class LostError(Exception):
     """The session cannot go on."""
 
@@ -114,7 +118,7 @@ class Session:
     @property
     def now(self) -> dict:
         """What the program told last."""
-        return self.reports[-1] if self.reports else {"state": "", "buttons": {}}
+        return self.reports[-1] if self.reports else NOTHING
 
     def wait(self, done, longest: float, what: str) -> None:
         end = time.monotonic() + longest
@@ -122,8 +126,11 @@ class Session:
             if self.program.poll() is not None:
                 raise LostError(f"the program ended with {self.program.returncode}")
             if time.monotonic() > end:
+                here = self.now
+                left = ", ".join((*here["open"], *here["dialogs"])) or "nothing"
                 raise LostError(
-                    f"not {what} within {longest} s; it is {self.now['state']}"
+                    f"not {what} within {longest} s; it is {here['state']}; open: "
+                    f"{left}; keys: {here['keyboard']}"
                 )
             time.sleep(0.1)
 
@@ -209,6 +216,7 @@ class Session:
         """Have the form's run begin; its scene is opened anew where it is unusable.
 
         A computer too busy for the run's watchdogs ends it with a fault: again then.
+        So also where a dialog opens late that was asked for before.
         A click may come while the scene is still planned, and is lost on the button:
         one that is ready is clicked again.
         """
@@ -218,7 +226,8 @@ class Session:
             here = self.now
             if here["state"] == "ready" and here["at"] - pressed > PRESSED:
                 pressed = here["at"] if self.press("Run") else pressed
-            return here["output"] or here["state"] == "fault"
+            came_late = here["open"] or here["dialogs"]  # of the keys before
+            return here["output"] or here["state"] == "fault" or came_late
 
         for _ in range(TRIES):
             self.clear()

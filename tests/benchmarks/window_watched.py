@@ -17,7 +17,8 @@ import traceback
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QTimer, QtMsgType, qInstallMessageHandler
-from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu, QWidget
 
 from gui.app import application, begin, fit
 from gui.dialogs.overlay import Overlay
@@ -38,6 +39,7 @@ rest = "1 s"
 [record]
 sample_rate = "100 kS/s"
 """
+OPEN = Overlay, QMenu
 AMOUNTS = {"late": 1.0, "unplug": 2.0}
 """Of faults that have one, s."""
 
@@ -67,6 +69,13 @@ def listen_to_trouble() -> None:
 def number(far: wires.FarEnd) -> int:
     """The how many-th far end it is: they are numbered as they are plugged in."""
     return int(far.name.rpartition("-")[2])
+
+
+def named(one: QWidget | None) -> str:
+    """What a widget is, for who has to find out why it is open."""
+    if one is None:
+        return "none"
+    return " ".join((type(one).__name__, one.windowTitle() or one.accessibleName()))
 
 
 class Watched:
@@ -117,6 +126,18 @@ class Watched:
                 found.setdefault(name, [middle.x(), middle.y()])
         return found
 
+    def _keyboard(self) -> str:
+        """Which popup, window and widget take a key, as Qt and X have it."""
+        has = QGuiApplication.focusWindow()
+        return ", ".join(
+            (
+                f"popup {named(QApplication.activePopupWidget())}",
+                f"active {named(QApplication.activeWindow())}",
+                f"focus {named(QApplication.focusWidget())}",
+                f"X's {has.objectName() if has else None}",
+            )
+        )
+
     def _report(self) -> None:
         if self._count % 5 == 0:
             self._names = self._buttons()
@@ -137,8 +158,9 @@ class Watched:
                 "monitor": session.monitor.alive,
                 "output": any(far.instrument.output_on for far in coils),
                 "source": [far.name for far in coils],
-                "open": len(cards) + sum(isinstance(w, QMenu) for w in top),
-                "dialogs": sum(isinstance(w, QDialog) for w in top),
+                "open": [named(w) for w in (*cards, *top) if isinstance(w, OPEN)],
+                "dialogs": [named(w) for w in top if isinstance(w, QDialog)],
+                "keyboard": self._keyboard(),
                 "stop": [at.x(), at.y()],
                 "memory": int(pages) * 4096 / 1e6,
                 "buttons": self._names,

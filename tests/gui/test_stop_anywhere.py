@@ -1,7 +1,8 @@
 """STOP reaches the coil whatever Qt itself opens."""
 
 from PySide6.QtCore import QEvent, Qt, QTimer
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import (
     QMessageBox,
     QToolButton,
 )
+from shiboken6 import isValid
 
 from gui.dialogs.overlay import Overlay
 from gui.state import WindowState
@@ -66,6 +68,45 @@ def test_a_key_that_is_held_down_acts_once(lab) -> None:
     assert not any(card.isVisible() for card in window.findChildren(Overlay))
     off = [line for line in log.lines[before:] if line.source == "safety"]
     assert not off, "Esc closed the help; nothing was switched off"
+
+
+def test_esc_closes_the_dialog_that_got_the_keyboard_below_a_menu(lab) -> None:
+    """To Qt the main window stayed the active one: Esc was STOP, again and again."""
+    window, log = lab.window, lab.session.log
+    window.screen_.ask_scene()
+    (dialog,) = window.findChildren(QFileDialog)
+    lab.app.processEvents()
+    window.activateWindow()
+    lab.until(window.isActiveWindow)
+    window.actions_.show_menu()
+    menu = QApplication.activePopupWidget()
+    dialog.activateWindow()
+    lab.until(lambda: QGuiApplication.focusWindow() == dialog.windowHandle())
+    before = len(log.lines)
+    for shown in (menu, dialog):
+        QTest.keyClick(shown.windowHandle(), Qt.Key.Key_Escape)
+        assert not (isValid(shown) and shown.isVisible())
+    assert len(log.lines) == before, "nothing was switched off"
+
+
+def test_esc_closes_the_uppermost_first(lab) -> None:
+    """A dialog before the card that asked for it, whichever has the keyboard."""
+    window, log = lab.window, lab.session.log
+    window.actions_.show_preferences()
+    (card,) = (one for one in window.findChildren(Overlay) if one.isVisible())
+    before = len(log.lines)
+    for takes in (QFileDialog, type(window)):
+        window.screen_.ask_scene()
+        lab.app.processEvents()
+        (dialog,) = window.findChildren(QFileDialog)
+        keyboard = dialog if takes is QFileDialog else window
+        QTest.keyClick(keyboard.windowHandle(), Qt.Key.Key_Escape)
+        assert card.isVisible()
+        assert not (isValid(dialog) and dialog.isVisible())
+        lab.app.processEvents()
+    QTest.keyClick(window.windowHandle(), Qt.Key.Key_Escape)
+    assert not card.isVisible()
+    assert len(log.lines) == before, "nothing was switched off"
 
 
 def test_stop_acts_while_qt_waits_for_an_answer(lab) -> None:
