@@ -9,6 +9,7 @@ from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu
 
+from gui import bindings as _first  # noqa: F401  the first of all, as in gui.app
 from gui.lanes.box import LaneBox
 from gui.lanes.expected import Stretch
 from gui.lanes.lane import lanes_for
