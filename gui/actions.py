@@ -19,9 +19,10 @@ from PySide6.QtGui import (
     QKeySequence,
     QShortcut,
 )
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from gui.ask_file import ask_file
+from gui.banner import Banner
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.menu import Acts, GearMenu
@@ -34,7 +35,7 @@ from gui.stop_anywhere import StopAnywhere
 from gui.tab_order import enter_next, scroll
 from tactile_lab.errors import TactileLabError
 
-SCROLLING = ("PgUp", "PgDown")
+IN_CARDS = ("PgUp", "PgDown", "Return", "Enter")
 """Keys that act within an open card, too."""
 
 
@@ -86,6 +87,7 @@ class Actions(QObject):
         super().__init__(window)
         self.window, self.panels, self.screen = window, panels, screen
         self.runs, self.preferences = runs, preferences
+        self._grabbed = 1
         self.keys = self._all()
         self.bind(window)
         once = frozenset(
@@ -126,7 +128,7 @@ class Actions(QObject):
         pressed, covered = _written(event), self._card() is not None
         for key in self.keys:
             if key.single and pressed in key.keys:
-                if covered and pressed not in SCROLLING:
+                if covered and pressed not in IN_CARDS:
                     return False
                 if key.repeats or not self._is_held(event):
                     key.act()
@@ -151,8 +153,8 @@ class Actions(QObject):
             Shortcut(("A",), "Fit the whole run", view.show_all, single=True),
             Shortcut(("Z",), "Zoom to a box", tools.zoom.click, single=True),
             Shortcut(("C",), "Cursors", tools.cursors.click, single=True),
-            Shortcut(("1",), "Grab cursor A", lambda: tools.bring(0), single=True),
-            Shortcut(("2",), "Grab cursor B", lambda: tools.bring(1), single=True),
+            Shortcut(("1",), "Grab cursor A", lambda: self._grab(0), single=True),
+            Shortcut(("2",), "Grab cursor B", lambda: self._grab(1), single=True),
             Shortcut(("M",), "Model", tools.twin.click, single=True),
             Shortcut(("Shift+M",), "Residual", tools.residual.click, single=True),
             Shortcut(
@@ -192,6 +194,7 @@ class Actions(QObject):
                 single=True,
                 repeats=True,
             ),
+            Shortcut(("Ctrl+M",), "Monitor the sensor", tools.monitor.click),
             Shortcut(("Home",), "Start of the run", self._home, single=True),
             Shortcut(
                 ("End",), "End of the run", lambda: view.set_follow(True), single=True
@@ -218,6 +221,12 @@ class Actions(QObject):
                 "Redo in the form",
                 form.edits.redo,
                 repeats=True,
+            ),
+            Shortcut(
+                ("Return", "Enter"),
+                "Press the button that has the keyboard",
+                _press,
+                single=True,
             ),
             Shortcut(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
             Shortcut(
@@ -255,10 +264,10 @@ class Actions(QObject):
         ]
 
     def _enter(self, forward: bool) -> None:
-        """Give the keyboard to another panel: form, lanes, log, results, header."""
+        """Give the keyboard to a panel: fault, form, lanes, log, results, header."""
         card, panels, active = self._card(), self.panels, QApplication.activeWindow()
-        centre = panels.centre
-        parts = (panels.setup, centre.lanes, centre.record, panels.review)
+        centre, faults = panels.centre, self.window.findChildren(Banner)
+        parts = (*faults, panels.setup, centre.lanes, centre.record, panels.review)
         shown = (*(parts if card is None else (card,)), panels.header)
         enter_next([one for one in shown if one.window() is active], forward=forward)
 
@@ -275,11 +284,20 @@ class Actions(QObject):
         return next((card for card in reversed(cards) if card.isVisible()), None)
 
     def _nudge(self, way: int) -> None:
-        view = self.panels.centre.view
-        if view.cursors is not None:
-            view.move_cursor(1, view.cursors[1] + way * view.width / 400)
-        else:
+        """Move the cursor that was grabbed last, and stay with it; else the view."""
+        view, which = self.panels.centre.view, self._grabbed
+        if view.cursors is None:
             view.pan(way * view.width / 10)
+            return
+        to = view.cursors[which] + way * view.width / 400
+        view.move_cursor(which, to)
+        if not view.start <= to <= view.end:
+            view.show_span(to - view.width / 2, view.width)
+
+    def _grab(self, which: int) -> None:
+        """Bring cursor A (0) or B (1) to the middle; the arrows then move it."""
+        self._grabbed = which
+        self.panels.centre.tools.bring(which)
 
     def _home(self) -> None:
         view = self.panels.centre.view
@@ -290,6 +308,7 @@ class Actions(QObject):
         if panels.review.isHidden():
             self.fold_asked.emit(panels.review, False)
         panels.review.show_tab(number)
+        panels.review.focus_tab()
 
     def _search(self) -> None:
         self._tab(1)
@@ -400,6 +419,13 @@ def _ask_menu() -> None:
         at, why = focus.rect().center(), QContextMenuEvent.Reason.Keyboard
         asked = QContextMenuEvent(why, at, focus.mapToGlobal(at))
         QApplication.sendEvent(focus, asked)
+
+
+def _press() -> None:
+    """Press the button that has the keyboard, as Space does."""
+    focus = QApplication.focusWidget()
+    if isinstance(focus, QAbstractButton):
+        focus.click()
 
 
 def _written(event: QKeyEvent) -> str:

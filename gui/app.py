@@ -19,6 +19,7 @@ from gui.look.theme import Theme
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips
+from gui.within_reach import WithinReach
 from tactile_lab.engine.memory import map_large, share_heap
 from tactile_lab.engine.threads import start
 
@@ -40,6 +41,7 @@ def application(arguments: Sequence[str] = ()) -> QApplication:
     app.setFont(fonts.load())
     if not app.findChildren(ToolTips):
         ToolTips(app)
+        WithinReach(app)
     return app
 
 

@@ -91,7 +91,7 @@ class LanesWindow(QWidget):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes as one reads."""
-        return move_on([self], forward=forward)
+        return move_on([self], self, forward=forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take the single-key shortcuts."""

@@ -27,33 +27,35 @@ def in_reading_order(root: QWidget) -> list[QWidget]:
     return found
 
 
-def move_on(roots: Iterable[QWidget], *, forward: bool) -> bool:
-    """Give the keyboard to the next widget in `roots`, or the one before it."""
+def move_on(roots: Iterable[QWidget], rest: QWidget, *, forward: bool) -> bool:
+    """Give the keyboard to the next widget in `roots`, or the one before it.
+
+    Qt asks for that also where what has the keyboard is locked or hidden: then `rest`,
+    which is no button, gets it, for Space shall not press what comes next.
+    """
     order = [widget for root in roots for widget in in_reading_order(root)]
-    if not order:
-        return False
     now = QApplication.focusWidget()
-    if now in order:
-        following = order[(order.index(now) + (1 if forward else -1)) % len(order)]
-    else:
-        following = order[0 if forward else -1]
-    tab, back = Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason
-    following.setFocus(tab if forward else back)
-    _reveal(following)
-    return True
+    if now is not None and not (now.isEnabled() and now.isVisible()):
+        rest.setFocus()
+    elif now in order:
+        at = order.index(now) + (1 if forward else -1)
+        reach(order[at % len(order)], forward=forward)
+    elif order:
+        reach(order[0 if forward else -1], forward=forward)
+    return bool(order)
 
 
 def enter_next(panels: Sequence[QWidget], *, forward: bool) -> None:
     """Give the keyboard to the first widget of the panel after that which has it."""
-    orders = [in_reading_order(panel) for panel in panels if panel.isVisible()]
-    orders = [order for order in orders if order]
+    found = [(panel, in_reading_order(panel)) for panel in panels if panel.isVisible()]
+    orders = [(panel, order) for panel, order in found if order]
     now = QApplication.focusWidget()
-    inside = [number for number, order in enumerate(orders) if now in order]
+    inside = [
+        n for n, (panel, _) in enumerate(orders) if now and panel.isAncestorOf(now)
+    ]
     if orders:
         at = inside[0] + (1 if forward else -1) if inside else 0 if forward else -1
-        following = orders[at % len(orders)][0]
-        following.setFocus(Qt.FocusReason.TabFocusReason)
-        _reveal(following)
+        reach(orders[at % len(orders)][1][0])
 
 
 def scroll(root: QWidget, way: int) -> None:
@@ -79,8 +81,10 @@ def _compared(one: QWidget, other: QWidget) -> int:
     return a.top() - b.top()
 
 
-def _reveal(widget: QWidget) -> None:
-    """Scroll to a widget."""
+def reach(widget: QWidget, *, forward: bool = True) -> None:
+    """Give a widget the keyboard, and scroll to it."""
+    tab, back = Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason
+    widget.setFocus(tab if forward else back)
     area = widget.parentWidget()
     while area is not None:
         if isinstance(area, QScrollArea):

@@ -104,7 +104,7 @@ class Window(QMainWindow):
 
     def render_state(self) -> None:
         """Render everything from the session's snapshot."""
-        snapshot, focus = self.session.snapshot(), QApplication.focusWidget()
+        snapshot = self.session.snapshot()
         self.header.render_snapshot(snapshot)
         named = dict.fromkeys((snapshot.title, snapshot.bench, "Tactile Lab"))
         self.setWindowTitle(" · ".join(name for name in named if name))
@@ -121,9 +121,6 @@ class Window(QMainWindow):
         watching = self.session.monitor.alive
         tools.monitor.setEnabled(watching or snapshot.state is WindowState.READY)
         self._render_tools()
-        if focus is not None and not (focus.isEnabled() and focus.isVisible()):
-            # what had it is locked or gone: Space shall not press what comes next
-            self.page.setFocus()
         self._render_closing(snapshot)
 
     def render_clock(self, snapshot: Snapshot) -> None:
@@ -260,8 +257,10 @@ class Window(QMainWindow):
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes as one reads; below an open card it reaches the header only."""
         cards = [one for one in self.findChildren(Overlay) if one.isVisible()]
-        roots = [self.header, cards[-1]] if cards else [self.page]
-        return move_on(roots, forward=forward)
+        if cards:
+            card = cards[-1].card
+            return move_on([card, self.header], card, forward=forward)
+        return move_on([self.page], self.page, forward=forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take the single-key shortcuts."""

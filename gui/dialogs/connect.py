@@ -243,6 +243,10 @@ class Connect(Overlay):
         page.show_progress(text, busy=busy)
         for other in (self.wiring.check, self.calibration.field):
             other.setEnabled(not busy)
+        if not busy and self.card.hasFocus():  # as locking the button left it
+            (
+                self.wiring.check if page is self.wiring else self.calibration.field
+            ).setFocus()
 
     def _end(self, text: str) -> None:
         self._say_progress(text, busy=False)

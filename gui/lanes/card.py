@@ -49,6 +49,7 @@ class LaneAct(Enum):
 
     ABOVE, BELOW = "go to the lane above", "go to the lane below"
     UP, DOWN = "move the lane up", "move the lane down"
+    TALLER, SHORTER = "make the lane higher", "make the lane less high"
     CLOSER, FURTHER = "zoom into its values", "zoom out of its values"
     HIGHER, LOWER = "look at higher values", "look at lower values"
 
@@ -59,6 +60,8 @@ KEYS = {
     (HELD.NoModifier, Qt.Key.Key_Down): LaneAct.BELOW,
     (HELD.ShiftModifier, Qt.Key.Key_Up): LaneAct.UP,
     (HELD.ShiftModifier, Qt.Key.Key_Down): LaneAct.DOWN,
+    (HELD.AltModifier, Qt.Key.Key_Up): LaneAct.SHORTER,
+    (HELD.AltModifier, Qt.Key.Key_Down): LaneAct.TALLER,
     (HELD.ControlModifier, Qt.Key.Key_Up): LaneAct.CLOSER,
     (HELD.ControlModifier, Qt.Key.Key_Down): LaneAct.FURTHER,
     (HELD.NoModifier, Qt.Key.Key_PageUp): LaneAct.HIGHER,

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 STEPS = 40
 """Most steps that the menu offers to jump to."""
 
+STEP = 12.0
+"""By how much a key makes a lane higher, px."""
+
 
 class LaneStack(QFrame):
     """The lanes of one source: cards, and beside them their plots in one scene."""
@@ -224,6 +227,9 @@ class LaneStack(QFrame):
         box, shown = which.box, self.visible_rows()
         if act in (LaneAct.UP, LaneAct.DOWN):
             self._move_once(which, -1 if act is LaneAct.UP else 1)
+        elif act in (LaneAct.TALLER, LaneAct.SHORTER):
+            self._resize(which, STEP if act is LaneAct.TALLER else -STEP)
+            self.arranged.emit()
         elif act in (LaneAct.ABOVE, LaneAct.BELOW):
             at = shown.index(which) + (-1 if act is LaneAct.ABOVE else 1)
             if 0 <= at < len(shown):

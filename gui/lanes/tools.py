@@ -45,7 +45,9 @@ class Tools(QWidget):
             "residual", "Show measured less model (Shift+M)", "Residual"
         )
         self.monitor = self._toggle(
-            "eye", "Monitor: watch the sensor between runs, coil off", "Monitor"
+            "eye",
+            "Monitor: watch the sensor between runs, coil off (Ctrl+M)",
+            "Monitor",
         )
         self.lanes = IconButton(theme, "layers", "Choose lanes")
         self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
@@ -98,8 +100,6 @@ class Tools(QWidget):
             (self.residual, model and self._stack.row("residual") is not None),
         ):
             if button.isEnabled() is not possible:
-                if button.hasFocus():
-                    button.clearFocus()  # or Qt would give it to what comes next
                 button.setEnabled(possible)
 
     def bring(self, which: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QGridLayout, QSlider, QWidget
 
 from gui.look.theme import Theme
@@ -28,6 +29,14 @@ SIDES = (
 )
 
 
+class Slider(QSlider):
+    """A slider; the wheel scrolls what it stands in, never its value."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Leave the wheel to the page."""
+        event.ignore()
+
+
 class ManualView(QWidget):
     """Set a current, see what is read back, read the field, set the scope's inputs."""
 
@@ -44,7 +53,7 @@ class ManualView(QWidget):
         self._no_meter = "No bench."
         self.begin = push("Take the coil by hand …")
         self.current = line_edit("Coil current to set", text="0 mA")
-        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider = Slider(Qt.Orientation.Horizontal)
         self.slider.setRange(-100, 100)
         self.slider.setAccessibleName("Coil current to set, percent of the limit")
         self._scale = [label("", "small") for _ in range(3)]
@@ -66,7 +75,7 @@ class ManualView(QWidget):
         self.off.clicked.connect(self.off_asked)
         self.check.clicked.connect(self.checked)
         self.read.clicked.connect(self.field_asked)
-        self.slider.sliderMoved.connect(self._slid)
+        self.slider.actionTriggered.connect(self._slid)
 
     def show_bench(self, spec: BenchSpec | None) -> None:
         """Show limits and inputs of another bench."""
@@ -141,7 +150,9 @@ class ManualView(QWidget):
             force = show(round(coil.current * self._gain, 6), "N", 3)
             self.force.setText(f"read back · drives {force}")
 
-    def _slid(self, percent: int) -> None:
+    def _slid(self) -> None:
+        """Offer what the slider was moved to, by pointer or keys."""
+        percent = self.slider.sliderPosition()
         self.current.setText(show(self._limit * percent / 100, "A", 3))
         self.current.setModified(True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
@@ -84,3 +85,7 @@ class ReviewPanel(QFrame):
         """0 Results, 1 Runs, 2 Manual, 3 Spikes."""
         self._tabs.button(number).setChecked(True)
         self._pages.setCurrentIndex(number)
+
+    def focus_tab(self) -> None:
+        """Give the keyboard to the tab shown; `Tab` goes on into its page."""
+        self._tabs.button(self.tab).setFocus(Qt.FocusReason.ShortcutFocusReason)

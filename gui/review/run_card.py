@@ -34,13 +34,14 @@ class RunCard(QFrame):
     chosen = Signal(object)
     ticked = Signal()
     menu_asked = Signal(object, object)
+    stepped = Signal(int)
+    """The keyboard goes to the run below (1) or above (-1)."""
 
     def __init__(self, entry: RunSummary, theme: Theme) -> None:
         super().__init__()
         self.entry = entry
         self.thumbnail = ThumbnailView(theme)
         self.setProperty("role", "run")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setToolTip(
             "\n".join(
@@ -54,6 +55,7 @@ class RunCard(QFrame):
         self.tick = QCheckBox()
         self.tick.setAccessibleName(f"Compare {entry.name}")
         self.tick.setToolTip("Tick two or three runs to compare them")
+        self.tick.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # the card has a key for it
         self.tick.toggled.connect(self.ticked)
         self._mark = label("")
         self._mark.setFixedWidth(14)
@@ -87,6 +89,11 @@ class RunCard(QFrame):
         said = f"{self.entry.title}, {self.entry.status}, {day(self.entry.started)}"
         self.setAccessibleName(f"{said}, on screen" if shown else said)
 
+    def stop_tab(self, stops: bool) -> None:
+        """Whether `Tab` comes here: to one card of the list; arrows go on from it."""
+        policy = Qt.FocusPolicy.StrongFocus if stops else Qt.FocusPolicy.ClickFocus
+        self.setFocusPolicy(policy)
+
     def show_place(self, number: int | None) -> None:
         """Show marker and colour it would have in a comparison; None: it is not in."""
         runs = self._theme.tokens.runs
@@ -114,11 +121,13 @@ class RunCard(QFrame):
         self.menu_asked.emit(self.entry, event.globalPos())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Open with Enter, tick with Space."""
+        """Open with Enter, tick with Space, go on with up and down."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.opened.emit(self.entry)
         elif event.key() == Qt.Key.Key_Space:
             self.tick.toggle()
+        elif event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+            self.stepped.emit(1 if event.key() == Qt.Key.Key_Down else -1)
         else:
             super().keyPressEvent(event)
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtCore import QPoint, Qt, QTimer, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QMenu, QWidget
 
@@ -29,6 +29,7 @@ from gui.parts import (
 )
 from gui.review.run_card import RunCard
 from gui.review.thumbnails import Thumbnails
+from gui.tab_order import reach
 from tactile_lab.quantity import count
 from tactile_lab.store.summary import RunSummary
 
@@ -173,6 +174,9 @@ class RunsView(QWidget):
         chosen = list(FILTERS.values())[max(self.filter.chosen, 0)]
         key, largest_first = list(ORDERS.values())[max(self.order.currentIndex(), 0)]
         ticked = {card.entry.folder for card in self.cards if card.tick.isChecked()}
+        focused = next((c.entry.folder for c in self.cards if c.hasFocus()), None)
+        if focused is not None:
+            self.setFocus()  # or Qt would give the keyboard to, and choose, another run
         empty(self._rows)
         self.cards = []
         words = self.search.text()
@@ -187,6 +191,7 @@ class RunsView(QWidget):
             card.chosen.connect(self._choose)
             card.ticked.connect(self._buttons)
             card.menu_asked.connect(self._show_menu)
+            card.stepped.connect(partial(self._step, card))
             self.cards.append(card)
             self._rows.addWidget(card)
         self._ask_thumbnails()
@@ -200,6 +205,16 @@ class RunsView(QWidget):
         self._count.setText(count(len(fitting), "run"))
         on_screen = next((e for e in listed if e.folder == self._current), None)
         self._choose(self._chosen if self._chosen in listed else on_screen)
+        if focused is not None:
+            there = [card for card in self.cards if card.entry.folder == focused]
+            to = next(iter(there or self.cards), None) or self.search
+            QTimer.singleShot(0, to, to.setFocus)  # once it is on screen
+
+    def _step(self, card: RunCard, way: int) -> None:
+        """Give the keyboard to the run below (1) or above (-1)."""
+        at = self.cards.index(card) + way
+        if 0 <= at < len(self.cards):
+            reach(self.cards[at])
 
     def _nothing(self) -> QWidget:
         text = (
@@ -229,10 +244,11 @@ class RunsView(QWidget):
                 card.thumbnail.show_thumbnail(self.thumbnails.of(folder))
 
     def _choose(self, entry: RunSummary | None) -> None:
-        self._chosen = entry
+        self._chosen, first = entry, next(iter(self.cards), None)
         for card in self.cards:
             shown = card.entry.folder == self._current
             card.mark(chosen=card.entry == entry, shown=shown)
+            card.stop_tab(card.entry == entry or (entry is None and card is first))
         self._buttons()
 
     def _buttons(self) -> None:

@@ -150,3 +150,25 @@ def test_the_keyboard_stays_where_recover_was(runs: RunsView, qtbot) -> None:
     qtbot.waitUntil(runs.recover.hasFocus)
     runs.show_entries([*ENTRIES, summary("d", "Pulses", "recovered")])
     assert runs.open.hasFocus()
+
+
+def focused(runs: RunsView, qtbot, card: int) -> None:
+    runs.show()
+    runs.activateWindow()
+    runs.cards[card].setFocus()
+    qtbot.waitUntil(runs.cards[card].hasFocus)
+
+
+def test_arrows_go_from_run_to_run_and_tab_comes_to_one(runs: RunsView, qtbot) -> None:
+    stops = [card.focusPolicy() & Qt.FocusPolicy.TabFocus for card in runs.cards]
+    assert [bool(one) for one in stops] == [True, False, False], "none is chosen yet"
+    focused(runs, qtbot, 0)
+    QTest.keyClick(runs.cards[0], Qt.Key.Key_Down)
+    qtbot.waitUntil(runs.cards[1].hasFocus)
+    stops = [card.focusPolicy() & Qt.FocusPolicy.TabFocus for card in runs.cards]
+    assert [bool(one) for one in stops] == [False, True, False]
+    assert runs._chosen == runs.cards[1].entry
+    QTest.keyClick(runs.cards[1], Qt.Key.Key_Up)
+    qtbot.waitUntil(runs.cards[0].hasFocus)
+    QTest.keyClick(runs.cards[0], Qt.Key.Key_Up)
+    assert runs.cards[0].hasFocus()

@@ -1,0 +1,125 @@
+"""What is done at a bench by hand, done by keys alone."""
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from gui.dialogs.connect import Connect
+from gui.dialogs.preferring import PreferencesCard
+from gui.review.run_card import RunCard
+from gui.state import FaultNotice, WindowState
+
+KEY, HELD = Qt.Key, Qt.KeyboardModifier
+
+
+def press(lab, key: Qt.Key, held: HELD = HELD.NoModifier) -> QWidget:
+    """Press a key where the keyboard is; where the keyboard is after."""
+    QTest.keyClick(lab.app.focusWidget() or lab.window, key, held)
+    return lab.app.focusWidget()
+
+
+@pytest.fixture
+def window(lab):
+    lab.window.page.setFocus()
+    yield lab.window
+    lab.window.page.setFocus()
+    lab.window.review.show_tab(0)
+
+
+@pytest.mark.parametrize("key", [KEY.Key_Return, KEY.Key_Enter])
+def test_enter_presses_the_button_that_has_the_keyboard(lab, window, key) -> None:
+    window.actions_.show_preferences()
+    card = window.findChild(PreferencesCard)
+    assert press(lab, key) is card.folder and card.isVisible(), "that is a field"
+    card.close_button.setFocus()
+    press(lab, key)
+    assert not card.isVisible()
+
+
+def test_what_is_locked_leaves_the_keyboard_to_its_card(lab, window) -> None:
+    """It went on to a button: Space would have opened a file dialog."""
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    dialog.show_page(1)
+    dialog.wiring.check.setFocus()
+    dialog._running = dialog._wiring
+    dialog._say_progress("Preparing", busy=True)
+    assert lab.app.focusWidget() is dialog.card
+    dialog._end("")
+    assert lab.app.focusWidget() is dialog.wiring.check, "the check can be made again"
+    dialog.hide()
+
+
+def test_a_fault_is_reached_and_acknowledged(lab, window) -> None:
+    lab.session.status.fault = FaultNotice("The source is silent.", "Look at it.")
+    lab.session.status.enter(WindowState.FAULT)
+    assert press(lab, KEY.Key_F6) is window.banner.show_log
+    assert press(lab, KEY.Key_Tab) is window.banner.acknowledge
+    press(lab, KEY.Key_Return)
+    lab.until(lambda: lab.session.state is WindowState.READY)
+    assert lab.app.focusWidget() is window.page, "no button gets what is gone had"
+
+
+def test_a_tab_takes_the_keyboard(lab, window) -> None:
+    manual = window.review.manual
+    press(lab, KEY.Key_3, HELD.ControlModifier)
+    assert lab.app.focusWidget().accessibleName() == "Tab Manual"
+    for _ in range(3):  # beside the tabs are the run's folder and the help
+        focus = press(lab, KEY.Key_Tab)
+    assert focus is manual.begin
+
+
+def test_arrows_move_the_slider_of_the_coil(lab, window) -> None:
+    window.review.show_tab(2)
+    manual = window.review.manual
+    manual.begin.click()
+    lab.until(lambda: lab.session.manual.opened and manual.slider.isEnabled())
+    manual.slider.setFocus()
+    for _ in range(3):
+        press(lab, KEY.Key_Right)
+    window.render_state()
+    assert manual.current.text() == "60 mA" and manual.slider.value() == 3
+    lab.session.stop("test is over")
+    lab.until(lambda: not lab.session.manual.alive)
+
+
+def test_a_list_read_anew_keeps_keyboard_and_choice(lab, window) -> None:
+    """Another run was chosen, and Enter would have opened it."""
+    folders, runs = set(lab.runs(2)), window.review.runs
+    window.review.show_tab(1)
+    window.screen_.list_runs()
+    lab.until(lambda: folders <= {card.entry.folder for card in runs.cards})
+    runs.cards[1].setFocus()
+    chosen = runs.cards[1].entry
+    runs._show()
+    assert runs._chosen == chosen == runs.cards[1].entry
+    lab.until(lambda: isinstance(lab.app.focusWidget(), RunCard))
+
+
+def test_arrows_move_the_cursor_that_was_brought_last(lab, window) -> None:
+    view = window.centre.view
+    view.show_span(0.0, 1.0)
+    press(lab, KEY.Key_1)
+    _, b = view.cursors
+    assert view.cursors[0] == pytest.approx(0.5)
+    press(lab, KEY.Key_Right)
+    assert view.cursors == pytest.approx((0.5025, b))
+    press(lab, KEY.Key_2)
+    press(lab, KEY.Key_Left)
+    assert view.cursors == pytest.approx((0.5025, 0.4975))
+    view.show_span(0.6, 0.1)
+    press(lab, KEY.Key_Right)
+    assert view.start < view.cursors[1] < view.end, "what is moved is seen"
+    view.clear_cursors()
+
+
+def test_a_lane_is_made_higher(lab, window) -> None:
+    stack = window.centre.stack
+    upper, lower = stack.visible_rows()[:2]
+    before = stack.arrangement.weight(upper.lane), stack.arrangement.weight(lower.lane)
+    upper.card.setFocus()
+    press(lab, KEY.Key_Down, HELD.AltModifier)
+    weight = stack.arrangement.weight
+    assert weight(upper.lane) > before[0] and weight(lower.lane) < before[1]
+    stack.forget_arrangement()
