@@ -143,7 +143,7 @@ class SimulatedSensor:
             V_C2 = rest_V_C2(circuit, state.V_C1)
             if V_C2 >= circuit.fire_voltage:
                 V_C2 = circuit.reset_voltage
-            self._frontier = replace(state, V_C2=V_C2, resume=None, left_out=())
+            self._frontier = state._replace(V_C2=V_C2, resume=None, left_out=())
 
     def commanded(self, time: float) -> None:
         """A command takes effect at `time` s: what was solved beyond is void."""
@@ -218,7 +218,7 @@ class SimulatedSensor:
         end = state.time + min(max(calm, SHORTEST), LONGEST)
         circuit = self._next_circuit(state.time)
         if not state.left_out and state.V_C2 >= circuit.fire_voltage:
-            state = replace(state, V_C2=circuit.reset_voltage, resume=None)
+            state = state._replace(V_C2=circuit.reset_voltage, resume=None)
         if self._V_fire is not None or self._warmer is not None:
             end = min(end, state.time + LONGEST_NOISY)
         after, outputs = self._advance(circuit, state, end)

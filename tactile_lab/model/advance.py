@@ -6,12 +6,11 @@ import math
 import time as wall
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.equations import rest_point
+from tactile_lab.model.equations import rest
 from tactile_lab.model.need import Need, checked_tolerance
 from tactile_lab.model.solution import Solution
 from tactile_lab.model.solver import solve
@@ -50,20 +49,6 @@ class Outputs:
             ParameterError: the signal was not kept, or a time lies outside.
         """
         return self.solution.sample(signal, times)
-
-
-@lru_cache(maxsize=256)
-def rest(circuit: Circuit, *, time: float = 0.0, force: float = 0.0) -> State:
-    """The equilibrium under a constant `force` N, reached long ago, at `time` s.
-
-    Where the equilibrium lies above threshold, V_C2 starts at V_reset.
-    """
-    if not (math.isfinite(time) and math.isfinite(force)):
-        raise ParameterError(f"time {time} s and force {force} N must be finite.")
-    V_C1, V_C2 = rest_point(circuit)
-    if V_C2 >= circuit.fire_voltage:
-        V_C2 = circuit.reset_voltage
-    return State(time=time, force=force, V_P=0.0, V_C1=V_C1, V_C2=V_C2)
 
 
 def advance(

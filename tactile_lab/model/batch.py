@@ -156,18 +156,11 @@ def numbers_of(c: Any, direct: bool, par: FloatArray) -> float:
 
 
 @inner
-def begun(
-    V_P: float, y: float, v: float, node: FloatArray, S: FloatArray, counts: Any
-) -> None:
-    """Set the kernel's state to these voltages, V, before the first spike."""
-    node[:] = 0.0
-    node[kernel.Y] = y
-    node[kernel.V_P] = node[kernel.V_P_HIGHEST] = V_P
-    S[:] = 0.0
-    S[spiking.VOLTAGE], S[spiking.RESUME] = v, -1.0
-    S[spiking.LAST] = S[spiking.PREVIOUS] = -np.inf
-    S[spiking.SHORTEST] = np.inf
-    counts[:] = 0
+def begun(V_P: float, y: float, v: float, S: FloatArray) -> None:
+    """Set the kernel's memory to these voltages, V, before the first spike."""
+    S[:] = kernel.FRESH
+    S[kernel.Y], S[spiking.VOLTAGE] = y, v
+    S[kernel.V_P] = S[kernel.V_P_HIGHEST] = V_P
 
 
 @inner
@@ -182,9 +175,7 @@ def train(
     keep_times: bool,
     most: float,
     par: FloatArray,
-    node: FloatArray,
     S: FloatArray,
-    counts: Any,
 ) -> Any:
     """One record's spikes; `begin` holds V_P, V_C1, V_C2 or NaN for the equilibrium.
 
@@ -197,10 +188,10 @@ def train(
         y, v = rest_of_cascade(par)
         if v >= c.fire_voltage:
             v = c.reset_voltage
-    begun(V_P, y, v, node, S, counts)
-    status, _rows_0, _rows_1, _rows_2, spikes = kernel.run(
-        time, force, 0.0, force[0], until, k_F, par, node, S, counts,
-        tolerance, True, True, keep_times, False, False, most,
+    begun(V_P, y, v, S)
+    status, spikes, _rows = kernel.run(
+        time, force, 0.0, force[0], until, k_F, par, S, tolerance, True, True,
+        keep_times, False, False, most,
     )  # fmt: skip
     return status, spikes
 
@@ -224,13 +215,12 @@ def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
         first, last = np.full(n, np.nan), np.full(n, np.nan)
         times, size = np.empty(CHUNK if keep_times else 0), 0
         par = np.empty(ALL_PARAMETERS)
-        node, S = np.empty(6), np.empty(spiking.MEMORY)
-        counts = np.empty(kernel.COUNTS, np.int64)
+        S = np.empty(kernel.FRESH.size)
         for i in range(n):
             k_F = numbers_of(many[i], direct, par)
             status[i], spikes = train(
                 many[i], k_F, begin, time, force, until, tolerance, keep_times, most,
-                par, node, S, counts,
+                par, S,
             )  # fmt: skip
             if status[i] != kernel.DONE:
                 continue

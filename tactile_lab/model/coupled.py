@@ -26,6 +26,7 @@ from tactile_lab.model.integrator import (
 )
 from tactile_lab.model.kernel import (
     DONE,
+    ERRORS,
     EXPANSIONS,
     FAST,
     FORCE,
@@ -47,11 +48,13 @@ from tactile_lab.model.kernel import (
     STUCK,
     V_P,
     V_P_HIGHEST,
+    Y_ERROR,
     Y_LARGEST_ERROR,
     Y,
     largest_of,
     more_rows,
     points_between,
+    stored,
 )
 from tactile_lab.model.node_a import (
     DIVIDER,
@@ -85,6 +88,7 @@ from tactile_lab.model.spiking import (
     COUNT,
     DOUBT,
     EPS,
+    ERROR,
     LAST,
     RESUME,
     SEARCHES,
@@ -95,20 +99,30 @@ from tactile_lab.model.spiking import (
     grown,
 )
 from tactile_lab.model.tableau import ORDER
-from tactile_lab.model.taylor import MOST, ROWS, end_at, expanded, highest, to_chebyshev
+from tactile_lab.model.taylor import (
+    MOST,
+    ROWS,
+    end_at,
+    expanded,
+    fastest,
+    highest,
+    longest,
+    move,
+    to_chebyshev,
+)
 from tactile_lab.model.taylor import V as OF_V_C2
 from tactile_lab.model.taylor import Y as OF_V_C1
 from tactile_lab.model.transistor import (
     A_BY_1,
-    A_BY_2,
-    C2_BY_1,
     C2_BY_2,
     TO_A,
     TO_C2,
     reach,
 )
 
-FEW_UNITS = 4.0
+PATIENCE = 6
+"""After so many steps that stability kept short it is stiff."""
+FEW_UNITS = 20.0
 """A collocated step shorter than this, in units of the fastest rate, is not stiff."""
 
 
@@ -136,10 +150,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         until: float,
         k_F: float,
         par: FloatArray,
-        node: FloatArray,
-        E: FloatArray,
         S: FloatArray,
-        counts: Any,
         tolerance: float,
         keep_spikes: bool,
         keep_1: bool,
@@ -149,7 +160,8 @@ def _build(stamp: int) -> Callable[..., Any]:
         _ = stamp
         status = DONE
         time, force = points_between(wave_time, wave, start, force_before, until)
-        node[FORCE] = force[-1]
+        E = S[ERRORS:]
+        S[FORCE] = force[-1]
         if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
             status = STRONG
         seg_rows = np.empty((8, SEGMENT_ROW))
@@ -159,6 +171,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         W = np.empty(2 * ORDER)
         f = np.empty(6)
         g = np.empty(6)
+        m = np.empty(6)
         matrix = np.empty((2 * ORDER, 2 * ORDER))
         right = np.empty((2 * ORDER, COLUMNS))
         a = np.empty(ORDER + 1)
@@ -166,27 +179,27 @@ def _build(stamp: int) -> Callable[..., Any]:
         part = np.empty(ORDER + 1)
         d = np.empty(ORDER + 1)
         c = np.empty((ROWS, MOST + 2))
-        step = np.empty(STEP)
+        step = np.zeros(STEP)
         for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
-                node[V_P] += k_F * (force[k + 1] - force[k])
-                node[V_P_HIGHEST] = max(node[V_P_HIGHEST], node[V_P])
+                S[V_P] += k_F * (force[k + 1] - force[k])
+                S[V_P_HIGHEST] = max(S[V_P_HIGHEST], S[V_P])
                 continue
-            t, V0 = time[k], node[V_P]
+            t, V0 = time[k], S[V_P]
             p = k_F * (force[k + 1] - force[k]) / T
             V1 = V_P_at(T, V0, p, par[TAU])
-            counts[SEGMENTS] += 1
+            S[SEGMENTS] += 1.0
             if keep_1:
-                n = counts[ROWS_0]
+                n = int(S[ROWS_0])
                 seg_rows = more_rows(seg_rows, n)
                 seg_rows[n, 0], seg_rows[n, 1] = t, T
                 seg_rows[n, 2], seg_rows[n, 3] = V0, p
-                counts[ROWS_0] += 1
-            node[V_P] = V1
-            node[V_P_HIGHEST] = max(node[V_P_HIGHEST], V1)
+                S[ROWS_0] += 1.0
+            S[V_P] = V1
+            S[V_P_HIGHEST] = max(S[V_P_HIGHEST], V1)
             B0, B1 = B_at(V0, par), B_at(V1, par)
-            y, v = node[Y], S[VOLTAGE]
+            y, v = S[Y], S[VOLTAGE]
             y_a, y_b = equilibrium(B0, par), equilibrium(B1, par)
             # leakage of T1 alone can pull node A down, by less than I_T1s
             low = min(y, y_a, y_b, v) - 1e-3 * par[V_T]
@@ -203,7 +216,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             moving |= abs(f[TO_C2]) > -1e-14 * f[C2_BY_2] * high
             stiff = V1 == V0 and not moving
             h = T
-            tries = 0
+            tries = short = 0
             while s < T:
                 held = S[RESUME] >= 0.0
                 room = min(T - s, S[RESUME]) if held else T - s
@@ -213,14 +226,19 @@ def _build(stamp: int) -> Callable[..., Any]:
                     break
                 wanted = max(SHARE * tolerance, 6e-16 * max(abs(y), abs(v)))
                 flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
-                rate = -f[A_BY_1] - f[C2_BY_2] + abs(f[A_BY_2]) + abs(f[C2_BY_1])
+                rate = fastest(f)
+                unit = 1.0 / rate
                 degree = 0
+                stiff = stiff or short >= PATIENCE
                 if not stiff:
                     degree = expanded(
                         s, room, y, v, held, V0, p, rate, wanted, par, g, c, step
                     )
-                    counts[ITERATIONS] += 1
+                    S[ITERATIONS] += 1.0
                     h = step[LENGTH]
+                    short = (
+                        short + 1 if degree and step[UNITS] == longest(degree) else 0
+                    )
                 if degree == 0:
                     if 1.0001 * h >= room:
                         h = room
@@ -233,10 +251,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                     )  # fmt: skip
                     if done < 0:
                         h = step[LENGTH]
-                        counts[REJECTED] += 1
+                        S[REJECTED] += 1.0
                         continue
-                    counts[ITERATIONS] += done
-                    stiff = h * rate > FEW_UNITS
+                    S[ITERATIONS] += done
+                    stiff, short = h * rate > FEW_UNITS, 0
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, step[Y_END]))
                 floor_1 = 5e-16 * (max(abs(y), abs(step[Y_END])) + 12.0 * depth)
@@ -259,13 +277,15 @@ def _build(stamp: int) -> Callable[..., Any]:
                     step[STAYS_1] = max(step[STAYS_1], step[LEFT_1])
                     step[STAYS_2] = max(step[STAYS_2], step[LEFT_2])
                     if degree:
-                        end_at(c, degree, x, step)
+                        end_at(s, x, unit, held, V0, p, degree, par, c, g, step)
                     else:
                         end_inside(u, y, v, W, right, step)
-                counts[STEPS] += 1
-                counts[EXPANSIONS] += 1
-                node[Y_LARGEST_ERROR] = max(
-                    node[Y_LARGEST_ERROR],
+                if degree:
+                    move(s, x, unit, held, V0, p, degree, par, c, f, m, g, step)
+                S[STEPS] += 1.0
+                S[EXPANSIONS] += 1.0
+                S[Y_LARGEST_ERROR] = max(
+                    S[Y_LARGEST_ERROR],
                     math.sqrt(E[E_11]) + step[LEFT_1] + floor_1,
                 )
                 transform(
@@ -279,7 +299,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     stays_2 += abs(step[MOVED + 2]) * max(0.05 * step[LEFT_1], stays_1)
                 widen(E, stays_1, stays_2)
                 if keep_1:
-                    n = counts[ROWS_1]
+                    n = int(S[ROWS_1])
                     step_rows = more_rows(step_rows, n)
                     step_rows[n, 0], step_rows[n, 1], step_rows[n, 2] = t, s, h
                     if degree:
@@ -288,10 +308,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                         shortened(a, min(u, 1.0), part, d)
                     for i in range(ORDER + 1):
                         step_rows[n, 3 + i] = d[i]
-                    counts[ROWS_1] += 1
-                counts[PIECES] += 1
+                    S[ROWS_1] += 1.0
+                S[PIECES] += 1.0
                 if keep_2:
-                    n = counts[ROWS_2]
+                    n = int(S[ROWS_2])
                     piece_rows = more_rows(piece_rows, n)
                     piece_rows[n, 0], piece_rows[n, 1], piece_rows[n, 2] = t, s, h
                     piece_rows[n, 3] = ORDER
@@ -306,7 +326,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                         piece_rows[n, 6 + i] = d[i]
                     for i in range(ORDER + 1, MOST_TERMS + 1):
                         piece_rows[n, 6 + i] = 0.0
-                    counts[ROWS_2] += 1
+                    S[ROWS_2] += 1.0
                 y, v = step[Y_END], step[V_END]
                 h_next = h * step[GROWTH]
                 if not (abs(y) < np.inf and abs(v) < np.inf):
@@ -344,8 +364,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                         break
                     # the rest starts there, not where the step ended
                     y += f[TO_A] * late
-                    node[Y_LARGEST_ERROR] = max(
-                        node[Y_LARGEST_ERROR],
+                    S[Y_LARGEST_ERROR] = max(
+                        S[Y_LARGEST_ERROR],
                         math.sqrt(E[E_11]) + abs(f[TO_A] * late),
                     )
                     following = s + (carry + late)
@@ -353,7 +373,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     s = following
                     transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
                     S[RESUME], v = par[T_EPS], par[V_FIRE]
-                    last, tries, stiff = False, 0, False
+                    last, tries, short, stiff = False, 0, 0, False
                 if last:
                     s = T
                 h = h_next
@@ -361,11 +381,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                     v = restart(
                         B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f, g
                     )
-                    stiff = False
-            node[Y], S[VOLTAGE] = y, v
+                    short, stiff = 0, False
+            S[Y], S[VOLTAGE] = y, v
             if status != DONE:
                 break
-        return status, seg_rows, step_rows, piece_rows, spikes
+        S[Y_ERROR], S[ERROR] = math.sqrt(E[E_11]), math.sqrt(E[E_22])
+        return status, spikes, stored(seg_rows, step_rows, piece_rows, S)
 
     return run
 

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.errors import ParameterError
 from tactile_lab.model import derived
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.state import State
 
 
 def V_P(circuit: Circuit, V_P0: float, slope: float, time: float) -> float:
@@ -131,6 +133,20 @@ def rest_point(circuit: Circuit) -> tuple[float, float]:
 
     V_C1, V_C2 = rest_of_both(parameters(circuit))
     return float(V_C1), float(V_C2)
+
+
+@lru_cache(maxsize=256)
+def rest(circuit: Circuit, *, time: float = 0.0, force: float = 0.0) -> State:
+    """The equilibrium under a constant `force` N, reached long ago, at `time` s.
+
+    Where the equilibrium lies above threshold, V_C2 starts at V_reset.
+    """
+    if not (math.isfinite(time) and math.isfinite(force)):
+        raise ParameterError(f"time {time} s and force {force} N must be finite.")
+    V_C1, V_C2 = rest_point(circuit)
+    if V_C2 >= circuit.fire_voltage:
+        V_C2 = circuit.reset_voltage
+    return State(time=time, force=force, V_P=0.0, V_C1=V_C1, V_C2=V_C2)
 
 
 def fires_at_rest(circuit: Circuit) -> bool:

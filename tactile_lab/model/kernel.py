@@ -38,7 +38,11 @@ from tactile_lab.model.node_a import (
 from tactile_lab.model.spiking import (
     COUNT,
     EPS,
+    KNOWN,
+    LAST,
+    PREVIOUS,
     RESUME,
+    SHORTEST,
     TOO_FAST,
     VOLTAGE,
     grown,
@@ -51,8 +55,6 @@ from tactile_lab.model.truncation import carried, longer, missing, unseen
 
 SEGMENT_ROW, STEP_ROW, PIECE_ROW = 4, 3 + ORDER + 1, 6 + MOST_TERMS + 1
 """Columns of the dense stores: t T V0 p; t s h series; t s h degree V resume series."""
-STEPS, ITERATIONS, REJECTED, SEGMENTS, PIECES, EXPANSIONS = range(6)
-ROWS_0, ROWS_1, ROWS_2 = range(6, 9)
 DONE, STUCK, FAST, NOT_FINITE, STRONG = range(5)
 SHARE, SHARE_Q = 0.1, 0.5
 """Of the tolerance: what a step's series of V_C1, V, and of Q, V, may be wrong by."""
@@ -63,9 +65,17 @@ KNEE = 12.0
 """From so many V_T down exp(-V_C1/V_T) bends V_C1."""
 SHORTEST_SEGMENT = 1e-290
 """A segment shorter than this is a jump, s."""
-Y, Y_ERROR, Y_LARGEST_ERROR, V_P, V_P_HIGHEST, FORCE = range(6)
-COUNTS = 9
-"""Number of counters."""
+Y, Y_ERROR, Y_LARGEST_ERROR, V_P, V_P_HIGHEST, FORCE = range(KNOWN, KNOWN + 6)
+"""What the memory `S` holds beside the integrator and its spikes: V_C1, V_P, force."""
+STEPS, ITERATIONS, REJECTED, SEGMENTS, PIECES, EXPANSIONS = range(FORCE + 1, FORCE + 7)
+ROWS_0, ROWS_1, ROWS_2, ERRORS = range(EXPANSIONS + 1, EXPANSIONS + 5)
+"""Counters of work and of rows stored; from `ERRORS` on an `ellipse`, where V_C1 and
+V_C2 are solved together."""
+FRESH = np.zeros(ERRORS + 3)
+"""The memory before the first spike."""
+FRESH[RESUME] = -1.0
+FRESH[LAST] = FRESH[PREVIOUS] = -np.inf
+FRESH[SHORTEST] = np.inf
 
 
 @inner
@@ -78,6 +88,24 @@ def more_rows(rows: FloatArray, count: int) -> FloatArray:
         for j in range(rows.shape[1]):
             larger[i, j] = rows[i, j]
     return larger
+
+
+@inner
+def stored(
+    segments: FloatArray, steps: FloatArray, pieces: FloatArray, S: FloatArray
+) -> FloatArray:
+    """The rows that are filled, one store after the other: one array to hand out."""
+    size = int(S[ROWS_0]) * SEGMENT_ROW
+    size += int(S[ROWS_1]) * STEP_ROW + int(S[ROWS_2]) * PIECE_ROW
+    whole = np.empty(size)
+    at = 0
+    for rows, count in (
+        (segments, S[ROWS_0]), (steps, S[ROWS_1]), (pieces, S[ROWS_2])
+    ):  # fmt: skip
+        more = int(count) * rows.shape[1]
+        whole[at : at + more] = rows[: int(count)].ravel()
+        at += more
+    return whole
 
 
 @inner
@@ -141,9 +169,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         until: float,
         k_F: float,
         par: FloatArray,
-        node: FloatArray,
         S: FloatArray,
-        counts: Any,
         tolerance: float,
         node_a: bool,
         integrate: bool,
@@ -155,7 +181,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         _ = stamp
         status = DONE
         time, force = points_between(wave_time, wave, start, force_before, until)
-        node[FORCE] = force[-1]
+        S[FORCE] = force[-1]
         if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
             status = STRONG
         seg_rows = np.empty((8 if node_a else max(time.size, 1), SEGMENT_ROW))
@@ -173,34 +199,34 @@ def _build(stamp: int) -> Callable[..., Any]:
         P = np.empty(2 * MOST_TERMS + 2)
         fires = np.empty(4)
         piece_fires = np.empty(4)
-        B1 = B_at(node[V_P], par)
+        B1 = B_at(S[V_P], par)
         y_b = equilibrium(B1, par)
         for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
-                node[V_P] += k_F * (force[k + 1] - force[k])
-                node[V_P_HIGHEST] = max(node[V_P_HIGHEST], node[V_P])
-                B1 = B_at(node[V_P], par)
+                S[V_P] += k_F * (force[k + 1] - force[k])
+                S[V_P_HIGHEST] = max(S[V_P_HIGHEST], S[V_P])
+                B1 = B_at(S[V_P], par)
                 y_b = equilibrium(B1, par)
                 continue
             t = time[k]
-            V0 = node[V_P]
+            V0 = S[V_P]
             p = k_F * (force[k + 1] - force[k]) / T
             V1 = V_P_at(T, V0, p, par[TAU])
-            counts[SEGMENTS] += 1
-            n = counts[ROWS_0]
+            S[SEGMENTS] += 1.0
+            n = int(S[ROWS_0])
             seg_rows = more_rows(seg_rows, n)
             seg_rows[n, 0] = t
             seg_rows[n, 1] = T
             seg_rows[n, 2] = V0
             seg_rows[n, 3] = p
             if keep_1:
-                counts[ROWS_0] += 1
-            node[V_P] = V1
-            node[V_P_HIGHEST] = max(node[V_P_HIGHEST], V1)
+                S[ROWS_0] += 1.0
+            S[V_P] = V1
+            S[V_P_HIGHEST] = max(S[V_P_HIGHEST], V1)
             if not node_a:
                 continue
-            y = node[Y]
+            y = S[Y]
             B0, y_a = B1, y_b
             B1 = B_at(V1, par)
             y_b = equilibrium(B1, par)
@@ -237,9 +263,9 @@ def _build(stamp: int) -> Callable[..., Any]:
                 )
                 if done < 0:
                     h *= 0.2
-                    counts[REJECTED] += 1
+                    S[REJECTED] += 1.0
                     continue
-                counts[ITERATIONS] += done
+                S[ITERATIONS] += done
                 values[0] = y
                 for i in range(ORDER):
                     values[i + 1] = y + W[i]
@@ -263,27 +289,27 @@ def _build(stamp: int) -> Callable[..., Any]:
                     layer = max(layer, closing * par[V_T] / rise)
                 if left + layer > 3.0 * wanted:
                     h *= min(max(0.1, longer(a, biggest, wanted, 0.0)), 0.5)
-                    counts[REJECTED] += 1
+                    S[REJECTED] += 1.0
                     continue
-                counts[STEPS] += 1
-                error_in = node[Y_ERROR]
+                S[STEPS] += 1.0
+                error_in = S[Y_ERROR]
                 # B carries the rounding of its exponent: so does V_C1
                 depth = abs(par[DIVIDER] - min(y, values[ORDER]))
                 floor = EPS * (biggest + 12.0 * depth) + unsolved
                 error = error_in + left + layer + floor
-                node[Y_LARGEST_ERROR] = max(node[Y_LARGEST_ERROR], error)
-                node[Y_ERROR] = (
+                S[Y_LARGEST_ERROR] = max(S[Y_LARGEST_ERROR], error)
+                S[Y_ERROR] = (
                     error_in * math.exp(-par[LAMBDA] * h) + stays + layer + floor
                 )
                 if keep_1:
-                    step_rows = more_rows(step_rows, counts[ROWS_1])
-                    n = counts[ROWS_1]
+                    step_rows = more_rows(step_rows, int(S[ROWS_1]))
+                    n = int(S[ROWS_1])
                     step_rows[n, 0] = t
                     step_rows[n, 1] = s
                     step_rows[n, 2] = h
                     for i in range(ORDER + 1):
                         step_rows[n, 3 + i] = a[i]
-                    counts[ROWS_1] += 1
+                    S[ROWS_1] += 1.0
                 if integrate:
                     asked = False
                     u, width = 0.0, 1.0
@@ -303,7 +329,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                             part[i] = Q_at(part[i], par)
                             Q_low, Q_high = min(Q_low, part[i]), max(Q_high, part[i])
                         to_series(part, q)
-                        counts[EXPANSIONS] += 1
+                        S[EXPANSIONS] += 1.0
                         span = par[V_FIRE] - par[V_RESET]
                         largest_Q = max(abs(Q_low), abs(Q_high))
                         gain = Q_gain(Q_high, par)
@@ -326,7 +352,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                                 break
                             continue
                         degree = needed(q, P, degree, 1e-18 * largest_Q)
-                        counts[PIECES] += 1
+                        S[PIECES] += 1.0
                         size = left_q
                         for i in range(1, ORDER + 1):
                             size += abs(q[i])
@@ -356,8 +382,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                                 status = FAST
                                 break
                         if keep_2:
-                            piece_rows = more_rows(piece_rows, counts[ROWS_2])
-                            n = counts[ROWS_2]
+                            piece_rows = more_rows(piece_rows, int(S[ROWS_2]))
+                            n = int(S[ROWS_2])
                             piece_rows[n, 0] = t
                             piece_rows[n, 1] = s + u * h
                             piece_rows[n, 2] = piece
@@ -366,7 +392,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                             piece_rows[n, 5] = S[RESUME]
                             for i in range(degree + 1):
                                 piece_rows[n, 6 + i] = P[i]
-                            counts[ROWS_2] += 1
+                            S[ROWS_2] += 1.0
                         # what a series misses changes its sign at every node of its
                         # own, so C2 sums up no more than SWING of it over a step, and
                         # nothing over a whole one, as Radau's rule integrates twice its
@@ -400,16 +426,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if s < T:
                     growth = longer(a, biggest, wanted, rate * h)
                     h *= min(max(growth, 0.2), 30.0)
-            node[Y] = y
+            S[Y] = y
             if status != DONE:
                 break
-        return (
-            status,
-            seg_rows,
-            step_rows,
-            piece_rows,
-            spikes,
-        )
+        return status, spikes, stored(seg_rows, step_rows, piece_rows, S)
 
     return run
 

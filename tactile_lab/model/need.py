@@ -87,6 +87,12 @@ class Need:
         return asked or (self.coupled and self.node_a)
 
     @cached_property
+    def stale(self) -> tuple[str, ...]:
+        """Voltages that are not solved, and so not known at the end."""
+        solved = (("V_C1", self.node_a), ("V_C2", self.integrator))
+        return tuple(name for name, known in solved if not known)
+
+    @cached_property
     def node_a(self) -> bool:
         """Whether V_C1 must be solved."""
         return "V_C1" in self.signals

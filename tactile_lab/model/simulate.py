@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import time as wall
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit
+from tactile_lab.model.equations import rest
 from tactile_lab.model.need import Need, checked_tolerance
 from tactile_lab.model.state import Start, State
 from tactile_lab.waveform import Waveform
@@ -21,8 +23,7 @@ if TYPE_CHECKING:
     from tactile_lab.model.solution import Solution
 
 
-@dataclass(frozen=True)
-class ErrorEstimate:
+class ErrorEstimate(NamedTuple):
     """Largest estimated error over a result.
 
     Attributes:
@@ -34,9 +35,9 @@ class ErrorEstimate:
     V_C1: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Result:
-    """What `simulate` found.
+    """What `simulate` found. Nothing changes it; see `Solution` why it is not frozen.
 
     Attributes:
         duration: s.
@@ -115,9 +116,6 @@ def simulate(
         ParameterError: a bad option or waveform.
         SolverError: the model cannot answer to that tolerance.
     """
-    # compiled code, which only those who simulate load
-    from tactile_lab.model.solver import solve
-
     duration = force.end if until is None else until
     if not (math.isfinite(duration) and duration > 0):
         raise ParameterError(
@@ -133,7 +131,7 @@ def simulate(
     tolerance = checked_tolerance(tolerance)
     began = wall.perf_counter()
     first = state_at_start(circuit, float(force.value[0]), start)
-    solution = solve(circuit, first, force, duration, need, tolerance)
+    solution = _solve()(circuit, first, force, duration, need, tolerance)
     return Result(
         duration=duration,
         spike_times=solution.spike_times if "spikes" in need.signals else None,
@@ -142,14 +140,20 @@ def simulate(
     )
 
 
+@cache
+def _solve() -> Callable[..., Solution]:
+    """`solve`: compiled code, loaded by those who simulate, and looked for once."""
+    from tactile_lab.model.solver import solve
+
+    return solve
+
+
 def state_at_start(circuit: Circuit, force: float, start: Start | None) -> State:
     """The state at time 0: as `start` says, or at rest under `force` N.
 
     Raises:
         ParameterError: a voltage the circuit cannot start at.
     """
-    from tactile_lab.model.advance import rest
-
     if start is None:
         return rest(circuit, force=force)
     for name, low, high in (

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-from tactile_lab.model import kernel, sampling, spiking
+from tactile_lab.model import ellipse, kernel, sampling, spiking
 from tactile_lab.model.circuit import SUBTHRESHOLD_LIMIT, Circuit
 from tactile_lab.model.equations import I_C, I_DS, T1_currents, fires_at_rest
 from tactile_lab.model.need import STAGES, Need
@@ -61,19 +60,15 @@ class Solution:
     end: float
     spike_times: FloatArray
     parameters: FloatArray
-    segments: FloatArray
-    steps: FloatArray
-    pieces: FloatArray
-    counts: NDArray[np.int64]
-    node: FloatArray
+    rows: FloatArray
+    """The dense stores, one after the other; see `kernel.stored`."""
     memory: FloatArray
     """What the kernel counted and knows at the end; see `kernel` and `spiking`."""
-    errors_together: float
 
     @cached_property
     def after(self) -> State:
         """The state at the end, after any jump or reset there."""
-        S, node, before = self.memory.tolist(), self.node.tolist(), self.before
+        S, before = self.memory.tolist(), self.before
         resume = None
         V_C2 = S[spiking.VOLTAGE]
         if not self.need.integrator:
@@ -82,33 +77,26 @@ class Solution:
             V_C2 = self.circuit.fire_voltage
             resume = self.end + S[spiking.RESUME]
         last, previous = S[spiking.LAST], S[spiking.PREVIOUS]
-        left_out = tuple(
-            name
-            for name, solved in (
-                ("V_C1", self.need.node_a), ("V_C2", self.need.integrator)
-            )
-            if not solved
-        )  # fmt: skip
         return State(
             time=self.end,
-            force=node[kernel.FORCE],
-            V_P=node[kernel.V_P],
-            V_C1=node[kernel.Y],
+            force=S[kernel.FORCE],
+            V_P=S[kernel.V_P],
+            V_C1=S[kernel.Y],
             V_C2=V_C2,
             resume=resume,
             last_spike=last if last > -math.inf else None,
             previous_spike=previous if previous > -math.inf else None,
             spikes=before.spikes + int(S[spiking.COUNT]),
-            error_V_C1=node[kernel.Y_ERROR],
+            error_V_C1=S[kernel.Y_ERROR],
             error_V_C2=S[spiking.ERROR],
-            errors_together=self.errors_together,
-            left_out=left_out,
+            errors_together=S[kernel.ERRORS + ellipse.E_12],
+            left_out=self.need.stale,
         )
 
     @cached_property
     def stages(self) -> dict[str, int]:
         """Evaluations of each stage, 0 where left out."""
-        counts = self.counts
+        counts = self.memory
         return dict.fromkeys(STAGES, 0) | {
             "V_P": int(counts[kernel.SEGMENTS]),
             "V_C1": int(counts[kernel.STEPS] + counts[kernel.REJECTED]),
@@ -120,8 +108,8 @@ class Solution:
     @property
     def evaluations(self) -> int:
         """Evaluations of Eq. (16), of Eq. (17) or of both at once."""
-        of_16 = ORDER * int(self.counts[kernel.ITERATIONS])
-        return of_16 + (ORDER + 1) * int(self.counts[kernel.EXPANSIONS])
+        of_16 = ORDER * int(self.memory[kernel.ITERATIONS])
+        return of_16 + (ORDER + 1) * int(self.memory[kernel.EXPANSIONS])
 
     @property
     def error_spike_time(self) -> float:
@@ -131,7 +119,7 @@ class Solution:
     @property
     def error_V_C1(self) -> float:
         """Largest estimated error of V_C1, V."""
-        return float(self.node[kernel.Y_LARGEST_ERROR])
+        return float(self.memory[kernel.Y_LARGEST_ERROR])
 
     @property
     def statistics(self) -> Statistics | None:
@@ -153,7 +141,7 @@ class Solution:
     def warnings(self) -> tuple[str, ...]:
         """Where the model leaves what it describes well."""
         found = []
-        highest = self.node[kernel.V_P_HIGHEST] + self.circuit.V_GS
+        highest = self.memory[kernel.V_P_HIGHEST] + self.circuit.V_GS
         if self.need.node_a and highest > SUBTHRESHOLD_LIMIT:
             found.append(
                 f"V_GS + V_P exceeds {SUBTHRESHOLD_LIMIT} V, where the exponential law "
@@ -210,7 +198,7 @@ class Solution:
             return I_C(self.circuit, V_C1)
         kind = ("V_P", "V_C1", "V_C2").index(signal)
         last = getattr(self.after, signal)
-        rows = (self.segments, self.steps, self.pieces)[kind]
+        rows = self._stores[kind]
         if rows.shape[0] == 0:
             return np.full(t.size, last)
         starts = np.ascontiguousarray(
@@ -220,6 +208,20 @@ class Solution:
         sampling.sample(kind, t, starts, rows, self.spike_times, self.parameters, out)
         out[t == self.end] = last
         return out
+
+    @cached_property
+    def _stores(self) -> list[FloatArray]:
+        """Rows of segments, of steps and of pieces, as `kernel` has them."""
+        found, at = [], 0
+        for counter, width in (
+            (kernel.ROWS_0, kernel.SEGMENT_ROW),
+            (kernel.ROWS_1, kernel.STEP_ROW),
+            (kernel.ROWS_2, kernel.PIECE_ROW),
+        ):
+            end = at + int(self.memory[counter]) * width
+            found.append(self.rows[at:end].reshape(-1, width))
+            at = end
+        return found
 
     def _after_spikes(self, signal: str, t: FloatArray) -> FloatArray:
         earlier = (self.before.previous_spike, self.before.last_spike)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
@@ -38,54 +36,46 @@ def solve(
             "signals in every slice."
         )
     par = parameters(circuit)
-    node = np.array([state.V_C1, state.error_V_C1, 0.0, state.V_P, state.V_P, 0.0])
     S = _memory(state)
-    counts = np.zeros(kernel.COUNTS, dtype=np.int64)
-    slice_ = (state.time, state.force, until)
-    together = 0.0
     keep_spikes = "spikes" in need.signals
     if circuit.saturation and need.node_a:
-        from tactile_lab.model import coupled, ellipse
+        from tactile_lab.model import coupled
 
         most = MOST_COUPLED
-        E = np.array([state.error_V_C1**2, state.errors_together, state.error_V_C2**2])
-        status, segments, steps, pieces, spikes = coupled.run(
-            force.time, force.value, *slice_, circuit.k_F, par, node, E, S, counts,
-            tolerance, keep_spikes, need.dense, need.dense_V_C2, most,
+        status, spikes, rows = coupled.run(
+            force.time, force.value, state.time, state.force, until, circuit.k_F, par,
+            S, tolerance, keep_spikes, need.dense, need.dense_V_C2, most,
         )  # fmt: skip
-        node[kernel.Y_ERROR] = math.sqrt(E[ellipse.E_11])
-        S[spiking.ERROR] = math.sqrt(E[ellipse.E_22])
-        together = float(E[ellipse.E_12])
     else:
         most = MOST_SPIKES
-        status, segments, steps, pieces, spikes = kernel.run(
-            force.time, force.value, *slice_, circuit.k_F, par, node, S, counts,
-            tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
+        status, spikes, rows = kernel.run(
+            force.time, force.value, state.time, state.force, until, circuit.k_F, par,
+            S, tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
             need.dense_V_C2, most,
         )  # fmt: skip
     if status != kernel.DONE:
         length = until - state.time
         raise _refusal(status, circuit, force, length, float(S[spiking.COUNT]), most)
     count = int(S[spiking.COUNT]) if keep_spikes else 0
-    return Solution(
-        circuit, need, force, state, until, spikes[:count], par,
-        segments[: counts[kernel.ROWS_0]], steps[: counts[kernel.ROWS_1]],
-        pieces[: counts[kernel.ROWS_2]], counts, node, S, together,
-    )  # fmt: skip
+    return Solution(circuit, need, force, state, until, spikes[:count], par, rows, S)
 
 
 def _memory(state: State) -> FloatArray:
-    S = np.zeros(spiking.MEMORY)
+    """What the kernel knows at the start; see `spiking` and `kernel`."""
+    S = kernel.FRESH.copy()
     S[spiking.VOLTAGE] = state.V_C2
-    S[spiking.RESUME] = -1.0
+    S[kernel.Y] = state.V_C1
+    S[kernel.V_P] = S[kernel.V_P_HIGHEST] = state.V_P
     if state.resume is not None:
         S[spiking.VOLTAGE], S[spiking.RESUME] = 0.0, max(state.resume - state.time, 0.0)
-    S[spiking.ERROR] = state.error_V_C2
-    S[spiking.LAST] = -math.inf if state.last_spike is None else state.last_spike
-    S[spiking.PREVIOUS] = (
-        -math.inf if state.previous_spike is None else state.previous_spike
-    )
-    S[spiking.SHORTEST] = math.inf
+    if state.last_spike is not None:
+        S[spiking.LAST] = state.last_spike
+    if state.previous_spike is not None:
+        S[spiking.PREVIOUS] = state.previous_spike
+    errors = state.error_V_C1, state.error_V_C2
+    if any(errors):
+        S[kernel.Y_ERROR], S[spiking.ERROR] = errors
+        S[kernel.ERRORS :] = errors[0] ** 2, state.errors_together, errors[1] ** 2
     return S
 
 

@@ -29,7 +29,8 @@ until RESUME (negative: not held), with an estimated error."""
 COUNT, FIRST, LAST, PREVIOUS, SHORTEST, LONGEST = range(5, 11)
 LARGEST_ERROR, DOUBT, SATURATED, TOO_FAST, SEARCHES = range(11, 16)
 """Spike statistics, s; estimated error of spike times, s; flags."""
-MEMORY = 16
+KNOWN = 16
+"""How many numbers that is, at the head of the kernel's memory."""
 EPS = 2.3e-16
 SHORTEST_INTERVAL = 1e-9
 """Spikes closer than this, s, are refused: no circuit, and no end of them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tactile_lab.model.circuit import Volt
 from tactile_lab.table import SceneTable
@@ -17,8 +18,7 @@ class Start(SceneTable):
     V_C2: Volt
 
 
-@dataclass(frozen=True, kw_only=True)
-class State:
+class State(NamedTuple):
     """The circuit at one instant, after any jump or reset there; can be pickled.
 
     Attributes:

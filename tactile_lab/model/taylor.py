@@ -2,9 +2,9 @@
 
 All coefficients follow from the state by recursion, as every function in the equations
 solves a differential equation itself: x = exp(g) has x' = x g', and Wright's omega w of
-z has w' = z' w/(1 + w). With them come those of what either voltage at the start moves.
-Time is counted in units in which the fastest rate is 1, so that no coefficient leaves
-the range of numbers.
+z has w' = z' w/(1 + w). Time is counted in units of the fastest rate, so that no
+coefficient leaves the range of numbers. What either voltage at the start moves
+needs no such digits: it is Magnus's exponential of the Jacobian, of order 4.
 """
 
 from __future__ import annotations
@@ -30,6 +30,10 @@ from tactile_lab.model.pair import (
 )
 from tactile_lab.model.tableau import ORDER, POINTS
 from tactile_lab.model.transistor import (
+    A_BY_1,
+    A_BY_2,
+    C2_BY_1,
+    C2_BY_2,
     E_DROP,
     E_LOG,
     I_S1,
@@ -43,33 +47,72 @@ from tactile_lab.model.transistor import (
     TO_C2,
 )
 
-LEAST, MOST = 7, 22
+LEAST, MOST = 10, 30
 """Lowest and highest degree of a series."""
-MOST_UNITS = 6.0
-"""A step that accuracy lets be longer is stiff."""
 SAFETY = 2.0
-Y, V, TO_Y, TO_V, Y_BY_1, Y_BY_2, V_BY_1, V_BY_2 = range(8)
-"""Rows: V_C1 and V_C2, V; their slopes, V per unit; and how far a volt more of either
-at the start moves them."""
-G, B, Q, X, APART, Z, W, U, A11, A12, A21, A22 = range(8, 20)
-"""Rows: slope of V_P; B; exp(-V_C1/V_T) - 1; J/I_T1s; slope of V_C2 - V_C1; of z; omega
-or, with "direct", I_F + I_T1s; w/(1 + w); the Jacobian."""
-ROWS = 20
+Y, V, TO_Y, TO_V, G, B, Q, X, APART, Z, W, U = range(12)
+"""Rows: V_C1 and V_C2, V; their slopes, V per unit; slope of V_P; B;
+exp(-V_C1/V_T) - 1; J/I_T1s; slope of V_C2 - V_C1; of z; omega or, with "direct",
+I_F + I_T1s; w/(1 + w)."""
+ROWS = 12
+NOTHING = 1e-26
+"""A junction's exponential below this is left out: the rest of its series is, too."""
 
 
 @inner
-def product(a: FloatArray, b: FloatArray, n: int) -> float:
-    """Coefficient n of the product of two series."""
-    total = 0.0
-    for j in range(n + 1):
-        total += a[j] * b[n - j]
-    return float(total)
+def product(c: FloatArray, one: int, two: int, n: int) -> float:
+    """Coefficient n of the product of two rows of `c`: four sums, none waits."""
+    p = q = r = s = 0.0
+    j = 0
+    while j + 3 <= n:
+        p += c[one, j] * c[two, n - j]
+        q += c[one, j + 1] * c[two, n - j - 1]
+        r += c[one, j + 2] * c[two, n - j - 2]
+        s += c[one, j + 3] * c[two, n - j - 3]
+        j += 4
+    while j <= n:
+        p += c[one, j] * c[two, n - j]
+        j += 1
+    return (p + q) + (r + s)
 
 
 @inner
 def degree_for(wanted: float) -> int:
     """The degree that costs least where a step may miss by `wanted` V."""
-    return min(max(int(0.6 * math.log(3.0 / wanted)) + 2, LEAST), MOST)
+    return min(max(int(0.7 * math.log(3.0 / wanted)) + 8, LEAST), MOST)
+
+
+@inner
+def longest(degree: int) -> float:
+    """Units up to which a series of exp(-x) to that degree stays below 1/2."""
+    return 0.37 * degree + 1.0
+
+
+@inner
+def fastest(f: FloatArray) -> float:
+    """Magnitude of the largest eigenvalue of `flow`'s Jacobian, 1/s, at least."""
+    half = 0.5 * (f[A_BY_1] - f[C2_BY_2])
+    square = half * half + f[A_BY_2] * f[C2_BY_1]
+    rate: float = math.sqrt(abs(square)) - 0.5 * (f[A_BY_1] + f[C2_BY_2])
+    return rate
+
+
+@inner
+def expand_B(
+    V_P: float, p: float, unit: float, degree: int, par: FloatArray, c: FloatArray
+) -> int:
+    """Fill the rows G and B; returns the last coefficient of B that is not nothing."""
+    c[G, 0] = unit * (p - V_P / par[TAU])
+    c[B, 0] = B_at(V_P, par)
+    least = 1e-20 * c[B, 0]
+    for k in range(degree):
+        c[B, k + 1] = par[PER_VOLT] * product(c, G, B, k) / (k + 1)
+        c[G, k + 1] = -unit / par[TAU] * c[G, k] / (k + 1)
+        if max(abs(c[B, k]), abs(c[B, k + 1])) <= least:
+            for j in range(k, degree + 1):
+                c[B, j] = 0.0
+            return k
+    return degree
 
 
 @inner
@@ -78,83 +121,71 @@ def expand(
     degree: int, par: FloatArray, c: FloatArray,
 ) -> None:  # fmt: skip
     """Fill the rows of `c` at s after the segment's start, up to `degree`."""
-    V_P = V_P_at(s, V0, p, par[TAU])
+    few = expand_B(V_P_at(s, V0, p, par[TAU]), p, unit, degree, par, c)
     v_t, leak, direct = par[V_T], par[I_S1], par[DIRECT] != 0.0
     to_a, to_c2 = unit / par[T1_C1], unit / par[T1_C2]
-    a = 1.0 + par[PER_F]
+    per_t = 1.0 / v_t
     r = 1.0 + par[PER_R]
-    per_w = 1.0 if direct else v_t / (a * par[R_E])
+    per_w = 1.0 if direct else v_t / ((1.0 + par[PER_F]) * par[R_E])
     c[Y, 0], c[V, 0] = y, v
-    c[Y_BY_1, 0] = c[V_BY_2, 0] = 1.0
-    c[Y_BY_2, 0] = c[V_BY_1, 0] = 0.0
-    c[G, 0] = unit * (p - V_P / par[TAU])
-    c[B, 0] = B_at(V_P, par)
-    c[Q, 0] = math.expm1(-y / v_t)
-    c[X, 0] = math.expm1(((par[V_RESET] if held else v) - y) / v_t)
+    c[Q, 0] = math.expm1(-y * per_t)
+    c[X, 0] = math.expm1(((par[V_RESET] if held else v) - y) * per_t)
+    open_1, open_2 = 1.0 + c[Q, 0] > NOTHING, 1.0 + c[X, 0] > NOTHING
+    per_u = 0.0
     if direct:
-        c[W, 0] = leak * math.exp((par[V_S] - y) / v_t)
+        c[W, 0] = leak * math.exp((par[V_S] - y) * per_t)
     else:
-        z = (par[V_S] - y + par[R_E] * leak * c[X, 0] + par[E_DROP]) / v_t
+        z = (par[V_S] - y + par[R_E] * leak * c[X, 0] + par[E_DROP]) * per_t
         c[W, 0] = omega(z + par[E_LOG])
-        c[U, 0] = c[W, 0] / (1.0 + c[W, 0])
+        per_u = 1.0 / (1.0 + c[W, 0])
+        c[U, 0] = c[W, 0] * per_u
+    leak_1, to_z = unit * par[LAMBDA], par[R_E] * leak * per_t
+    leak_2 = unit / par[TAU_L]
     for k in range(degree):
-        first = 1.0 if k == 0 else 0.0
         per = 1.0 / (k + 1)
-        closing = product(c[B], c[Q], k)
-        I_F, J = per_w * c[W, k] - first * leak, leak * c[X, k]
-        to_y = unit * (par[LAMBDA] * (first * par[DIVIDER] - c[Y, k]) + closing)
+        I_F, J = per_w * c[W, k], leak * c[X, k]
+        closing = 0.0
+        if open_1:
+            for j in range(min(k, few) + 1):
+                closing += c[B, j] * c[Q, k - j]
+        else:
+            closing = -c[B, k]
+        to_y = unit * closing - leak_1 * c[Y, k]
+        if k == 0:
+            I_F -= leak
+            to_y += leak_1 * par[DIVIDER]
         to_y += to_a * (I_F * par[PER_F] + J * par[PER_R])
         to_v = 0.0
         if not held:
-            to_v = to_c2 * (I_F - J * r + first * par[T1_BIAS])
-            to_v -= unit * c[V, k] / par[TAU_L]
+            to_v = to_c2 * (I_F - J * r) - leak_2 * c[V, k]
+            if k == 0:
+                to_v += to_c2 * par[T1_BIAS]
         c[TO_Y, k], c[TO_V, k] = to_y, to_v
         c[Y, k + 1], c[V, k + 1] = per * to_y, per * to_v
-        J_v = leak / v_t * (c[X, k] + first)
-        F_v = 0.0
+        c[Q, k + 1] = c[X, k + 1] = 0.0
+        if open_1:
+            c[Q, k + 1] = -per * per_t * (product(c, TO_Y, Q, k) + to_y)
+        if open_2:
+            c[APART, k] = apart = -to_y if held else to_v - to_y
+            c[X, k + 1] = per * per_t * (product(c, APART, X, k) + apart)
         if direct:
-            F_y = -c[W, k] / v_t
-        else:
-            F_v = leak / (a * v_t) * (product(c[U], c[X], k) + c[U, k])
-            F_y = -c[U, k] / (a * par[R_E]) - F_v
-        c[A11, k] = -unit * (first * par[LAMBDA] + (closing + c[B, k]) / v_t)
-        c[A11, k] += to_a * (F_y * par[PER_F] - J_v * par[PER_R])
-        c[A12, k] = c[A21, k] = c[A22, k] = 0.0
-        if not held:
-            c[A12, k] = to_a * (F_v * par[PER_F] + J_v * par[PER_R])
-            c[A21, k] = to_c2 * (F_y + J_v * r)
-            c[A22, k] = to_c2 * (F_v - J_v * r) - first * unit / par[TAU_L]
-        for m in range(Y_BY_1, Y_BY_2 + 1):
-            moved_y, moved_v = c[m], c[m + 2]
-            moved_y[k + 1] = per * (
-                product(c[A11], moved_y, k) + product(c[A12], moved_v, k)
-            )
-            moved_v[k + 1] = per * (
-                product(c[A21], moved_y, k) + product(c[A22], moved_v, k)
-            )
-        c[B, k + 1] = per * par[PER_VOLT] * product(c[G], c[B], k)
-        c[G, k + 1] = -per * unit / par[TAU] * c[G, k]
-        c[Q, k + 1] = -per / v_t * (product(c[TO_Y], c[Q], k) + to_y)
-        apart = -to_y if held else to_v - to_y
-        c[APART, k] = apart
-        c[X, k + 1] = per / v_t * (product(c[APART], c[X], k) + apart)
-        if direct:
-            c[W, k + 1] = -per / v_t * product(c[TO_Y], c[W], k)
+            c[W, k + 1] = -per * per_t * product(c, TO_Y, W, k)
             continue
-        c[Z, k] = (par[R_E] * leak * (k + 1) * c[X, k + 1] - to_y) / v_t
-        c[W, k + 1] = w = per * product(c[Z], c[U], k)
+        c[Z, k] = to_z * (k + 1) * c[X, k + 1] - to_y * per_t
+        c[W, k + 1] = w = per * product(c, Z, U, k)
         c[U, k + 1] = 0.0
-        inside = product(c[W], c[U], k + 1)
-        c[U, k + 1] = (w - inside) / (1.0 + c[W, 0])
+        c[U, k + 1] = (w - product(c, W, U, k + 1)) * per_u
 
 
 @inner
-def value(row: FloatArray, degree: int, x: float) -> float:
-    """The series at x units."""
-    total = row[degree]
+def two_at(
+    c: FloatArray, one: int, two: int, degree: int, x: float
+) -> tuple[float, float]:
+    """Two of the series at x units."""
+    a, b = c[one, degree], c[two, degree]
     for k in range(degree - 1, -1, -1):
-        total = total * x + row[k]
-    return float(total)
+        a, b = a * x + c[one, k], b * x + c[two, k]
+    return float(a), float(b)
 
 
 @inner
@@ -181,51 +212,98 @@ def to_chebyshev(
     row: FloatArray, degree: int, x: float, part: FloatArray, a: FloatArray
 ) -> None:
     """The series from 0 to x units as one of Chebyshev's, its last digits kept."""
-    part[0] = 0.0
-    for i in range(1, ORDER + 1):
-        at = x * POINTS[i]
-        total = row[degree]
-        for k in range(degree - 1, 0, -1):
-            total = total * at + row[k]
-        part[i] = total * at
+    for i in range(ORDER + 1):
+        part[i] = row[degree]
+    for k in range(degree - 1, 0, -1):
+        for i in range(ORDER + 1):  # side by side: none waits for another
+            part[i] = part[i] * (x * POINTS[i]) + row[k]
+    for i in range(ORDER + 1):
+        part[i] *= x * POINTS[i]
     to_series(part, a)
     a[0] += row[0]
 
 
 @inner
-def end_at(c: FloatArray, degree: int, x: float, step: FloatArray) -> None:
-    """Let the step end after x units."""
-    step[Y_END], step[V_END] = value(c[Y], degree, x), value(c[V], degree, x)
-    for m in range(4):
-        step[MOVED + m] = value(c[Y_BY_1 + m], degree, x)
+def moved(
+    h: float, a: FloatArray, m: FloatArray, b: FloatArray, step: FloatArray
+) -> None:
+    """What a volt at the start moves at the end of h s: `flow` at start, middle, end.
+
+    Magnus's exponential of order 4: of Simpson's mean of the Jacobians less h^2/12
+    times the first one's commutator with the last.
+    """
+    k = h / 6.0
+    p = k * (a[A_BY_1] + 4.0 * m[A_BY_1] + b[A_BY_1])
+    q = k * (a[A_BY_2] + 4.0 * m[A_BY_2] + b[A_BY_2])
+    r = k * (a[C2_BY_1] + 4.0 * m[C2_BY_1] + b[C2_BY_1])
+    s = k * (a[C2_BY_2] + 4.0 * m[C2_BY_2] + b[C2_BY_2])
+    k = h * h / 12.0
+    turn = k * (a[A_BY_2] * b[C2_BY_1] - b[A_BY_2] * a[C2_BY_1])
+    apart_a, apart_b = a[A_BY_1] - a[C2_BY_2], b[A_BY_1] - b[C2_BY_2]
+    p, s = p - turn, s + turn
+    q -= k * (apart_a * b[A_BY_2] - apart_b * a[A_BY_2])
+    r += k * (apart_a * b[C2_BY_1] - apart_b * a[C2_BY_1])
+    mean, half = 0.5 * (p + s), 0.5 * (p - s)
+    square = half * half + q * r
+    root = math.sqrt(abs(square))
+    if root < 1e-3:
+        even, odd = 1.0 + 0.5 * square, 1.0 + square / 6.0
+    elif square > 0.0:
+        even, odd = math.cosh(root), math.sinh(root) / root
+    else:
+        even, odd = math.cos(root), math.sin(root) / root
+    scale = math.exp(mean)
+    step[MOVED], step[MOVED + 1] = scale * (even + odd * half), scale * odd * q
+    step[MOVED + 2], step[MOVED + 3] = scale * odd * r, scale * (even - odd * half)
+
+
+@inner
+def end_at(
+    s: float, x: float, unit: float, held: bool, V0: float, p: float, degree: int,
+    par: FloatArray, c: FloatArray, g: FloatArray, step: FloatArray,
+) -> None:  # fmt: skip
+    """Let the step end after x units; g becomes `flow` there."""
+    y, v = two_at(c, Y, V, degree, x)
+    step[Y_END], step[V_END] = y, v
+    flow(B_at(V_P_at(s + x * unit, V0, p, par[TAU]), par), y, v, held, par, g)
+
+
+@inner
+def move(
+    s: float, x: float, unit: float, held: bool, V0: float, p: float, degree: int,
+    par: FloatArray, c: FloatArray, f: FloatArray, m: FloatArray, g: FloatArray,
+    step: FloatArray,
+) -> None:  # fmt: skip
+    """Fill what a volt at the start moves after x units; f and g are `flow` there."""
+    y, v = two_at(c, Y, V, degree, 0.5 * x)
+    B_m = B_at(V_P_at(s + 0.5 * x * unit, V0, p, par[TAU]), par)
+    flow(B_m, y, v, held, par, m)
+    moved(x * unit, f, m, g, step)
 
 
 @inner
 def expanded(
     s: float, room: float, y: float, v: float, held: bool, V0: float, p: float,
-    rate: float, wanted: float, par: FloatArray, f: FloatArray, c: FloatArray,
+    rate: float, wanted: float, par: FloatArray, g: FloatArray, c: FloatArray,
     step: FloatArray,
 ) -> int:  # fmt: skip
     """A step from s of at most `room` s that misses `wanted` V; returns its degree.
 
     Its error is told by how far the series' slope at the end is from the equations'
-    there. Returns 0 where not accuracy but stability would keep it short.
+    there, which are left in `g`. Returns 0 where none is short enough.
     """
     degree = degree_for(wanted)
     unit = 1.0 / rate
     expand(s, y, v, held, V0, p, unit, degree, par, c)
     x = reached(c, degree, wanted)
     step[LENGTH] = (x if x > 0.1 else 0.1) * unit
-    if not x < MOST_UNITS:
-        return 0
-    x = min(x, room * rate)
+    x = min(x, longest(degree), room * rate)
     for _ in range(8):
-        end_at(c, degree, x, step)
-        B_end = B_at(V_P_at(s + x * unit, V0, p, par[TAU]), par)
-        flow(B_end, step[Y_END], step[V_END], held, par, f)
+        end_at(s, x, unit, held, V0, p, degree, par, c, g, step)
         share = SAFETY * x / (degree + 1)
-        left_1 = share * abs(unit * f[TO_A] - value(c[TO_Y], degree - 1, x))
-        left_2 = share * abs(unit * f[TO_C2] - value(c[TO_V], degree - 1, x))
+        to_y, to_v = two_at(c, TO_Y, TO_V, degree - 1, x)
+        left_1 = share * abs(unit * g[TO_A] - to_y)
+        left_2 = share * abs(unit * g[TO_C2] - to_v)
         if max(left_1, left_2) <= 3.0 * wanted:
             step[LENGTH] = x * unit if x < room * rate else room
             step[LEFT_1] = step[STAYS_1] = left_1

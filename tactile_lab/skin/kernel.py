@@ -73,18 +73,16 @@ def train_of_both(
     tolerance: float,
     most: float,
     par: FloatArray,
-    node: FloatArray,
     S: FloatArray,
-    counts: Any,
 ) -> Any:
     """As `batch.train` from the equilibrium, where T1 saturates."""
     y, v = rest_of_both(par)
     if v >= c.fire_voltage:
         v = c.reset_voltage
-    begun(0.0, y, v, node, S, counts)
-    status, _rows_0, _rows_1, _rows_2, spikes = coupled.run(
-        time, force, 0.0, force[0], until, k_F, par, node, np.zeros(3), S, counts,
-        tolerance, True, False, False, most,
+    begun(0.0, y, v, S)
+    status, spikes, _rows = coupled.run(
+        time, force, 0.0, force[0], until, k_F, par, S, tolerance, True, False, False,
+        most,
     )  # fmt: skip
     return status, spikes
 
@@ -112,8 +110,7 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
         spikes, size = np.empty(CHUNK), 0
         rest = np.full(3, np.nan)
         par = np.empty(ALL_PARAMETERS)
-        node, S = np.empty(6), np.empty(spiking.MEMORY)
-        counts = np.empty(kernel.COUNTS, np.int64)
+        S = np.empty(kernel.FRESH.size)
         for i in range(n):
             if role[i] == DEAD:
                 continue
@@ -139,13 +136,12 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
                 continue
             if saturates:
                 status, found = train_of_both(
-                    many[i], k_F, t, F, until, tolerance, most, par, node, S, counts
+                    many[i], k_F, t, F, until, tolerance, most, par, S
                 )
             else:
                 status, found = train(
-                    many[i], k_F, rest, t, F, until, tolerance, True, most, par, node,
-                    S, counts,
-                )  # fmt: skip
+                    many[i], k_F, rest, t, F, until, tolerance, True, most, par, S
+                )
             if status != kernel.DONE:
                 role[i] = REFUSED
                 continue

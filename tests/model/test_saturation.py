@@ -54,6 +54,12 @@ def test_a_random_scene_has_errors_below_the_estimate():
     assert found.honest, found
 
 
+def test_a_spike_takes_a_dozen_steps():
+    found = simulate(SENSOR, step(0.2, at=0.05), until=0.3)
+    assert found.spike_times.size == 7
+    assert found.stages["V_C1"] <= 13 * found.spike_times.size
+
+
 def spice_rows():
     with Path(__file__).with_name("saturation.csv").open() as file:
         return list(csv.DictReader(file))
