@@ -287,6 +287,8 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
         )
     lines += _irregular(world)
     noise = ", ".join(f"{name} {show(sd, 'V')}" for name, sd in world.noise.items())
+    if world.hum:
+        noise += f", and {show(world.hum, 'V')} of mains hum on every channel"
     codes = ""
     if needed.channels and bench.scope is not None:
         codes = f"; {scope_capability(bench.scope).bits}-bit codes"
@@ -330,6 +332,12 @@ def _irregular(world: Simulated) -> Iterator[str]:
     ]
     if told:
         yield f"noise of the sensor: {', '.join(told)}"
+    if world.warming:
+        become = "warmer" if world.warming > 0 else "colder"
+        yield (
+            f"the sensor becomes {show(abs(world.warming), 'K')} {become} than at the "
+            f"begin, with a time constant of {show(world.warming_time, 's')}"
+        )
     if world.specimen:
         yield (
             f"specimen {world.specimen}: R within 1 %, C within 5 %, V_GS within 2 mV, "

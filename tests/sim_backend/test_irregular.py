@@ -105,3 +105,11 @@ def test_a_plan_tells_what_is_off_and_what_is_on():
     on = plan(load("demo", {"simulated.V_fire_noise": 0.02}), preview=False)
     assert "noise of V_fire" not in dict(on.leaves_out)
     assert any("noise of the sensor: V_fire 20 mV" in line for line in on.assumptions)
+    also = {
+        "simulated.warming": 3.0,
+        "simulated.warming_time": 5.0,
+        "simulated.hum": 0.03,
+    }
+    said = "\n".join(plan(load("demo", also), preview=False).assumptions)
+    assert "becomes 3 K warmer than at the begin, with a time constant of 5 s" in said
+    assert "and 30 mV of mains hum on every channel" in said
