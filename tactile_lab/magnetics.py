@@ -42,6 +42,12 @@ class ForceUncertainty:
     absolute: float
     relative: float
 
+    @property
+    def text(self) -> str:
+        """For a person: "±0.5 mN and ±4 % (95 %)"."""
+        absolute = f"{show(self.absolute, 'N', 2)} and ±" if self.absolute else ""
+        return f"±{absolute}{100 * self.relative:.2g} % (95 %)"
+
     def of(self, force: ArrayLike) -> FloatArray:
         """Half of the 95 % band of `force` N (any shape), N."""
         newtons = np.asarray(force, dtype=np.float64)

@@ -379,12 +379,7 @@ def _calibration(scene: Scene) -> dict[str, str]:
         head = magnet.calibration.head
         found |= {name.capitalize(): head[name] for name in names if name in head}
     known = magnet.force_uncertainty
-    if known is None:
-        found["Uncertainty of a force"] = "not stated"
-    else:
-        found["Uncertainty of a force"] = (
-            f"±{show(known.absolute, 'N', 2)} and ±{100 * known.relative:.2g} % (95 %)"
-        )
+    found["Uncertainty of a force"] = "not stated" if known is None else known.text
     return found
 
 

@@ -13,7 +13,12 @@ from tactile_lab.store.folder import SCENE
 from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
 
-DERIVED = ("force", "rate", "I_DS")
+DERIVED = {
+    "force": "by the run's calibration from the current that flowed, lags included",
+    "rate": "1/ISI of the last two spikes, 0 in a silence",
+    "I_DS": "Eq. (16) from V_C1, in steps of about 1 ms",
+}
+"""By name, what each is derived from."""
 STEP = 1e-3
 """V_C1 is averaged over so long before I_DS is derived from it, s."""
 

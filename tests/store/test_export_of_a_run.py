@@ -76,6 +76,13 @@ def test_csv_says_what_the_run_was_and_when_it_held(run, tmp_path):
         about = dict(csv.reader(file))
     assert about["scene"] == "demo"
     assert about["note operator"] == "Ada B. Petaru"
+    # what the numbers rest on goes with them
+    assert about["force source"].startswith("derived: by the run's calibration")
+    assert about["force uncertainty"] == "not stated"
+    assert about["loss"].startswith("0 of ")
+    told = [text for key, text in about.items() if key.startswith("warning ")]
+    assert any("Table 1's value as printed" in text for text in told)
+    assert about["assumption 1"].startswith("force from Eq. (2)")
     assert float(about["V_C1 one code V"]) == run.signal("V_C1").gain
     assert 'levels = ["0.2 N"]' in about["scene.toml"].replace("\n    ", "").replace(
         ",\n]", "]"

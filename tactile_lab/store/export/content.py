@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.derived import derivable, derivation
+from tactile_lab.store.derived import DERIVED, derivable, derivation
 from tactile_lab.store.folder import SCENE
+from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
@@ -128,7 +129,15 @@ def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
             )
             told[f"{name} one code {signal.unit}"] = abs(signal.gain)
         else:
-            told[f"{name} source"] = "derived"
+            told[f"{name} source"] = f"derived: {DERIVED[name]}"
+    if "force" in names and (run.path / SCENE).exists():
+        known = run.scene.bench.magnet.force_uncertainty
+        told["force uncertainty"] = "not stated" if known is None else known.text
+    if loss := (info.get("loss") or {}).get("text"):
+        told["loss"] = str(loss).removeprefix("loss: ")
+    warnings = *overrange_told(run), *(info.get("warnings") or ())
+    for kind, texts in (("warning", warnings), ("assumption", info.get("assumptions"))):
+        told |= {f"{kind} {n}": str(text) for n, text in enumerate(texts or (), 1)}
     if (run.path / SCENE).exists():
         told["scene.toml"] = (run.path / SCENE).read_text(encoding="utf-8")
     return told

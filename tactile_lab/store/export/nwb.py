@@ -177,7 +177,7 @@ def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
             continue
         series = pynwb.TimeSeries(
             name=name,
-            description=f"{SIGNALS[name].title}, derived",
+            description=f"{SIGNALS[name].title}, derived: {DERIVED[name]}",
             data=derivation(run, name)(time),
             unit=UNITS[SIGNALS[name].unit],
             continuity="step" if name == "rate" else "continuous",
