@@ -66,7 +66,7 @@ class AboutRun(Overlay):
         self.tags = line_edit("Tags", "separated by commas")
         self.choice = Segments(list(PAGES), "Page")
         self.pages = QStackedWidget()
-        self.pages.setMinimumHeight(330)
+        self.give_room(self.pages, 330)
         self.notes = QTableWidget(0, 2)
         self._set_up_notes()
         self.add = push("Add a note")

@@ -293,16 +293,13 @@ class Connect(Overlay):
         say(self.problem, problem)
         self.open()
 
-    def _place(self) -> None:
-        self.pages.setFixedHeight(min(PAGE, max(self._window.height() - 330, 110)))
-        super()._place()
-
     def _lay_out(self) -> None:
         head = row(label("Connect instruments", "big"), STRETCH, self.tabs)
         named = row(label("Name of the bench"), (self.name, 1))
         foot = row(self.open_file, STRETCH, self.close_button, self.save)
         parts = (head, named, (self.pages, 1), self.problem, foot)
         column(self.card, *parts, margin=22, spacing=14)
+        self.give_room(self.pages, PAGE)
 
 
 def show_connect(window: QWidget, panels: Panels, screen: Screen) -> None:

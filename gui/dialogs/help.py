@@ -124,9 +124,10 @@ class Help(Overlay):
         self.close_button = push("Close", "primary")
         self.close_button.clicked.connect(self.hide)
         self._pages = QStackedWidget()
-        self._pages.setMinimumHeight(430)
+        self.give_room(self._pages, 430)
         self._area = scrolling(self._panels())
-        for page in (self._area, scrolling(self._shortcuts(keys)), self._about()):
+        shortcuts, about = scrolling(self._shortcuts(keys)), scrolling(self._about())
+        for page in (self._area, shortcuts, about):
             self._pages.addWidget(page)
         head = row(label("Help", "big"), STRETCH, choice)
         foot = row(STRETCH, self.close_button)

@@ -22,6 +22,9 @@ from gui.tab_order import in_reading_order
 
 HEADER = 68
 
+LEAST = 60
+"""Height below which a page of a card is not made, px."""
+
 
 class Overlay(QWidget):
     """Covers the window below the header and centres a card.
@@ -38,6 +41,7 @@ class Overlay(QWidget):
         self.card.setProperty("role", "dialog")
         self._width = width
         self._before: QWidget | None = None
+        self._page: tuple[QWidget, int] | None = None
         shadow = QGraphicsDropShadowEffect(self.card)
         shadow.setBlurRadius(40)
         shadow.setOffset(0, 10)
@@ -59,6 +63,15 @@ class Overlay(QWidget):
         whole = bar(self.card, (24, 22, 22, 20), 16)
         whole.addWidget(sign, 0, Qt.AlignmentFlag.AlignTop)
         whole.addLayout(said, 1)
+
+    def give_room(self, page: QWidget, height: int) -> None:
+        """Have a part of the card, which scrolls, be as high as there is room for.
+
+        Args:
+            page: the part.
+            height: that it has where there is room enough, px.
+        """
+        self._page = page, height
 
     def open(self) -> None:
         """Show the card, and give it the keyboard unless it has it."""
@@ -103,8 +116,15 @@ class Overlay(QWidget):
         width = min(self._width, self.width() - 24)
         self.card.setFixedWidth(width)
         self.card.ensurePolished()
+        room = self.height() - 24
+        if self._page is not None:
+            page, most = self._page
+            page.setFixedHeight(most)
+            self._unwrap(width)
+            over = max(self.card.sizeHint().height() - room, 0)
+            page.setFixedHeight(max(most - over, LEAST))
         self._unwrap(width)
-        height = min(self.card.sizeHint().height(), self.height() - 24)
+        height = min(self.card.sizeHint().height(), room)
         self.card.setGeometry(
             QRect(
                 (self.width() - width) // 2,

@@ -5,11 +5,22 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QCheckBox, QLayout, QLineEdit, QWidget
 
 from gui.ask_file import ask_file
 from gui.dialogs.overlay import Overlay
-from gui.parts import STRETCH, Part, column, label, line, line_edit, push, row
+from gui.parts import (
+    STRETCH,
+    Part,
+    column,
+    label,
+    line,
+    line_edit,
+    push,
+    row,
+    scrolling,
+    with_gutter,
+)
 from gui.preferences import Preferences
 
 SWITCHES = {
@@ -18,6 +29,9 @@ SWITCHES = {
     "reports": "Write the report at the end of each run",
     "lsl": "Publish each run live to other programs (Lab Streaming Layer)",
 }
+
+PAGE = 260
+"""Height of all that is to be set, where the window is high enough, px."""
 
 
 class PreferencesCard(Overlay):
@@ -39,14 +53,17 @@ class PreferencesCard(Overlay):
             "muted",
             wrap=True,
         )
+        page = QWidget()
         parts: tuple[Part, ...] = (
-            label("Settings", "big"),
             self._chosen("Folder for runs", self.folder, folder=True),
             self._chosen("Bench at the start", self.bench, folder=False),
             *(note, line(), *self.switches.values()),
-            row(STRETCH, self.close_button, self.save),
         )
-        column(self.card, *parts, margin=22, spacing=12)
+        area = with_gutter(scrolling(page), column(page, *parts, spacing=12))
+        foot = row(STRETCH, self.close_button, self.save)
+        whole = label("Settings", "big"), area, foot
+        column(self.card, *whole, margin=22, spacing=12)
+        self.give_room(area, PAGE)
 
     def show_preferences(self) -> None:
         """Open the card."""
@@ -65,7 +82,7 @@ class PreferencesCard(Overlay):
         )
         self.hide()
 
-    def _chosen(self, words: str, edit: QLineEdit, *, folder: bool) -> QWidget:
+    def _chosen(self, words: str, edit: QLineEdit, *, folder: bool) -> QLayout:
         name = label(words)
         name.setFixedWidth(130)
         browse = push("…", name=f"Choose: {words}")
@@ -74,10 +91,7 @@ class PreferencesCard(Overlay):
         browse.clicked.connect(
             lambda: ask_file(self, words, put, folder=folder, kinds=kinds)
         )
-        across = QWidget()
-        filled_row = row(name, (edit, 1), browse, spacing=8)
-        column(across).addLayout(filled_row)
-        return across
+        return row(name, (edit, 1), browse, spacing=8)
 
     def _put(self, edit: QLineEdit, path: Path) -> None:
         edit.setText(str(path))

@@ -67,7 +67,7 @@ class StudiesCard(Overlay):
         self._rows = column(inner, self.text, spacing=10)
         self._rows.addStretch(1)
         self._area = scrolling(inner)
-        self._area.setMinimumHeight(430)
+        self.give_room(self._area, 430)
         head = row(label("Studies", "big"), (self.choice, 1), self.state, spacing=12)
         pick = row((self.hint, 1), self.points, self.point, spacing=12)
         foot = row(STRETCH, self.page, self.close_button, spacing=12)

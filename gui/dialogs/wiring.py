@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
 )
 
 from gui.dialogs.bench_text import BenchChoice
+from gui.lanes.lane import title_of
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, empty, label, push, row, say, set_role, sign
 from gui.review.conclusion import Concluded
@@ -108,7 +109,9 @@ class Wiring(QWidget):
                 set_role(text, "error")
             top = Qt.AlignmentFlag.AlignTop
             self._verdicts.addWidget(mark, at, 0, top)
-            self._verdicts.addWidget(label(verdict.signal, "strong"), at, 1, top)
+            self._verdicts.addWidget(
+                label(title_of(verdict.signal), "strong"), at, 1, top
+            )
             self._verdicts.addWidget(text, at, 2)
         signals = tuple(f"{verdict.signal}:" for verdict in verdicts)
         statements = found.statements if found else ()

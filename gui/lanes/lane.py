@@ -97,5 +97,5 @@ def lanes_for(signals: Iterable[str], *, twin: bool = True) -> tuple[Lane, ...]:
 
 
 def title_of(signal: str) -> str:
-    """A signal's name as its lane has it, rich text."""
-    return next(lane.title for lane in _LANES if lane.key == signal)
+    """A signal's name as its lane has it, rich text; what has no lane is as it is."""
+    return next((lane.title for lane in _LANES if lane.key == signal), signal)

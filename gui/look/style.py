@@ -110,13 +110,13 @@ QToolButton[role="section"] { background: transparent; border: 1px solid transpa
 QToolButton[role="section"]:hover { color: $text; }
 QToolButton[role="section"]:focus { border: 2px solid $accent; padding: 2px 3px; }
 QToolButton[role="tab"] { background: transparent; border: 0; border-radius: 0;
-  border-bottom: 2px solid transparent; padding: 8px 10px; color: $muted;
+  border-bottom: 2px solid transparent; padding: 8px 7px; color: $muted;
   font-weight: 500; }
 QToolButton[role="tab"]:hover { color: $text; }
 QToolButton[role="tab"]:checked { color: $text; border-bottom: 2px solid $accent;
   font-weight: 600; }
 QToolButton[role="tab"]:focus { border: 2px solid $accent; border-radius: 5px;
-  padding: 6px 8px 8px 8px; }
+  padding: 6px 5px 8px 5px; }
 
 QLineEdit, QPlainTextEdit, QComboBox, QAbstractSpinBox { background: $field;
   border: 1px solid $control; border-radius: 6px; padding: 3px 8px;

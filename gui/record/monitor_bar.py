@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QWidget
 
+from gui.lanes.lane import title_of
 from gui.parts import STRETCH, bar, column, filled, label, push, set_role
 from gui.plots.numbers import number
 from tactile_lab.engine.sensor import SensorState
+
+WIDE = 760
+"""Width from which on there is room for all of it, px."""
 
 
 class MonitorBar(QFrame):
@@ -21,13 +26,15 @@ class MonitorBar(QFrame):
         self.setAccessibleName("Monitor")
         whole = bar(self, (14, 5, 10, 5), 20)
         self._values: dict[str, QLabel] = {}
+        boxes: list[QWidget] = []
         for name in ("V_C1", "V_C2", "Rate", "To the threshold"):
-            box = QFrame()
-            value, title = label("—", "value"), label(name, "small")
+            box, shown = QFrame(), title_of(name)
+            value, title = label("—", "value"), label(shown, "small")
             value.setAccessibleName(name)
             column(box, title, value, spacing=0)
             self._values[name] = value
             whole.addWidget(box)
+            boxes.append(box)
         self._threshold = title
         self._threshold.setMinimumWidth(132)
         self.side = label("", "pill")
@@ -39,7 +46,14 @@ class MonitorBar(QFrame):
         off = push("Stop watching")
         off.clicked.connect(self.closed)
         filled(whole, (self.side, STRETCH, self._kept, self.record, off))
+        self._minor = [self._kept, *boxes[:-1]]
         self.hide()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Say less where there is less room: the lanes have voltages and rate, too."""
+        super().resizeEvent(event)
+        for part in self._minor:
+            part.setVisible(event.size().width() >= WIDE)
 
     @property
     def words(self) -> str:

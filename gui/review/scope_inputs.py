@@ -7,6 +7,7 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QLineEdit, QWidget
 
+from gui.lanes.lane import title_of
 from gui.parts import STRETCH, Combo, column, empty, label, push, row, say
 from gui.setup.parameter import toml
 from tactile_lab.errors import QuantityError, SceneError
@@ -36,7 +37,8 @@ class InputCard(QFrame):
         self.coupling.addItems(["DC", "AC"])
         self.coupling.setCurrentText(table.coupling)
         self._sees = label("", "small")
-        top = row(label(name, "strong"), STRETCH, self._sees)
+        wired = label(f"{table.input} · {title_of(table.signal)}", "strong")
+        top = row(wired, STRETCH, self._sees)
         below = row(spacing=5)
         for words, editor, share in (
             ("Range", self.range, 4),

@@ -16,7 +16,7 @@ from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import STRETCH, column, empty, label, line, lines, panel, push, row, say
+from gui.parts import STRETCH, column, empty, label, line, panel, push, row, say
 from gui.record.log import LogView
 from gui.record.monitor_bar import MonitorBar
 from gui.record.progress import ProgressStrip
@@ -30,6 +30,9 @@ STRIP, LOGGED = 56, 151
 
 NARROW, LOW, LOWEST = 1000, 640, 500
 """Width and heights of the window, px, below which not all of the centre is shown."""
+
+MOST = 520
+"""Width of the card of the empty state, px."""
 
 FOLLOWED = 5.0
 """Visible time of a run that begins, s."""
@@ -50,23 +53,24 @@ class EmptyCard(QFrame):
         self._below, self._theme = parent, theme
         self._picture = QLabel()
         title = label("No bench connected", "big")
-        text = label(
+        self._text = text = label(
             "Explore with the simulated bench: same drivers, same protocols, same "
             "files, no hardware. Or connect your own coil source, oscilloscope "
             "and teslameter.",
             wrap=True,
         )
         self.simulated = push("Use simulated bench", "primary")
-        connect = push("Connect instruments …")
+        self._connect = connect = push("Connect instruments …")
         scene = push("Open scene …")
         offers = (self.simulated, connect, scene)
         buttons = row(STRETCH, *offers, STRETCH, spacing=8)
-        self._recent = lines(spacing=2)
-        hint = label("or drop a scene or a run anywhere", "small")
+        self._listed = QWidget()
+        self._recent = column(self._listed, spacing=2)
+        self._hint = hint = label("or drop a scene or a run anywhere", "small")
         for words in (self._picture, title, text, hint):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        parts = (self._picture, title, text, buttons, self._recent, hint)
-        column(self, *parts, margin=26, spacing=12)
+        parts = (self._picture, title, text, buttons, self._listed, hint)
+        self._rows = column(self, *parts, margin=26, spacing=12)
         self.simulated.clicked.connect(self.simulated_asked)
         connect.clicked.connect(self.connect_asked)
         scene.clicked.connect(self.open_asked)
@@ -81,14 +85,29 @@ class EmptyCard(QFrame):
         return False
 
     def place(self) -> None:
-        """Lie in the middle, as large as it needs to be and has room for."""
-        below = self._below
-        self.setFixedWidth(min(520, below.width() - 40))
-        self.adjustSize()
-        height = min(self.sizeHint().height() + 12, below.height() - 16)
-        self.setFixedHeight(height)
+        """Lie in the middle; where there is little room, say and offer less."""
+        below, minor = (
+            self._below,
+            (self._hint, self._picture, self._listed, self._text),
+        )
+        narrow = below.width() < MOST + 40
+        self._connect.setText("Connect …" if narrow else "Connect instruments …")
+        margin = 12 if narrow else 26
+        self._rows.setContentsMargins(margin, margin, margin, margin)
+        self.setFixedWidth(min(MOST, below.width() - 16))
+        for part in minor:
+            part.show()
+        for part in (None, *minor):
+            if part is not None:
+                part.hide()
+            self._rows.activate()
+            height = self._rows.totalHeightForWidth(self.width())
+            if height <= below.height() - 16:
+                break
+        self.setFixedHeight(min(height, below.height() - 16))
         self.move(
-            (below.width() - self.width()) // 2, max((below.height() - height) // 2, 8)
+            (below.width() - self.width()) // 2,
+            max((below.height() - self.height()) // 2, 8),
         )
         self.raise_()
 

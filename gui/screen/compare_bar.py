@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QFont, QResizeEvent
-from PySide6.QtWidgets import QFrame, QLabel, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame, QLabel, QWidget
 
 from gui.lanes.compare import MARKS, Comparison, ComparisonRows
 from gui.lanes.stack import LaneStack
@@ -44,8 +44,9 @@ class CompareBar(QFrame):
         self._words = [label(text, role) for text, role in parts]
         close = IconButton(theme, "close", "End the comparison")
         title, align, layout_ = self._words
-        choices = (align, self.align, layout_, self.layout_, close)
-        bar(self, (12, 4, 8, 4), 10, title, self._names, STRETCH, *choices)
+        runs = row(title, self._names, STRETCH, spacing=10)
+        choices = (align, self.align, layout_, self.layout_, STRETCH, close)
+        self._rows = bar(self, (12, 4, 8, 4), 10, (runs, 1), row(*choices, spacing=10))
         self._buttons = (self.align, self.layout_, close)
         close.clicked.connect(self.closed)
         self.align.group.idClicked.connect(self._align)
@@ -65,7 +66,7 @@ class CompareBar(QFrame):
             self._show_names()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave words out where there is no room for them."""
+        """Leave words out where there is no room for them; then take two rows."""
         super().resizeEvent(event)
         self._show_names()
 
@@ -77,6 +78,9 @@ class CompareBar(QFrame):
         ]
         short = [self._name(k, m.name.split()[0]) for k, m in enumerate(members)]
         names = full if self._fits(*full, *self._words) else short
+        low = self._fits(*names)
+        way = QBoxLayout.Direction
+        self._rows.setDirection(way.LeftToRight if low else way.TopToBottom)
         for word in self._words:
             word.setVisible(self._fits(*names, *self._words))
         empty(self._names)

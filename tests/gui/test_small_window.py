@@ -1,0 +1,124 @@
+"""Cards and bars in a window as small as a screen of 1280 x 720 at 150 % leaves."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QAbstractButton, QLabel, QLineEdit, QWidget
+
+from gui.app import FRAME
+from gui.dialogs.connect import Connect
+from gui.dialogs.help import Help
+from gui.dialogs.preferring import PreferencesCard
+from gui.dialogs.studies import StudiesCard
+from gui.look.theme import Theme
+from gui.record.monitor_bar import MonitorBar
+from gui.screen.centre import EmptyCard
+from gui.screen.compare_bar import CompareBar
+from tactile_lab.engine.sensor import SensorState
+
+SMALL, USUAL = QSize(853, 480) - FRAME, QSize(1720, 1080)
+
+BAR = 480
+"""Width of the lanes in such a window beside the form, px."""
+
+
+def cut(root: QWidget) -> list[str]:
+    """What cannot be read, or pressed, in whole."""
+    found = []
+    for one in root.findChildren(QWidget):
+        if not one.isVisible() or not isinstance(
+            one, QAbstractButton | QLabel | QLineEdit
+        ):
+            continue
+        least = one.minimumSizeHint()
+        if isinstance(one, QLabel) and one.wordWrap():
+            least = QSize(0, one.heightForWidth(one.width()))
+        parent = one.parentWidget().rect()
+        small = one.width() < least.width() or one.height() < least.height()
+        if small or not parent.contains(one.geometry()):
+            name = one.accessibleName() or one.text()
+            found.append(f"{name}: {one.geometry()} of {least} in {parent}")
+    return found
+
+
+@pytest.fixture
+def small(lab):
+    lab.window.resize(SMALL)
+    lab.app.processEvents()
+    yield lab.window
+    lab.window.resize(USUAL)
+
+
+def test_every_card_fits(lab, small) -> None:
+    acts, folder = small.actions_, lab.runs(1)[0]
+    for kind, show in (
+        (PreferencesCard, acts.show_preferences),
+        (Help, acts.show_help),
+        (StudiesCard, acts.show_studies),
+        (Connect, acts.connect_dialog),
+        (type(small.runs.card), lambda: small.runs.card.show_run(folder)),
+    ):
+        show()
+        lab.app.processEvents()
+        card = small.findChild(kind)
+        assert card.rect().contains(card.card.geometry())
+        least = card.card.minimumSizeHint().height()
+        assert least <= card.card.height(), kind
+        assert cut(card.card) == [], kind
+        card.hide()
+
+
+@pytest.fixture
+def host(app):
+    """A place for a bar; a window of its own would be as wide as it wants to be."""
+    made = QWidget()
+    made.resize(BAR, 120)
+    made.show()
+    yield made
+    made.close()
+
+
+def lay(app, bar: QWidget) -> None:
+    """Give a bar the width that there is, and the height it then needs."""
+    bar.show()
+    for _ in range(2):
+        bar.setGeometry(0, 0, BAR, bar.sizeHint().height())
+        app.processEvents()
+
+
+def test_the_bar_of_the_monitor_fits(app, host) -> None:
+    bar = MonitorBar()
+    bar.setParent(host)
+    state = SensorState(3.981, 4.346, 1.480, 7.25, held=60.0)
+    bar.show_sensor(state, recording=False)
+    lay(app, bar)
+    assert cut(bar) == [] and bar.record.isVisible()
+
+
+def test_the_bar_of_a_comparison_fits(lab, host) -> None:
+    centre = lab.window.centre
+    bar = CompareBar(centre.stack, centre.view, lab.window.theme)
+    bar.setParent(host)
+    runs = [
+        SimpleNamespace(name=f"14:03:5{k} demo", source=SimpleNamespace(path=Path()))
+        for k in range(3)
+    ]
+    bar.show_comparison(SimpleNamespace(members=runs))
+    lay(lab.app, bar)
+    assert cut(bar) == []
+
+
+@pytest.mark.parametrize("room", [(BAR, 170), (BAR, 600), (1100, 700)])
+def test_the_card_of_the_empty_state_fits(app, room: tuple[int, int]) -> None:
+    below = QWidget()
+    below.resize(*room)
+    card = EmptyCard(below, Theme("light"))
+    card.show_recent([("Pulses · today 14:03 · complete", Path())] * 4)
+    below.show()
+    card.place()
+    app.processEvents()
+    assert below.rect().contains(card.geometry())
+    assert cut(card) == [] and card.simulated.isVisible()
+    below.close()
