@@ -75,7 +75,7 @@ def test_a_run_on_a_link_faster_than_promised_takes_what_its_plan_allowed():
         if step.trial.length > 200
     )
     drive = drive_for(trial, scene, 0.0, update_interval=4e-4)
-    assert drive.way == "set-points" and drive.error < 1e-3
+    assert drive.way == "set-points" and drive.error < 3e-3
     with pytest.raises(LimitError, match="changes its force for"):
         drive_for(replace(trial, force=Waveform.pulse(0.1, ramp=3e4, hold=1)), scene, 0)
 
