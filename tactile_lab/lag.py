@@ -140,11 +140,15 @@ class Lag:
         """
         if self.coil == 0 and self.eddy == 0:
             return wave
-        inside = np.concatenate([
-            np.arange(max(start - 2 * fine, wave.start), end + 2 * fine, fine)
-            for start, end, a, b in wave.segments() if a != b
-        ] or [np.empty(0)])  # fmt: skip
-        inside = np.unique(np.round(inside / fine)) * fine
+        pieces = (np.diff(wave.time) > 0) & (np.diff(wave.value) != 0)
+        begin = np.maximum(wave.time[:-1][pieces] - 2 * fine, wave.start)
+        ends = wave.time[1:][pieces] + 2 * fine
+        first = np.round(begin / fine).astype(int)
+        stop = first + np.ceil((ends - begin) / fine).astype(int)
+        moves = np.zeros(stop.max(initial=0) + 1, dtype=int)  # how many pieces do
+        np.add.at(moves, first, 1)
+        np.subtract.at(moves, stop, 1)
+        inside = np.flatnonzero(np.cumsum(moves)) * fine
         # no point so near an end that what differs there would be a jump
         inside = inside[
             (inside > wave.start + fine / 2) & (inside < wave.end - fine / 2)

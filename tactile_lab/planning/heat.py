@@ -51,14 +51,25 @@ def heat_along(
     """
     most, spent, bound = used, None, limits.continuous
     bent = current.with_points_at(np.array([-bound, bound]))
-    a, b, spans = bent.value[:-1], bent.value[1:], np.diff(bent.time)
+    pieces = np.diff(bent.time) > 0
+    a, b, spans = bent.value[:-1][pieces], bent.value[1:][pieces], np.diff(bent.time)
+    end, spans = bent.time[1:][pieces], spans[pieces]
     warm = np.maximum(np.abs(a), np.abs(b)) > bound * (1 + 1e-12)
     gains = spans * np.where(warm, (a * a + a * b + b * b) / 3 - bound * bound, 0.0)
-    kept = np.where(warm, 1.0, np.exp(-spans / limits.recovery))
-    rows = np.column_stack([bent.time[1:], spans, gains, kept])[spans > 0]
-    for end, span, gain, part in rows.tolist():
-        used = used * part + max(gain, 0.0)
+    gains = np.maximum(gains, 0.0)
+    turns = np.flatnonzero(np.diff(warm)) + 1  # it warms or cools for many in a row
+    for part in np.split(np.arange(spans.size), turns):
+        if not part.size:
+            continue
+        if not warm[part[0]]:
+            used *= math.exp(-float(spans[part].sum()) / limits.recovery)
+            continue
+        along = used + np.cumsum(gains[part])
+        over = np.flatnonzero((along > limits.heat) & (gains[part] > 0))
+        if over.size and spent is None:
+            first = part[over[0]]
+            beyond = (along[over[0]] - limits.heat) / gains[first]
+            spent = float(end[first] - spans[first] * min(beyond, 1.0))
+        used = float(along[-1])
         most = max(most, used)
-        if gain > 0 and used > limits.heat and spent is None:
-            spent = end - span * min((used - limits.heat) / gain, 1.0)
     return used, most, spent
