@@ -5,14 +5,12 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass, field
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.bench_file import BenchSpec
-from tactile_lab.scene.load import load_bench
 from tactile_lab.table import dumped
 
 BY_PERSON = "read by a person"
@@ -110,24 +108,6 @@ def bench_text(choice: BenchChoice) -> str:
         }
     data["magnet"] = {k: _typed(v) for k, v in choice.magnet.items() if v != ""}
     return tomli_w.dumps(data)
-
-
-def save_bench(choice: BenchChoice, path: Path) -> BenchSpec:
-    """Write the bench file and read it back.
-
-    Raises:
-        SceneError: what was chosen is no usable bench; nothing is left at `path`.
-        OSError: `path` cannot be written.
-    """
-    trial = path.with_suffix(".new.toml")
-    trial.write_text(bench_text(choice), encoding="utf-8")
-    try:
-        spec = load_bench(trial)
-    except ValueError:
-        trial.unlink()
-        raise
-    trial.replace(path)
-    return spec
 
 
 def _take_over(choice: BenchChoice, data: dict[str, Any]) -> None:

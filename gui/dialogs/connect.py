@@ -14,7 +14,7 @@ from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QScrollArea, QStackedWidget, QWidget
 
 from gui.ask_file import ask_file
-from gui.dialogs.bench_text import save_bench, show_bench, start_choice
+from gui.dialogs.bench_text import bench_text, show_bench, start_choice
 from gui.dialogs.calibrating import Calibrating
 from gui.dialogs.instruments import InstrumentsPage
 from gui.dialogs.overlay import Overlay
@@ -39,7 +39,7 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import protocol_checking
 from tactile_lab.scene.bench_file import BenchSpec
-from tactile_lab.scene.calibrated_bench import write_calibrated_bench
+from tactile_lab.scene.write_bench import write_bench, write_calibrated_bench
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels
@@ -127,7 +127,7 @@ class Connect(Overlay):
         self.calibration.take()
         choice.name = self.name.text().strip() or "my bench"
         try:
-            save_bench(choice, path)
+            write_bench(bench_text(choice), path)
         except (TactileLabError, OSError) as error:
             self._say(str(error))
             return False

@@ -230,8 +230,8 @@ class Day:
 
     def _calibrate(self, run: Path) -> None:
         """From now on the force rests on the calibration that `run` measured."""
-        from tactile_lab.scene.calibrated_bench import write_calibrated_bench
         from tactile_lab.scene.load import load_bench
+        from tactile_lab.scene.write_bench import write_calibrated_bench
 
         with refusing():
             target = self.out / BENCH

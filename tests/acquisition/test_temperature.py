@@ -241,12 +241,15 @@ def test_its_chip_tells_who_it_is_and_what_it_reads(serial):
 
 
 def test_a_bench_file_that_the_window_writes_keeps_it(serial, tmp_path):
-    from gui.dialogs.bench_text import save_bench, show_bench, start_choice
+    from gui.dialogs.bench_text import bench_text, show_bench, start_choice
+    from tactile_lab.scene.write_bench import write_bench
 
     choice = start_choice()
     show_bench(choice, serial().bench)
-    assert save_bench(choice, tmp_path / "a.toml").thermometer is None  # simulated
+    assert (
+        write_bench(bench_text(choice), tmp_path / "a.toml").thermometer is None
+    )  # simulated
     wired = serial("bench.thermometer.port=/dev/ttyUSB3", "bench.thermometer.input=B")
     show_bench(choice, wired.bench)
-    kept = save_bench(choice, tmp_path / "b.toml").thermometer
+    kept = write_bench(bench_text(choice), tmp_path / "b.toml").thermometer
     assert (kept.port, kept.input) == ("/dev/ttyUSB3", "B")

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import QLabel
 from gui.dialogs.bench_text import (
     BY_PERSON,
     bench_text,
-    save_bench,
     show_bench,
     start_choice,
 )
@@ -33,6 +32,7 @@ from tactile_lab.engine.request import Request
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
+from tactile_lab.scene.write_bench import write_bench
 from tactile_lab.store.run import Run
 
 
@@ -40,7 +40,7 @@ def test_bench_file_reads_back_as_chosen(tmp_path: Path) -> None:
     choice = start_choice()
     choice.name, choice.coil_port = "lab 3", "/dev/ttyUSB0"
     choice.meter_port = "/dev/ttyUSB1"
-    spec = save_bench(choice, tmp_path / "bench.toml")
+    spec = write_bench(bench_text(choice), tmp_path / "bench.toml")
     assert not spec.simulated and spec.name == "lab 3"
     assert spec.coil is not None and spec.coil.port == "/dev/ttyUSB0"
     assert spec.field_meter is not None and spec.field_meter.port == "/dev/ttyUSB1"
@@ -77,7 +77,7 @@ def test_wrong_range_is_refused_and_leaves_no_file(tmp_path: Path) -> None:
     where, signal, _, offset, shunt = choice.channels[0]
     choice.channels[0] = (where, signal, "2 mN", offset, shunt)
     with pytest.raises(SceneError, match="mN"):
-        save_bench(choice, tmp_path / "bench.toml")
+        write_bench(bench_text(choice), tmp_path / "bench.toml")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -255,7 +255,7 @@ def test_dialog_keeps_what_it_does_not_show(tmp_path: Path) -> None:
     (tmp_path / "before.toml").write_text(text)
     choice = start_choice()
     show_bench(choice, load_bench(tmp_path / "before.toml"))
-    spec = save_bench(choice, tmp_path / "after.toml")
+    spec = write_bench(bench_text(choice), tmp_path / "after.toml")
     assert spec.hand_set == {"V_GS": 1.3}
     (channel,) = [c for c in spec.scope.channels if c.signal == "V_K"]
     assert (channel.coupling, channel.scale) == ("AC", 10.0)
@@ -267,7 +267,7 @@ def test_a_teslameter_that_a_person_reads_needs_no_port(lab, tmp_path: Path) -> 
     assert page.meter_port.isEnabled()
     page.meter_row.setCurrentText(BY_PERSON)
     assert not page.meter_port.isEnabled() and not page.test_meter.isEnabled()
-    spec = save_bench(page.take(), tmp_path / "bench.toml")
+    spec = write_bench(bench_text(page.take()), tmp_path / "bench.toml")
     assert spec.field_meter is not None and spec.field_meter.driver == "manual"
     again = start_choice()
     show_bench(again, spec)

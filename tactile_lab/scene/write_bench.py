@@ -1,4 +1,4 @@
-"""A bench file that takes its force from a measured calibration."""
+"""Bench files are written: none that cannot be read again takes another's place."""
 
 from __future__ import annotations
 
@@ -10,6 +10,24 @@ from tactile_lab.errors import SceneError
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.table import dumped
+
+
+def write_bench(text: str, path: Path) -> BenchSpec:
+    """Write a bench file, ending in .toml, and read it back.
+
+    Raises:
+        SceneError: `text` is no usable bench; what was at `path` stays.
+        OSError: `path` cannot be written.
+    """
+    draft = path.with_suffix(".new.toml")
+    draft.write_text(text, encoding="utf-8")
+    try:
+        load_bench(draft)
+    except ValueError:
+        draft.unlink()
+        raise
+    draft.replace(path)
+    return load_bench(path)
 
 
 def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> BenchSpec:
@@ -28,7 +46,6 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
             file that was there stays.
     """
     copy = path.with_name(f"{path.stem}-{calibration.parent.name}.csv")
-    draft = path.with_suffix(".new.toml")
     table = dumped(spec)
     table.pop("file", None)
     table["magnet"]["calibration"] = copy.name
@@ -42,15 +59,8 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
         if not copy.exists():
             copy.write_bytes(contents)
             copy.chmod(0o444)
-        draft.write_text(tomli_w.dumps(table), encoding="utf-8")
-        try:
-            load_bench(draft)
-        except SceneError:
-            draft.unlink()
-            raise
-        draft.replace(path)
+        return write_bench(tomli_w.dumps(table), path)
     except OSError as reason:
         raise SceneError(
             f"Bench file {path} cannot be written: {reason.strerror or reason}."
         ) from reason
-    return load_bench(path)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.errors import SceneError
-from tactile_lab.scene.calibrated_bench import write_calibrated_bench
 from tactile_lab.scene.load import load, load_bench
+from tactile_lab.scene.write_bench import write_calibrated_bench
 
 POINTS = "current_A,field_T\n-1,-0.0095\n0,0\n1,0.0095\n"
 
