@@ -30,7 +30,7 @@ from gui.review.panel import ReviewPanel
 from gui.review.spike_tools import SpikeTools
 from gui.run_actions import RunActions
 from gui.screen.centre import Centre
-from gui.screen.frames import Frames
+from gui.screen.frames import FrameLoop
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.session.session import Session
@@ -84,7 +84,7 @@ class Window(QMainWindow):
             session, theme, self.header, self.setup, self.centre, self.review
         )
         self.screen_ = Screen(self.panels)
-        self.frames = Frames(self.panels, self.screen_)
+        self.frames = FrameLoop(self.panels, self.screen_)
         self.runs = RunActions(self, self.panels, self.screen_)
         self.actions_ = Actions(
             self, self.panels, self.screen_, self.runs, self.closing, self.preferences

@@ -107,7 +107,7 @@ class Interlock:
         warn: Callable[[str], None],
     ) -> None:
         self.heat = HeatBudget(limits, time)
-        self.thermometer = Thermometer(limits.resistance)
+        self.thermometer = WindingThermometer(limits.resistance)
         self.tripped: str | None = None
         self._limits = limits
         self._guard = guard
@@ -305,7 +305,7 @@ class ReadbackCheck:
 
 
 @dataclass
-class Thermometer:
+class WindingThermometer:
     """Temperature of the copper from its resistance, V/I at a steady current.
 
     Attributes:

@@ -23,7 +23,7 @@ from gui.parts import line
 from gui.plots.numbers import number, signed
 
 if TYPE_CHECKING:
-    from tactile_lab.store.statistics import Statistics
+    from tactile_lab.store.statistics import SignalStatistics
 
 ROOM = 96
 """Height of a card from which on there is room for statistics, px."""
@@ -44,7 +44,7 @@ class LaneRow:
         )
         self.rule = line()
         self.box = LaneBox(lane, stage)
-        self.statistics: Statistics | None = None
+        self.statistics: SignalStatistics | None = None
         self._stage, self._theme = stage, theme
         self.tint()
 

@@ -26,7 +26,7 @@ from gui.plots.numbers import number
 from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
-    from tactile_lab.store.statistics import Statistics
+    from tactile_lab.store.statistics import SignalStatistics
 
 STEPS = 40
 """Most steps that the menu offers to jump to."""
@@ -201,7 +201,7 @@ class LaneStack(QFrame):
         self.stage.laws = laws
         self.refresh()
 
-    def show_statistics(self, found: Mapping[str, Statistics]) -> None:
+    def show_statistics(self, found: Mapping[str, SignalStatistics]) -> None:
         """Show what the samples between the cursors come to, by signal."""
         for one in self.rows:
             one.statistics = found.get(one.lane.key)

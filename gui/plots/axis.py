@@ -52,7 +52,7 @@ def stroke(
     return pen
 
 
-class Line(pg.InfiniteLine):  # type: ignore[misc]
+class GuardedLine(pg.InfiniteLine):  # type: ignore[misc]
     """A line across or upright that may fail alone."""
 
     paint = guarded(pg.InfiniteLine.paint)

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QMenu
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.look.tokens import Tokens
-from gui.plots.axis import Line, RoundAxis, stroke
+from gui.plots.axis import GuardedLine, RoundAxis, stroke
 from gui.plots.cells import cell_at, item, levels, shades
 from gui.plots.numbers import nice_range
 from tactile_lab.arrays import FloatArray
@@ -344,7 +344,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         colour = self._colour(guide.colour)
         style = Qt.PenStyle.DashLine if guide.dashed else Qt.PenStyle.SolidLine
         pen = stroke(colour, self._ratio, style)
-        self.box.addItem(Line(ends[0], 0 if across else 90, pen))
+        self.box.addItem(GuardedLine(ends[0], 0 if across else 90, pen))
         if guide.text:
             (left, right), (_, top) = self.box.whole
             far = not across and ends[0] > left + 0.6 * (right - left)

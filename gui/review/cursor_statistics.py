@@ -10,7 +10,7 @@ from gui.lanes.stack import LaneStack
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import statistics_of_run
-from tactile_lab.store.statistics import Statistics
+from tactile_lab.store.statistics import SignalStatistics
 
 STILL = 150
 """Milliseconds for which the cursors stand still before samples are read."""
@@ -52,6 +52,6 @@ class CursorStatistics(QObject):
             partial(self._arrived, asked), statistics_of_run, source.path, start, end
         )
 
-    def _arrived(self, asked: Asked, reply: Reply[dict[str, Statistics]]) -> None:
+    def _arrived(self, asked: Asked, reply: Reply[dict[str, SignalStatistics]]) -> None:
         if asked == self._asked and reply.value is not None:
             self._lanes.show_statistics(reply.value)

@@ -130,7 +130,7 @@ class EmptyCard(QFrame):
         self._picture.setPixmap(pixmap("bench", self._theme.tokens.accent, 44))
 
 
-class Record(QFrame):
+class RecordPanel(QFrame):
     """Progress, and the log where it has room for a line."""
 
     def __init__(self, progress: ProgressStrip, log: LogView) -> None:
@@ -163,7 +163,7 @@ class Centre(QWidget):
         self.monitor_bar = MonitorBar()
         bars = (self.tools, line(), self.notice, self.compare_bar, self.monitor_bar)
         column(self.lanes, *bars, (self.stack, 1), margin=1, spacing=0)
-        self.record = Record(self.progress, self.log)
+        self.record = RecordPanel(self.progress, self.log)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
         self.splitter.addWidget(self.lanes)
         self.splitter.addWidget(self.record)

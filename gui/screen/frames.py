@@ -20,7 +20,7 @@ BUDGET = 0.6
 """Share of the interval a frame may cost before the interval is doubled."""
 
 
-class Frames(QObject):
+class FrameLoop(QObject):
     """Moves what is on screen; `costs` holds the newest frame costs, s."""
 
     told = Signal(object)

@@ -7,7 +7,7 @@ import numpy as np
 from gui.lanes.expected import Preview
 from gui.lanes.paint import zigzag
 from gui.look.theme import Theme
-from gui.plots.axis import Line, stroke
+from gui.plots.axis import GuardedLine, stroke
 from gui.plots.small_plot import SmallPlot
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.trace import Trace
@@ -48,7 +48,7 @@ class WaveformPreview(SmallPlot):
         """The plan, and the play-head on it."""
         super().draw()
         pen = stroke(self._theme.tokens.text, 1.5 * self.devicePixelRatio())
-        self._line = Line(pen=pen)
+        self._line = GuardedLine(pen=pen)
         self._line.setZValue(10)
         for panel in self.panels:
             panel.box.addItem(self._line, ignoreBounds=True)

@@ -19,7 +19,7 @@ from tactile_lab.trial import Protocol
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class KeptForm:
     """What stood in the form before a queued run was taken up."""
 
     path: str | None
@@ -46,7 +46,7 @@ class Subject(QObject):
         self.path: str | None = None
         self._session, self._form, self._tables = session, form, tables
         self._usual: Scene | None = None
-        self._before = Kept(None, None, {}, None, {})
+        self._before = KeptForm(None, None, {}, None, {})
         self._taken_up: object = None
         self._typed: dict[str, dict[str, str]] = {}
         session.queue.changed.connect(self._mind_queue)
@@ -157,7 +157,7 @@ class Subject(QObject):
         except (TactileLabError, OSError) as error:
             return f"{item.title} cannot be edited: {error}"
         if self.edited is None:
-            self._before = Kept(
+            self._before = KeptForm(
                 self.path,
                 self._form.protocol,
                 self._form.texts(),

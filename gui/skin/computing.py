@@ -20,7 +20,7 @@ from tactile_lab.skin.skin import Skin
 
 
 @dataclass(frozen=True, eq=False)
-class Trains:
+class TrainsFound:
     """The trains of some taxels are computed.
 
     Attributes:
@@ -45,7 +45,7 @@ class LeftError(Exception):
     """The window was closed."""
 
 
-class Computing:
+class SkinComputation:
     """Computes in a thread: the kernel does not hold Python back.
 
     Args:
@@ -55,11 +55,11 @@ class Computing:
 
     def __init__(self, skin: Skin | None, folder: Path) -> None:
         self._skin, self._folder = skin, folder
-        self._told: SimpleQueue[Trains | Film | Failed] = SimpleQueue()
+        self._told: SimpleQueue[TrainsFound | Film | Failed] = SimpleQueue()
         self._leave = threading.Event()
         self.thread = start(self._main, "skin")
 
-    def told(self) -> list[Trains | Film | Failed]:
+    def told(self) -> list[TrainsFound | Film | Failed]:
         """What has come since the last look."""
         found = []
         try:
@@ -87,4 +87,4 @@ class Computing:
     def _trains(self, first: int, count: NDArray[np.int64], time: FloatArray) -> None:
         if self._leave.is_set():
             raise LeftError
-        self._told.put(Trains(first, count, time))
+        self._told.put(TrainsFound(first, count, time))

@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor
 
 from gui.look.fonts import sized
 from gui.look.theme import Theme
-from gui.plots.axis import Line, RoundAxis, guarded, stroke
+from gui.plots.axis import GuardedLine, RoundAxis, guarded, stroke
 from gui.skin.film import pixels
 from tactile_lab.arrays import FloatArray
 from tactile_lab.skin.layout import Array
@@ -19,7 +19,7 @@ FOOT, LEFT, BAR = 38, 56, 62
 """Height and width of the axes, and width of the colour bar, px."""
 
 
-class Picture(pg.ImageItem):  # type: ignore[misc]
+class GuardedImage(pg.ImageItem):  # type: ignore[misc]
     """An image that may fail alone."""
 
     paint = guarded(pg.ImageItem.paint)
@@ -57,7 +57,7 @@ class View(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             axis.setLabel(text, color=tokens.muted, **{"font-size": "12px"})
 
 
-class TaxelMap(View):
+class MapView(View):
     """Every taxel where it lies, coloured by its rate; with the bar of colours.
 
     What is dead has no colour and is crossed out, what is stuck is framed: shapes can
@@ -74,7 +74,7 @@ class TaxelMap(View):
         places, side = array.places, array.side
         self._which, (x, y, wide, high) = pixels(places, side)
         self._blank = (self._which < 0) | array.named(array.dead)[self._which]
-        self.picture = Picture(axisOrder="col-major")
+        self.picture = GuardedImage(axisOrder="col-major")
         self.picture.setColorMap(pg.colormap.get("viridis"))
         self._place = QRectF(MM * x, MM * y, MM * wide, MM * high)
         self.box.addItem(self.picture)
@@ -143,7 +143,7 @@ class Raster(View):
     def __init__(self, theme: Theme, duration: float, taxels: int) -> None:
         super().__init__(theme, "Time (s)", "Taxel", "Raster of the spikes")
         self.dots = pg.ScatterPlotItem(size=3.0, pen=None, pxMode=True)
-        self.now = Line(angle=90)
+        self.now = GuardedLine(angle=90)
         self.now.setVisible(False)
         self.box.addItem(self.dots)
         self.box.addItem(self.now)

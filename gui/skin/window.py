@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QProgressBar, QSlider, QSplitter, QWidget
 
 from gui.look.theme import Theme
 from gui.parts import Combo, Elided, IconButton, column, label, row, say
-from gui.skin.computing import Computing, Failed, Trains
+from gui.skin.computing import Failed, SkinComputation, TrainsFound
 from gui.skin.film import Dots, Film
-from gui.skin.views import Raster, TaxelMap
+from gui.skin.views import MapView, Raster
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count, show
 from tactile_lab.skin.events import FILE, Events
@@ -48,12 +48,12 @@ def open_skin(
     if path.is_dir() or path.suffix == Path(FILE).suffix:
         events = Events.read(path)
         skin = load_skin(events.about["skin"], events.about["name"], folder=path)
-        return SkinWindow(skin, Computing(None, path), theme, parent)
+        return SkinWindow(skin, SkinComputation(None, path), theme, parent)
     from tactile_lab.skin.press import highest
 
     skin = load_skin(path)
     _, warnings = highest(skin)
-    computing = Computing(skin, out / skin.name)
+    computing = SkinComputation(skin, out / skin.name)
     return SkinWindow(skin, computing, theme, parent, warnings)
 
 
@@ -74,7 +74,7 @@ class SkinWindow(QWidget):
     def __init__(
         self,
         skin: Skin,
-        computing: Computing,
+        computing: SkinComputation,
         theme: Theme,
         parent: QWidget | None = None,
         warnings: tuple[str, ...] = (),
@@ -89,7 +89,7 @@ class SkinWindow(QWidget):
         self.film: Film | None = None
         self._dots, self._rates = Dots(), np.full(skin.array.size, np.nan)
         self._at, self._last = 0.0, 0.0
-        self.map = TaxelMap(theme, skin.array)
+        self.map = MapView(theme, skin.array)
         self.raster = Raster(theme, skin.duration, skin.array.size)
         self.play = IconButton(theme, "play", "Play (Space)", checkable=True)
         self.slider = QSlider(Qt.Orientation.Horizontal)
@@ -194,7 +194,7 @@ class SkinWindow(QWidget):
                 self.play.setChecked(False)
             self.show_time(at)
 
-    def _take(self, told: Trains) -> None:
+    def _take(self, told: TrainsFound) -> None:
         taxels = told.first + np.arange(told.count.size)
         self._rates[taxels] = told.count / self._skin.duration
         self._dots.add(told.time, np.repeat(taxels, told.count))

@@ -71,7 +71,7 @@ class _Streaming:
 
 
 @dataclass
-class Part:
+class RingPart:
     """One contiguous part of the ring: what one callback announces."""
 
     start: int
@@ -267,7 +267,7 @@ class SimulatedPicoScope:
             self._streaming.next += samples
             self.dropped += samples
 
-    def read(self) -> tuple[int, Part | None]:
+    def read(self) -> tuple[int, RingPart | None]:
         """The next contiguous part, if there is one."""
         if self._stream_status != pico.OK:
             self._streaming = None
@@ -293,7 +293,7 @@ class SimulatedPicoScope:
         overflow = sum(1 << row for row, o in zip(state.rows, over, strict=True) if o)
         if self._saturated:
             codes, overflow = self._saturate(state, codes, overflow)
-        part = Part(state.place, state.rows, codes, overflow)
+        part = RingPart(state.place, state.rows, codes, overflow)
         state.next += samples
         state.place = (state.place + samples) % state.ring
         return pico.OK, part

@@ -47,7 +47,7 @@ NEEDS = {
 """What the model must keep for a scope channel."""
 
 
-class Drive(Protocol):
+class ForceSource(Protocol):
     """Where the force on the cantilever comes from."""
 
     def force(self, start: float, end: float) -> Waveform:
@@ -101,7 +101,7 @@ class SimulatedSensor:
     def __init__(
         self,
         circuit: Circuit,
-        drive: Drive,
+        drive: ForceSource,
         V_fire: Callable[[int, float, float], float] | None = None,
         warmer: Callable[[float], float] | None = None,
     ) -> None:

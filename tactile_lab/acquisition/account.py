@@ -43,7 +43,7 @@ MOST_LONGER = 3e-3
 """Time by which a list may come too late half-way, s."""
 
 
-class Rate:
+class RunningRate:
     """Instantaneous rate on the fly: 1/ISI of the last two spikes, 0 before the second.
 
     Attributes:
@@ -89,7 +89,7 @@ class Account:
         self._clock = clock
         self._open_journal = open_journal
         self._origin: float | None = None
-        self._rate = Rate()
+        self._rate = RunningRate()
         self._waiting: list[tuple[str, str]] = []
         self.edges: list[Edge] = []
         self._clocks = Clocks()

@@ -1,7 +1,7 @@
 """What a run tells whoever watches it: small immutable events, through one callable.
 
 The command line prints them, the window queues them into its own thread. Samples are
-not events: a watcher polls them from `tactile_lab.acquisition.live.Live`.
+not events: a watcher polls them from `tactile_lab.acquisition.live.LiveBins`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tactile_lab.acquisition.alignment import CLOCK_ERROR
 from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.journal import Journal
-from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Reading
 from tactile_lab.errors import SamplesLostError
@@ -53,7 +53,7 @@ class Intake:
             than two clocks part.
     """
 
-    def __init__(self, live: Live) -> None:
+    def __init__(self, live: LiveBins) -> None:
         self._live = live
         self._row, self._scale = 0, (1.0, 0.0)
         self._journal: Journal | None = None

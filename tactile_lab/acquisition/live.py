@@ -24,7 +24,7 @@ CAPACITY = 1 << 17
 """Bins kept per channel: 131 s at 1 ms."""
 
 
-class Live:
+class LiveBins:
     """The newest bins of each channel."""
 
     def __init__(self) -> None:

@@ -22,7 +22,7 @@ from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instruments import Instruments
 from tactile_lab.acquisition.intake import Intake
 from tactile_lab.acquisition.journal import Journal
-from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.acquisition.person import PLACES
 from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.pump import GRACE, Pump, StopAskedError
@@ -70,7 +70,7 @@ class Runner:
         bench: Bench,
         journal: Callable[[Stream | None], Journal],
         stop: StopRequest,
-        live: Live,
+        live: LiveBins,
         *emits: events.Emit,
     ) -> None:
         self.intake = Intake(live)

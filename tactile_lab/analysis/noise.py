@@ -36,7 +36,7 @@ CLEAR = 6.0
 
 
 @dataclass(frozen=True)
-class Line:
+class MainsLine:
     """A frequency of the mains that stands out of the noise.
 
     Attributes:
@@ -67,7 +67,7 @@ class Noise:
     frequency: FloatArray
     density: FloatArray
     rms: float
-    lines: tuple[Line, ...]
+    lines: tuple[MainsLine, ...]
     seconds: float
     segments: int
     resolution: float
@@ -116,7 +116,7 @@ def noise(values: FloatArray, interval: float) -> Noise:
     )
 
 
-def _lines(frequency: FloatArray, power: FloatArray) -> list[Line]:
+def _lines(frequency: FloatArray, power: FloatArray) -> list[MainsLine]:
     """Lines of the mains: what a line has above the noise on either side of it.
 
     A multiple of both mains, such as 300 Hz, counts to the one whose own lines are
@@ -141,7 +141,7 @@ def _lines(frequency: FloatArray, power: FloatArray) -> list[Line]:
     for shared in set(found[MAINS[0]]) & set(found[MAINS[1]]):
         del found[MAINS[1] if one > other else MAINS[0]][shared]
     return [
-        Line(mains, at, float(np.sqrt(above)))
+        MainsLine(mains, at, float(np.sqrt(above)))
         for mains, lines in found.items()
         for at, above in lines.items()
     ]

@@ -29,7 +29,7 @@ def command(key: str, root: Path, where: str, out: Path | None, as_json: bool) -
     whether it drifts, and mean and standard error of each sensor.
     """
     with refusing():
-        from tactile_lab.report.over_runs import OverRuns, Point
+        from tactile_lab.report.over_runs import OverRuns, RunValue
         from tactile_lab.store.catalogue import Catalogue
 
         points, unit = [], ""
@@ -42,7 +42,7 @@ def command(key: str, root: Path, where: str, out: Path | None, as_json: bool) -
             if numbers and entry.started:
                 unit = told[0].unit or unit
                 points.append(
-                    Point(
+                    RunValue(
                         entry.name,
                         datetime.fromisoformat(entry.started),
                         entry.sensor,

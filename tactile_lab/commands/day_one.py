@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactile_lab.commands.attended import INTERRUPTED, Signals
-from tactile_lab.commands.day_steps import STEPS, Step, levels
+from tactile_lab.commands.day_steps import STEPS, FirstDayStep, levels
 from tactile_lab.commands.one_run import finished, prepared, tell_of
 from tactile_lab.commands.options import noted, notes_option
 from tactile_lab.commands.terminal import fail, refusing, say, somebody, warn
@@ -151,7 +151,7 @@ class Day:
 
         return load_bench(self.bench).simulated
 
-    def load(self, step: Step, changes: tuple[str, ...]) -> Any:
+    def load(self, step: FirstDayStep, changes: tuple[str, ...]) -> Any:
         """The scene of a step on the bench as it is known now.
 
         Raises:
@@ -161,17 +161,17 @@ class Day:
 
         return load(step.name, changes, self.bench)
 
-    def words(self, step: Step) -> tuple[str, ...]:
+    def words(self, step: FirstDayStep) -> tuple[str, ...]:
         """What a verb is told beside its name."""
         return ("--bench", self.bench) if step.name == "doctor" else ()
 
-    def did(self, step: Step, printed: str, wrong: str) -> None:
+    def did(self, step: FirstDayStep, printed: str, wrong: str) -> None:
         """A verb was called; what it printed is for a person to judge."""
         said = [wrong] if wrong else []
         self.done[step.name] = {"at": _now(), "said": said, "printed": printed}
         self._keep()
 
-    def ran(self, step: Step, done: Executed, changed: tuple[str, ...]) -> str:
+    def ran(self, step: FirstDayStep, done: Executed, changed: tuple[str, ...]) -> str:
         """A scene was run, so changed: what is wrong with it, "" if nothing."""
         self.code = done.exit_code
         if done.exit_code:

@@ -38,7 +38,7 @@ def _fired(results: Results) -> str:
 
 
 @dataclass(frozen=True)
-class Step:
+class FirstDayStep:
     """One step of the first day.
 
     Attributes:
@@ -59,20 +59,20 @@ class Step:
 
 
 STEPS = (
-    Step(
+    FirstDayStep(
         "doctor",
         "Can this computer run an experiment?",
         "no problems; notes matter only for instruments you do not have.",
         "do what stands after `remedy`, then go on.",
     ),
-    Step(
+    FirstDayStep(
         "devices",
         "What is attached?",
         "each of your instruments, with the row or driver that fits it.",
         "check power and cable. An instrument without a row needs one "
         "(docs/how-to/add-a-dialect.md); on the simulated bench nothing need be here.",
     ),
-    Step(
+    FirstDayStep(
         "wiring_check",
         "Is each channel what the bench file says?",
         '"as wired" after each channel.',
@@ -80,7 +80,7 @@ STEPS = (
         "cable, or the channel in the bench file.",
         wrong=_wired,
     ),
-    Step(
+    FirstDayStep(
         "calibrate_field",
         "What field does the coil give?",
         "a slope near that of the bench file, a loop of a few mT, little drift.",
@@ -89,7 +89,7 @@ STEPS = (
         before="Take the NdFeB magnet away and put the probe on the core's axis.",
         wrong=_calibrated,
     ),
-    Step(
+    FirstDayStep(
         "force_check",
         "Is the force what Eq. (2) says?",
         "the forces asked for, within their uncertainty. With a balance under the "
@@ -100,7 +100,7 @@ STEPS = (
         before="Put the magnet back; without the sensor, or over a balance.",
         wrong=_forced,
     ),
-    Step(
+    FirstDayStep(
         "threshold_search",
         "Where does the sensor begin to fire?",
         "a critical force between two that were played.",
@@ -109,7 +109,7 @@ STEPS = (
         before="Put the sensor in its place.",
         wrong=_onset,
     ),
-    Step(
+    FirstDayStep(
         "demo",
         "Does it adapt?",
         "spikes that grow with the force and slow down within a hold.",

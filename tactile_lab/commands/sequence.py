@@ -44,7 +44,7 @@ LOOK_EVERY = 0.2
 
 
 @dataclass(frozen=True)
-class Step:
+class SequenceRun:
     """One run of a sequence.
 
     Attributes:
@@ -163,7 +163,7 @@ def command(
     raise click.exceptions.Exit(code)
 
 
-def _asked(scenes: tuple[str, ...], bench: str | None) -> list[Step]:
+def _asked(scenes: tuple[str, ...], bench: str | None) -> list[SequenceRun]:
     """What the arguments name.
 
     Raises:
@@ -175,13 +175,13 @@ def _asked(scenes: tuple[str, ...], bench: str | None) -> list[Step]:
     return steps
 
 
-def _named(name: str, bench: str | None) -> Iterator[Step]:
+def _named(name: str, bench: str | None) -> Iterator[SequenceRun]:
     from tactile_lab.scene.load import read_toml
 
     path = Path(name)
     held = read_toml(path, "Sequence") if path.suffix == ".toml" else {}
     if "run" not in held:
-        yield Step(str(path.resolve()) if path.is_file() else name, {}, bench)
+        yield SequenceRun(str(path.resolve()) if path.is_file() else name, {}, bench)
         return
     known = ("scene", "set", "bench", "times")
     runs = held["run"]
@@ -203,10 +203,10 @@ def _named(name: str, bench: str | None) -> Iterator[Step]:
         file = str(beside.resolve()) if beside.is_file() else scene
         if own is not None and own != "sim":
             own = str((path.parent / str(own)).resolve())
-        yield from [Step(file, changes, own)] * times
+        yield from [SequenceRun(file, changes, own)] * times
 
 
-def _resumed(state: Path, scenes: tuple[str, ...]) -> list[Step]:
+def _resumed(state: Path, scenes: tuple[str, ...]) -> list[SequenceRun]:
     """The sequence that was begun in that folder.
 
     Raises:
@@ -216,7 +216,7 @@ def _resumed(state: Path, scenes: tuple[str, ...]) -> list[Step]:
         raise SceneError(f"--resume goes on with {state}; leave the scenes out.")
     try:
         held = json.loads(state.read_text(encoding="utf-8"))
-        return [Step(**one) for one in held["runs"]]
+        return [SequenceRun(**one) for one in held["runs"]]
     except FileNotFoundError as reason:
         raise SceneError(
             f"{state} does not exist: no sequence was begun in {state.parent}. Name "
@@ -237,7 +237,7 @@ def _refuse_to_forget(state: Path) -> None:
         )
 
 
-def _plan_all(steps: list[Step]) -> None:
+def _plan_all(steps: list[SequenceRun]) -> None:
     """Refuse before anything is opened what any of them would be refused for."""
     from tactile_lab.planning.plan import plan
 
@@ -253,7 +253,7 @@ def _plan_all(steps: list[Step]) -> None:
     say(f"{len(steps)} runs, {whole:.4g} s of experiment to do", sys.stderr)
 
 
-def _keep(state: Path, steps: list[Step]) -> None:
+def _keep(state: Path, steps: list[SequenceRun]) -> None:
     from tactile_lab.store.folder import write_json
 
     state.parent.mkdir(parents=True, exist_ok=True)
@@ -295,7 +295,7 @@ def _wait(start: datetime, signals: Signals) -> None:
         line.close()
 
 
-def _summary(steps: list[Step], state: Path) -> None:
+def _summary(steps: list[SequenceRun], state: Path) -> None:
     say()
     for number, step in enumerate(steps, 1):
         say(f"{number:3}  {step.status or 'not begun':<10} {step.scene}  {step.run}")

@@ -23,7 +23,7 @@ from tactile_lab.commands.terminal import (
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
     from tactile_lab.engine.execution import Execution
-    from tactile_lab.studies.carry_out import Forecast, Progress
+    from tactile_lab.studies.carry_out import Forecast, StudyProgress
     from tactile_lab.studies.study import Study
 
 UNSAFE = 4
@@ -111,7 +111,7 @@ def carry_out_attended(
         line = stack.enter_context(ProgressLine(study.design.size, study.name))
         signals = stack.enter_context(Signals()) if study.on == "bench" else None
 
-        def tell(progress: Progress) -> None:
+        def tell(progress: StudyProgress) -> None:
             line.update(progress.done, _now(progress))
 
         def play(execution: Execution) -> Executed:
@@ -157,7 +157,7 @@ def _say_all(text: str, folder: Path, report: Path) -> None:
     say(f"report  {report}")
 
 
-def _now(progress: Progress) -> str:
+def _now(progress: StudyProgress) -> str:
     parts = [f"{progress.done:,} of {progress.total:,} points"]
     if progress.there:
         parts.append(f"{progress.there:,} known before")

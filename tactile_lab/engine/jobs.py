@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from tactile_lab.scene.scene import Scene
     from tactile_lab.scope import Scope
     from tactile_lab.store.spike_shapes import SpikeShapes
-    from tactile_lab.store.statistics import Statistics
+    from tactile_lab.store.statistics import SignalStatistics
     from tactile_lab.voltage_source import VoltageSource
 
     Instrument = Coil | Scope | Meter | VoltageSource
@@ -285,7 +285,7 @@ def shapes_of_run(engine: Engine, folder: Path, times: FloatArray) -> SpikeShape
 
 def statistics_of_run(
     engine: Engine, folder: Path, start: float, end: float
-) -> dict[str, Statistics]:
+) -> dict[str, SignalStatistics]:
     """Statistics of each stored signal from `start` to `end` s of a run, by name.
 
     Raises:

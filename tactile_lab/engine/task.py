@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import CoilState, Ending
-from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.bench import Bench
 from tactile_lab.scene.scene import Scene
@@ -35,7 +35,7 @@ class Task(ABC, Generic[Ended]):
     def __init__(self, scene: Scene, bench: Bench, emit: events.Emit) -> None:
         self.scene, self.bench = scene, bench
         self.stop = StopRequest(bench.clock)
-        self.live = Live()
+        self.live = LiveBins()
         self._emit = emit
 
     @abstractmethod

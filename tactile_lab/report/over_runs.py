@@ -28,7 +28,7 @@ DAY = 86400.0
 
 
 @dataclass(frozen=True)
-class Point:
+class RunValue:
     """One number of one run.
 
     Attributes:
@@ -59,11 +59,11 @@ class OverRuns:
 
     key: str
     unit: str
-    points: tuple[Point, ...]
+    points: tuple[RunValue, ...]
     chart: ControlChart | None
 
     @classmethod
-    def of(cls, key: str, unit: str, points: Sequence[Point]) -> OverRuns:
+    def of(cls, key: str, unit: str, points: Sequence[RunValue]) -> OverRuns:
         """The points in order of time, and their chart.
 
         Raises:

@@ -32,7 +32,7 @@ AHEAD = 4
 """Blocks for each core that may be under way."""
 
 
-class Solved(NamedTuple):
+class SolvedBlock(NamedTuple):
     """What became of a block.
 
     Attributes:
@@ -55,7 +55,7 @@ class Solved(NamedTuple):
 def solve_block(
     loads: Loads, part: slice, role: NDArray[np.uint8], span: FloatArray,
     framed: FloatArray | None = None,
-) -> Solved:  # fmt: skip
+) -> SolvedBlock:  # fmt: skip
     """Solve those of a block that are not left out yet.
 
     Args:
@@ -72,7 +72,7 @@ def solve_block(
     count, pieces = np.zeros(role.size, np.int64), np.zeros(role.size, np.int64)
     force, error = np.full(role.size, np.nan), np.zeros(role.size)
     if not asked.size:
-        return Solved(role, count, pieces, force, error, np.empty(0))
+        return SolvedBlock(role, count, pieces, force, error, np.empty(0))
     taxels = part.start + asked
     first = skin.first_specimen
     many = (
@@ -90,7 +90,7 @@ def solve_block(
         skin, loads, many, skin.array.places[taxels], framed, became, span[asked]
     )
     role[asked] = became
-    return Solved(role, count, pieces, force, error, times)
+    return SolvedBlock(role, count, pieces, force, error, times)
 
 
 def solved(
@@ -116,7 +116,7 @@ def solved_blocks(
     span: FloatArray,
     cores: int | None,
     scheduler: str | None,
-) -> Iterator[tuple[slice, Solved]]:
+) -> Iterator[tuple[slice, SolvedBlock]]:
     """All taxels of a skin, block by block in the order of their numbers.
 
     Args:
@@ -130,7 +130,7 @@ def solved_blocks(
         SolverError: a taxel cannot be solved to the tolerance.
         LinkLostError: the workers of the scheduler are gone.
     """
-    waiting: deque[tuple[slice, Future[Solved]]] = deque()
+    waiting: deque[tuple[slice, Future[SolvedBlock]]] = deque()
     left_out = role == kernel.UNTOUCHED
     with _workers(loads, cores, scheduler) as workers:
         blocks = _parts(left_out, workers.block)
@@ -140,7 +140,7 @@ def solved_blocks(
                     part = blocks.popleft()
                     asked = (part, role[part], span[part])
                     if left_out[part].all():  # not worth sending
-                        future: Future[Solved] = Future()
+                        future: Future[SolvedBlock] = Future()
                         future.set_result(solve_block(loads, *asked))
                     else:
                         future = workers.submit(*asked)
@@ -175,7 +175,7 @@ def _parts(left_out: NDArray[np.bool_], block: int) -> deque[slice]:
 class _Workers(NamedTuple):
     """Whom blocks are submitted to, how many they are, and taxels of a block."""
 
-    submit: Callable[..., Future[Solved]]
+    submit: Callable[..., Future[SolvedBlock]]
     threads: int
     block: int
 
@@ -219,7 +219,7 @@ def _loads(given: bytes) -> Loads:
     return found
 
 
-def _on_worker(given: bytes, *block: Any) -> Solved:
+def _on_worker(given: bytes, *block: Any) -> SolvedBlock:
     return solve_block(_loads(given), *block)
 
 

@@ -16,7 +16,14 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.skin.contact import COLUMNS, KIND, SHAPE_1, SHAPE_2, SPHERE, STRIP
 from tactile_lab.skin.skin import Skin
-from tactile_lab.skin.track import KEPT, Series, slot_of, stress_of, summed, track_of
+from tactile_lab.skin.track import (
+    KEPT,
+    TrackSeries,
+    slot_of,
+    stress_of,
+    summed,
+    track_of,
+)
 
 SOURCES = tuple(
     Path(__file__).with_name(f"{n}.py") for n in ("contact", "track", "forces")
@@ -60,7 +67,7 @@ class Pressing(NamedTuple):
     courses: FloatArray
     coarse: FloatArray
     slides: Any
-    series: Series
+    series: TrackSeries
 
 
 @inner
@@ -370,7 +377,7 @@ class Loads:
         """For this thread."""
         if not hasattr(self._own, "series"):
             shared = np.any(self._given[3][:, HOW] == SHARED)
-            self._own.series = Series.none(KEPT if shared else 1)
+            self._own.series = TrackSeries.none(KEPT if shared else 1)
         return Pressing(*self._given, self._own.series)
 
     def _slides(self, courses: FloatArray) -> NDArray[np.int64]:

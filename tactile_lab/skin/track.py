@@ -35,7 +35,7 @@ POWERS = POWERS @ np.stack(_of_chebyshev)
 """From values at these points to factors of the powers of x."""
 
 
-class Series(NamedTuple):
+class TrackSeries(NamedTuple):
     """Stretches in the memory of one thread, each where its own key says.
 
     Attributes:
@@ -50,7 +50,7 @@ class Series(NamedTuple):
     bend: FloatArray
 
     @classmethod
-    def none(cls, room: int = KEPT) -> Series:
+    def none(cls, room: int = KEPT) -> TrackSeries:
         """None yet; room for a power of two of them."""
         return cls(np.full((room, 3), np.nan), np.empty((room, NODES)), np.empty(room))
 

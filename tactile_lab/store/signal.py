@@ -24,7 +24,7 @@ ROWS = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class TimeAxis:
     """Where stored samples lie in time: stretches without a gap.
 
     Attributes:
@@ -93,7 +93,7 @@ class StoredSignal:
         samples: h5py.Dataset,
         pyramid: h5py.Dataset,
         length: int,
-        axis: Axis,
+        axis: TimeAxis,
     ) -> None:
         self.name = name
         self.unit = str(samples.attrs["unit"])

@@ -15,7 +15,7 @@ MOST = 100_000_000
 
 
 @dataclass(frozen=True)
-class Statistics:
+class SignalStatistics:
     """Of every sample in a stretch of time, in the signal's SI unit.
 
     Attributes:
@@ -37,7 +37,7 @@ class Statistics:
         return math.hypot(self.mean, self.deviation)
 
 
-def statistics(signal: StoredSignal, start: float, end: float) -> Statistics:
+def statistics(signal: StoredSignal, start: float, end: float) -> SignalStatistics:
     """Over the samples with `start` <= time < `end`, s on the run's axis.
 
     Sums are of the stored integers and so without rounding.
@@ -62,7 +62,7 @@ def statistics(signal: StoredSignal, start: float, end: float) -> Statistics:
     ends = sorted((gain * low + offset, gain * high + offset))
     # of integers: exact, where a difference of two floats would lose what is small
     variance = (count * squares - total * total) / count**2
-    return Statistics(
+    return SignalStatistics(
         low=ends[0],
         high=ends[1],
         mean=gain * total / count + offset,

@@ -27,7 +27,7 @@ from tactile_lab.store.applied import (
 from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import DATA, SCENE, is_live, read_info
 from tactile_lab.store.layout import NEWER, RECORDS
-from tactile_lab.store.signal import Axis, StoredSignal
+from tactile_lab.store.signal import StoredSignal, TimeAxis
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
@@ -181,10 +181,10 @@ class StoredRun:
         return self.axis.time_of(np.array(joined))
 
     @property
-    def axis(self) -> Axis:
+    def axis(self) -> TimeAxis:
         """Where stored samples lie in time."""
         rows = self.records("segments")
-        return Axis(
+        return TimeAxis(
             rows["first"].copy(),
             rows["time"].copy(),
             rows["interval"] * (1.0 + rows["drift"]),

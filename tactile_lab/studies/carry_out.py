@@ -18,8 +18,8 @@ from tactile_lab.planning.plan import plan
 from tactile_lab.store.folder import lock
 from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
-from tactile_lab.studies.live import LOCK, Live
-from tactile_lab.studies.points import RUNS, Points, Task
+from tactile_lab.studies.live import LOCK, LiveStudy
+from tactile_lab.studies.points import RUNS, Points, PointTask
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
 from tactile_lab.studies.workers import Alone, Finished, Workers, workers
@@ -41,7 +41,7 @@ PATIENCE = 2.0
 
 
 @dataclass(frozen=True)
-class Progress:
+class StudyProgress:
     """How far a study is.
 
     Attributes:
@@ -114,7 +114,7 @@ def carry_out(
     *,
     count: int | None = None,
     scheduler: str | None = None,
-    tell: Callable[[Progress], None] = lambda progress: None,
+    tell: Callable[[StudyProgress], None] = lambda progress: None,
     play: Callable[[Execution], Executed] | None = None,
 ) -> Gathered:
     """Compute all points that are missing, and write the data set.
@@ -170,21 +170,21 @@ def _carried_out(
     out: Path,
     count: int | None,
     scheduler: str | None,
-    tell: Callable[[Progress], None],
+    tell: Callable[[StudyProgress], None],
 ) -> Gathered:
     shelf, named = Shelf(out / SHELF), addresses(study)
     missing = _missing(study, named, shelf)
     done, failed = study.design.size - missing.size, 0
     there = done
     if missing.size:
-        live = Live(study, shelf, named, out / study.name)
+        live = LiveStudy(study, shelf, named, out / study.name)
         with workers(study, points, shelf, count, scheduler) as crew:
             pace = _Pace(crew.count)
-            tell(Progress(done, study.design.size, there, failed, crew.count))
+            tell(StudyProgress(done, study.design.size, there, failed, crew.count))
             for one in _batches(study, missing, named, points, shelf, crew, pace):
                 pace.tell(one.points)
                 done, failed = done + one.points, failed + one.failed
-                tell(Progress(done, study.design.size, there, failed, crew.count))
+                tell(StudyProgress(done, study.design.size, there, failed, crew.count))
                 live.tell(done, failed)
         live.end()
     found = gathered(study, shelf, shelf.find(named))
@@ -247,7 +247,7 @@ def _tasks(
     missing: NDArray[np.intp],
     named: NDArray[np.void],
     pace: _Pace,
-) -> Iterator[Task]:
+) -> Iterator[PointTask]:
     at = 0
     while at < missing.size:
         numbers = missing[at : at + (1 if study.on == "bench" else pace.points())]
@@ -255,9 +255,11 @@ def _tasks(
         yield _task(study, named, numbers)
 
 
-def _task(study: Study, named: NDArray[np.void], numbers: NDArray[np.intp]) -> Task:
+def _task(
+    study: Study, named: NDArray[np.void], numbers: NDArray[np.intp]
+) -> PointTask:
     design = study.design
-    return Task(named[numbers], design.columns(numbers), design.repeats(numbers))
+    return PointTask(named[numbers], design.columns(numbers), design.repeats(numbers))
 
 
 class _Pace:

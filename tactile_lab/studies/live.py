@@ -38,7 +38,7 @@ SHARE = 20
 """Looking takes at most one part in so many of the time."""
 
 
-class Live:
+class LiveStudy:
     """Writes what is known of a study that is computed.
 
     Args:

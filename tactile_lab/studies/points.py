@@ -41,7 +41,7 @@ SCENES = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class PointTask:
     """Some points to compute.
 
     Attributes:
@@ -82,7 +82,7 @@ class Points:
         self._axes = Axes(study.design.axes, study.scene)
         self._with = lru_cache(SCENES)(self._scene_and_force)
 
-    def batch(self, task: Task) -> Batch:
+    def batch(self, task: PointTask) -> Batch:
         """What is kept of the points of a task; one that fails keeps its reason.
 
         Raises:

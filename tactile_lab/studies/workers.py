@@ -26,7 +26,7 @@ from typing import NamedTuple, Protocol
 
 from tactile_lab.engine.cluster import cluster
 from tactile_lab.errors import LinkLostError, SceneError
-from tactile_lab.studies.points import Points, Task
+from tactile_lab.studies.points import Points, PointTask
 from tactile_lab.studies.shelf import Batch, Shelf, put
 from tactile_lab.studies.study import Study
 
@@ -59,7 +59,7 @@ class Workers(Protocol):
 
     count: int
 
-    def batches(self, tasks: Iterable[Task]) -> Iterator[Finished]:
+    def batches(self, tasks: Iterable[PointTask]) -> Iterator[Finished]:
         """Each task's batch once it is on the shelf, in any order.
 
         Tasks are taken as they are needed.
@@ -79,7 +79,7 @@ class Alone:
     def __init__(self, points: Points, shelf: Shelf) -> None:
         self._points, self._shelf = points, shelf
 
-    def batches(self, tasks: Iterable[Task]) -> Iterator[Finished]:
+    def batches(self, tasks: Iterable[PointTask]) -> Iterator[Finished]:
         """In the order of the tasks."""
         for task in tasks:
             yield _shelved(self._points.batch(task), task, self._shelf)
@@ -120,14 +120,14 @@ class Pool:
             *lost,
         )
 
-    def batches(self, tasks: Iterable[Task]) -> Iterator[Finished]:
+    def batches(self, tasks: Iterable[PointTask]) -> Iterator[Finished]:
         """As they are finished; a worker that is ended is replaced.
 
         Raises:
             LinkLostError: workers are gone, or end again and again.
         """
-        coming, waiting = iter(tasks), deque[Task]()
-        running: dict[Future[Batch | Stored], Task] = {}
+        coming, waiting = iter(tasks), deque[PointTask]()
+        running: dict[Future[Batch | Stored], PointTask] = {}
         executor, ended = self._start(), 0
         try:
             while True:
@@ -168,7 +168,7 @@ class Pool:
             executor.shutdown(wait=False)
 
 
-def _shelved(found: Batch | Stored, task: Task, shelf: Shelf) -> Finished:
+def _shelved(found: Batch | Stored, task: PointTask, shelf: Shelf) -> Finished:
     """The points of a task are on the shelf when this returns."""
     if isinstance(found, Batch):
         found = Stored(put(found, shelf.folder), len(found.reasons))
@@ -248,7 +248,7 @@ def _points(study: bytes) -> Points:
     return Points(*pickle.loads(study))
 
 
-def _on_worker(study: bytes, task: Task, into: Path | None) -> Batch | Stored:
+def _on_worker(study: bytes, task: PointTask, into: Path | None) -> Batch | Stored:
     """The batch of a task, or its file where there is a folder to put it into."""
     batch = _points(study).batch(task)
     return Stored(put(batch, into), len(batch.reasons)) if into else batch

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactile_lab.acquisition.live import CAPACITY, Live
+from tactile_lab.acquisition.live import CAPACITY, LiveBins
 from tactile_lab.scope import Block, Channel, Stream
 
 CHANNELS = (
@@ -42,7 +42,7 @@ def noise(samples, seed=1):
 @given(st.lists(st.integers(0, 3000), max_size=12))
 def test_bins_do_not_depend_on_block_edges(cuts):
     codes = noise(3000)
-    whole, sliced = Live(), Live()
+    whole, sliced = LiveBins(), LiveBins()
     for live, edges in ((whole, ()), (sliced, cuts)):
         live.begin(stream(), 0.5)
         fill(live, codes, edges)
@@ -53,7 +53,7 @@ def test_bins_do_not_depend_on_block_edges(cuts):
 
 
 def test_one_sample_shows_in_its_bin_in_the_signals_unit():
-    live = Live()
+    live = LiveBins()
     live.begin(stream(), 2.0)
     codes = np.zeros((2, 100), np.int16)
     codes[1, 57] = 32512
@@ -67,7 +67,7 @@ def test_one_sample_shows_in_its_bin_in_the_signals_unit():
 
 
 def test_a_slow_reader_gets_the_newest_bins():
-    live = Live()
+    live = LiveBins()
     live.begin(stream(interval=1e-3), 0.0)
     for first in range(0, CAPACITY + 500, 1000):
         live.add(Block(first, np.zeros((2, 1000), np.int16), (False, False), 0.0))
@@ -77,7 +77,7 @@ def test_a_slow_reader_gets_the_newest_bins():
 
 
 def test_part_of_the_record_is_found_by_time():
-    live = Live()
+    live = LiveBins()
     live.begin(stream(), 0.0)
     fill(live, noise(5000))
     part = live.between(0.1, 0.2, "V_C1")
@@ -86,7 +86,7 @@ def test_part_of_the_record_is_found_by_time():
 
 
 def test_an_unmeasured_signal_is_no_silent_zero():
-    live = Live()
+    live = LiveBins()
     live.begin(stream(), 0.0)
     with pytest.raises(KeyError):
         live.since(0, "V_C2")

@@ -22,7 +22,7 @@ from tactile_lab.planning.timeline import timeline
 from tactile_lab.studies.addresses import addresses
 from tactile_lab.studies.answers import conclude
 from tactile_lab.studies.carry_out import carry_out
-from tactile_lab.studies.points import Points, Task
+from tactile_lab.studies.points import Points, PointTask
 from tactile_lab.studies.study import Study, load_study
 
 SHIFTS = 41
@@ -120,9 +120,9 @@ def scale() -> str:
     points, design = Points(study), study.design
     few = np.arange(100)
 
-    def task(numbers: np.ndarray, named: np.ndarray) -> Task:
+    def task(numbers: np.ndarray, named: np.ndarray) -> PointTask:
         columns = design.columns(numbers)
-        return Task(named[numbers], columns, design.repeats(numbers))
+        return PointTask(named[numbers], columns, design.repeats(numbers))
 
     began = time.process_time()
     named = addresses(study)

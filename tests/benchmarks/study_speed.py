@@ -29,8 +29,8 @@ from scipy.integrate import solve_ivp
 from tactile_lab import Circuit
 from tactile_lab.model.equations import I_C, V_C1_slope, rest_point
 from tactile_lab.studies.addresses import addresses
-from tactile_lab.studies.carry_out import Progress, carry_out
-from tactile_lab.studies.points import Points, Task
+from tactile_lab.studies.carry_out import StudyProgress, carry_out
+from tactile_lab.studies.points import Points, PointTask
 from tactile_lab.studies.study import Study, load_study
 
 WORKERS = 2
@@ -106,7 +106,7 @@ def carried_out(study: Study, cluster: bool) -> Measured:
             )
             with context as scheduler:
                 address = scheduler and scheduler.scheduler_address
-                told: list[tuple[float, Progress]] = []
+                told: list[tuple[float, StudyProgress]] = []
                 began = time.perf_counter()
                 carry_out(
                     study,
@@ -136,7 +136,7 @@ def kernel_time(study: Study) -> float:
     points = Points(study)
     design = study.design
     some = np.arange(min(SAMPLE, design.size))
-    task = Task(addresses(study)[some], design.columns(some), design.repeats(some))
+    task = PointTask(addresses(study)[some], design.columns(some), design.repeats(some))
     (group,) = points._axes.groups(task.columns, some.size)
     scene, drive = points._with(group.others)
     from tactile_lab.model.batch import records
@@ -193,7 +193,7 @@ def plain_rate(study: Study) -> tuple[float, bool]:
         began = time.perf_counter()
         counts = pool.starmap(plainly, parts, chunksize=1)
         wall = time.perf_counter() - began
-    task = Task(
+    task = PointTask(
         addresses(study)[:PLAIN],
         design.columns(np.arange(PLAIN)),
         design.repeats(np.arange(PLAIN)),

@@ -31,7 +31,7 @@ from sim_backend.picoscope.scope import Make
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.acquisition.intake import Intake
-from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import TactileLabError
@@ -82,7 +82,7 @@ def one(rate: float, seconds: float, root: Path) -> str:
     thread.start()
     clock.wait_for(lambda: thread.settled)
     thread.raise_failure()
-    live = Live()
+    live = LiveBins()
     intake = Intake(live)
     detector = detector_of(DETECTION)
     detector.feed(0, np.zeros(10, np.int16))  # compile or load before samples come

@@ -34,7 +34,7 @@ from gui.session.session import Session
 from gui.state import WindowState
 from gui.window import Window
 from tactile_lab.acquisition.ending import CoilState
-from tactile_lab.acquisition.live import Live
+from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.engine.events import Samples, TaskEvent
 from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.trace import Trace
@@ -133,7 +133,7 @@ def emulated(
     tell: Callable[[TaskEvent], None], seconds: float, rate: float = 7.8125e6
 ) -> threading.Thread:
     """Decimate four channels at `rate` as the runner does, in this very process."""
-    live = Live()
+    live = LiveBins()
     channels = tuple(Channel(signal=s, input=s, range=5.0) for s in SIGNALS)
     stream = Stream(
         channels=channels, interval=1 / rate, full_scale=32512, shift=8,

@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 from shiboken6 import isValid
 
-from gui.skin.computing import Computing
+from gui.skin.computing import SkinComputation
 from gui.skin.film import DOTS, Dots, pixels
 from gui.skin.window import open_skin
 from tactile_lab.commands.skin import command
@@ -54,7 +54,7 @@ def shown(lab, path, folder):
 
 def test_trains_come_while_it_is_computed_and_are_played_after(lab, folder, events):
     skin = load_skin(folder / "ball.toml")
-    computing = Computing(skin, folder / "again")
+    computing = SkinComputation(skin, folder / "again")
     computing.thread.join()
     told = computing.told()
     assert [type(one).__name__ for one in told] == ["Trains", "Film"]
@@ -153,7 +153,7 @@ def test_the_verb_that_cannot_show_it_ends_with_2(lab, tmp_path):
 
 def test_closing_the_window_ends_the_computing(folder, tmp_path):
     skin = load_skin(folder / "ball.toml")
-    computing = Computing(skin, tmp_path / "left")
+    computing = SkinComputation(skin, tmp_path / "left")
     computing.leave()
     computing.thread.join()
     told = [type(one).__name__ for one in computing.told()]

@@ -11,7 +11,7 @@ from gui.dialogs.studies import StudiesCard
 from gui.look.theme import Theme
 from tactile_lab.errors import RunFolderError
 from tactile_lab.scene.load import load
-from tactile_lab.studies.carry_out import Progress, carry_out
+from tactile_lab.studies.carry_out import StudyProgress, carry_out
 from tactile_lab.studies.live import look_at, studies_in
 from tactile_lab.studies.page import write_page
 from tactile_lab.studies.study import load_study
@@ -34,7 +34,7 @@ def test_figures_come_with_the_points_and_stay(lab, tmp_path: Path) -> None:
     assert "No studies yet" in card.text.text()
     seen: list[str] = []
 
-    def tell(progress: Progress) -> None:
+    def tell(progress: StudyProgress) -> None:
         card.refresh()
         if card.choice.count():
             seen.append(f"{card.state.text()}: {card.text.text()}")
@@ -112,7 +112,7 @@ def test_one_that_was_killed_says_how_to_go_on(tmp_path: Path) -> None:
     class KilledError(Exception):
         pass
 
-    def tell(progress: Progress) -> None:
+    def tell(progress: StudyProgress) -> None:
         if progress.done > 1:
             raise KilledError
 

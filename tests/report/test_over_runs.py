@@ -10,14 +10,14 @@ from click.testing import CliRunner
 from tactile_lab.analysis.control_chart import control_chart
 from tactile_lab.cli import cli
 from tactile_lab.errors import ParameterError
-from tactile_lab.report.over_runs import OverRuns, Point
+from tactile_lab.report.over_runs import OverRuns, RunValue
 from tactile_lab.store.folder import RunFolder, write_json
 
 
 def points(values, sensors="A"):
     begun = datetime(2026, 1, 1, tzinfo=UTC)
     return [
-        Point(
+        RunValue(
             f"run{i:02d}", begun + timedelta(days=i), sensors[i % len(sensors)], v, True
         )
         for i, v in enumerate(values)

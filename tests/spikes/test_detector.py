@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tactile_lab.acquisition.account import Rate
+from tactile_lab.acquisition.account import RunningRate
 from tactile_lab.errors import ParameterError
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.detector import (
@@ -182,7 +182,7 @@ def test_noise_around_one_code_is_measured_not_rounded(sigma):
 
 
 def test_rate_is_carried_from_block_to_block():
-    rate = Rate()
+    rate = RunningRate()
     times = np.array([1.0, 1.5, 1.6, 3.6])
     parts = [rate.feed(times[:1]), rate.feed(times[1:1]), rate.feed(times[1:])]
     np.testing.assert_allclose(np.concatenate(parts), [0, 2, 10, 0.5])

@@ -19,7 +19,7 @@ from tactile_lab.errors import (
 )
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
-from tactile_lab.studies.carry_out import Progress, carry_out, forecast
+from tactile_lab.studies.carry_out import StudyProgress, carry_out, forecast
 from tactile_lab.studies.live import look_at
 from tactile_lab.studies.page import write_page
 from tactile_lab.studies.study import load_study
@@ -87,7 +87,7 @@ def test_points_are_shared_whichever_key_varies(tmp_path: Path) -> None:
 def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
     asked = load_study(LEVELS)
 
-    def stop(progress: Progress) -> None:
+    def stop(progress: StudyProgress) -> None:
         if progress.done >= 3:
             raise KeyboardInterrupt
 
@@ -208,7 +208,7 @@ def test_two_at_once_are_told_of_each_other(tmp_path: Path, monkeypatch) -> None
     monkeypatch.setattr("tactile_lab.studies.carry_out.PATIENCE", 0.01)
     asked, told = load_study(SHORT), []
 
-    def tell(progress: Progress) -> None:
+    def tell(progress: StudyProgress) -> None:
         with pytest.raises(RecordingError, match="Another process carries out"):
             carry_out(asked, tmp_path, count=1)
         told.append(progress)

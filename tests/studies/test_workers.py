@@ -18,7 +18,7 @@ from short_studies import LEVELS, done, same
 from tactile_lab.engine import cluster
 from tactile_lab.engine.cluster import _check_versions, code_digests
 from tactile_lab.errors import LinkLostError, NotFoundError, SceneError
-from tactile_lab.studies.carry_out import Progress, carry_out
+from tactile_lab.studies.carry_out import StudyProgress, carry_out
 from tactile_lab.studies.study import load_study
 
 
@@ -126,7 +126,7 @@ def test_a_worker_that_is_killed_is_replaced(tmp_path: Path) -> None:
     asked = load_study({**LEVELS, "keep": {"n": "result.spike_times.size"}})
     hit = []
 
-    def tell(progress: Progress) -> None:
+    def tell(progress: StudyProgress) -> None:
         if not hit and progress.done > 1:
             hit.append(multiprocessing.active_children()[0].pid)
             os.kill(hit[0], signal.SIGKILL)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tactile_lab.studies.carry_out import Progress, carry_out
+from tactile_lab.studies.carry_out import StudyProgress, carry_out
 from tactile_lab.studies.dataset import Gathered
 from tactile_lab.studies.study import Study
 
@@ -27,8 +27,8 @@ LEVELS = {
 }
 
 
-def done(asked: Study, out: Path, **how) -> tuple[Gathered, list[Progress]]:
-    told: list[Progress] = []
+def done(asked: Study, out: Path, **how) -> tuple[Gathered, list[StudyProgress]]:
+    told: list[StudyProgress] = []
     return carry_out(asked, out, tell=told.append, **{"count": 1, **how}), told
 
 

@@ -35,7 +35,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ExportTable:
     """Records in columns.
 
     Attributes:
@@ -55,7 +55,7 @@ class Table:
         return next(iter(self.columns.values())).size
 
 
-def tables(run: Run, selection: Selection) -> dict[str, Table]:
+def tables(run: Run, selection: Selection) -> dict[str, ExportTable]:
     """Records of the part, by name; empty ones are left out. Trials are all there.
 
     Times are s on the run's axis.
@@ -67,12 +67,12 @@ def tables(run: Run, selection: Selection) -> dict[str, Table]:
         if name == "current" and "force" in derivable(run):
             columns["force"] = derivation(run, "force")(rows["time"])
             units = units | {"force": "N"}
-        found[name] = Table(columns, units)
+        found[name] = ExportTable(columns, units)
     found["trials"] = _trials(run)
     return {name: table for name, table in found.items() if len(table)}
 
 
-def _trials(run: Run) -> Table:
+def _trials(run: Run) -> ExportTable:
     rows = run.trials
     columns = {
         "index": rows["index"],
@@ -92,7 +92,7 @@ def _trials(run: Run) -> Table:
     for name in ("rest_V_C1", "drift_V_C1"):
         if name in (rows.dtype.names or ()):  # older runs lack it
             columns[name], units[name] = rows[name], "V"
-    return Table(columns, units)
+    return ExportTable(columns, units)
 
 
 def _plain(values: NDArray[Any]) -> NDArray[Any]:

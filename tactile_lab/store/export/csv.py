@@ -11,7 +11,7 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.store.export.content import (
     UNITS,
-    Table,
+    ExportTable,
     about,
     tables,
     unit,
@@ -54,7 +54,7 @@ def export(
         made.append(_table(folder / f"{name}.csv", table))
     told = about(run, selection.names(run))
     keys = np.array(list(told)), np.array([str(value) for value in told.values()])
-    pairs = Table({"key": keys[0], "value": keys[1]}, {"key": "", "value": ""})
+    pairs = ExportTable({"key": keys[0], "value": keys[1]}, {"key": "", "value": ""})
     made.append(_table(folder / "about.csv", pairs))
     for name in {"signals", *UNITS, "trials"} - {file.stem for file in made}:
         (folder / f"{name}.csv").unlink(missing_ok=True)
@@ -86,7 +86,7 @@ def _text(run: Run, name: str, selection: Selection) -> Callable[[FloatArray], T
     return CodeText(signal) if selection.average(signal.interval) == 1 else written
 
 
-def _table(path: Path, table: Table) -> Path:
+def _table(path: Path, table: ExportTable) -> Path:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table.heads)

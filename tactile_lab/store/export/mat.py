@@ -11,7 +11,7 @@ import scipy.io
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export.content import (
-    Table,
+    ExportTable,
     about,
     tables,
     unit,
@@ -88,7 +88,7 @@ def export(
     return [file]
 
 
-def _struct(table: Table) -> dict[str, Any]:
+def _struct(table: ExportTable) -> dict[str, Any]:
     return {
         name: values.astype(object) if values.dtype.kind == "U" else values
         for name, values in table.columns.items()
