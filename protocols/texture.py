@@ -177,7 +177,6 @@ class Texture(ForceProtocol):
         for speed, trials in scans.items():
             x, y = [], []
             for number, trial in enumerate(trials, start=1):
-                assert trial.hold is not None
                 times = self._spikes(trial)
                 x += ((times - self.down) * speed).tolist()
                 y += [float(number)] * times.size
@@ -235,14 +234,12 @@ class Texture(ForceProtocol):
 
     def _spikes(self, trial: MeasuredTrial) -> FloatArray:
         """Spikes while the profile acts in full, s from the trial's start."""
-        assert trial.hold is not None
         return within(trial.spike_times, trial.hold)
 
     def _scanned(self, trials: list[MeasuredTrial]) -> float:
         """Time for which the profile acts in full, s."""
-        hold = trials[0].hold
-        assert hold is not None
-        return hold[1] - hold[0]
+        start, end = trials[0].hold or (0.0, 0.0)
+        return end - start
 
 
 def read_profile(path: Path) -> tuple[FloatArray, FloatArray]:

@@ -145,8 +145,8 @@ class Magnet(SceneTable):
     @property
     def _per_unit(self) -> float:
         """Newtons per unit of the calibration's values."""
-        assert self.calibration is not None
-        return 1.0 if self.calibration.unit == "N" else self.newtons_per_tesla
+        used = self.calibration
+        return 1.0 if used and used.unit == "N" else self.newtons_per_tesla
 
     def field(self, current: ArrayLike) -> FloatArray:
         """Field of the electromagnet, T, at `current` A (any shape)."""
@@ -199,8 +199,12 @@ class Magnet(SceneTable):
             )
         if self.calibration is None:
             return force.scaled(1 / self.newtons_per_ampere)
-        bent = force.with_points_at(self.force(self.calibration.current))
-        return Waveform(bent.time, self._inverse(bent.value))
+        amperes = self.calibration.current
+        newtons = self.force(amperes)
+        bent = force.with_points_at(newtons)
+        if newtons[0] > newtons[-1]:
+            amperes, newtons = amperes[::-1], newtons[::-1]
+        return Waveform(bent.time, np.interp(bent.value, newtons, amperes))
 
     def force_for(
         self, current: Waveform, beyond: Literal["refuse", "hold"] = "refuse"
@@ -240,14 +244,6 @@ class Magnet(SceneTable):
         """
         field, after = self.lag.follow(setpoint, before)
         return self.force_for(field, beyond="hold"), after
-
-    def _inverse(self, force: FloatArray) -> FloatArray:
-        assert self.calibration is not None
-        amperes = self.calibration.current
-        newtons = self.force(amperes)
-        if newtons[0] > newtons[-1]:
-            amperes, newtons = amperes[::-1], newtons[::-1]
-        return np.asarray(np.interp(force, newtons, amperes))
 
     def _bounds(self, limit: float) -> str:
         if self.calibration is None:

@@ -87,7 +87,7 @@ def drive_for(
         if way == "auto" and name == "list" and _error(steps) <= near:
             break  # loading one takes longer than its trial
         try:
-            drive = _timed(trial, scene, wanted, asked, before, can(scene))
+            drive = _timed(trial, scene, coil, wanted, asked, before, can(scene, coil))
         except LimitError as reason:
             if way == name:
                 raise SceneError(
@@ -156,29 +156,25 @@ def _finest(wanted: Waveform, promised: float) -> float:
     return max(moving / MOST_MOVING, wanted.end / MOST_SET_POINTS)
 
 
-def _lists(scene: Scene) -> ListCapability:
+def _lists(_: Scene, coil: CoilSpec) -> ListCapability:
     """What lists the source plays.
 
     Raises:
         LimitError: none.
     """
-    coil = scene.bench.coil
-    assert coil is not None
     source = coil_capability(coil)
     if source.lists is None:
         raise LimitError(f"{source.title} plays none.")
     return source.lists
 
 
-def _generated(scene: Scene) -> GeneratedCurrent:
+def _generated(scene: Scene, coil: CoilSpec) -> GeneratedCurrent:
     """What currents the scope's generator gives through the source.
 
     Raises:
         LimitError: none.
     """
-    coil, scope = scene.bench.coil, scene.bench.scope
-    assert coil is not None
-    analogue = coil_capability(coil).analogue
+    scope, analogue = scene.bench.scope, coil_capability(coil).analogue
     if analogue is None:
         raise LimitError(
             "the bench wires none to the source's analogue input ([coil.generator])."
@@ -194,6 +190,7 @@ def _generated(scene: Scene) -> GeneratedCurrent:
 def _timed(
     trial: Trial,
     scene: Scene,
+    coil: CoilSpec,
     wanted: Waveform,
     asked: Waveform,
     before: float,
@@ -204,8 +201,7 @@ def _timed(
     Raises:
         LimitError: it cannot be, and why.
     """
-    coil, magnet, meter = scene.bench.coil, scene.bench.magnet, scene.bench.field_meter
-    assert coil is not None
+    magnet, meter = scene.bench.magnet, scene.bench.field_meter
     if trial.pause:
         raise LimitError("in a pause nothing is recorded.")
     if meter is not None and meter.driver == BY_PERSON and trial.hold is not None:
@@ -241,17 +237,17 @@ def _nearest(
     can: ListCapability | GeneratedCurrent,
 ) -> Drive:
     """The points whose force, behind the lags that the bench knows, is nearest."""
-    found = _listed(wanted, asked, magnet, limits, can)
+    found, _ = _listed(wanted, asked, magnet, limits, can)
     if magnet.lag == Lag():
         return found
     ahead, late = Waveform.constant(0.0), wanted
     for _ in range(LEADS):
         lead = ahead.plus(magnet.lag.led(late, can.shortest))
         ahead = _within(lead, limits, bipolar, can)
-        drive = _listed(ahead, asked, magnet, limits, can)
+        drive, field = _listed(ahead, asked, magnet, limits, can)
         if (drive.error or 0.0) < (found.error or 0.0):
             found = drive
-        late = wanted.plus(_field(drive, magnet).scaled(-1.0))
+        late = wanted.plus(field.scaled(-1.0))
     return found
 
 
@@ -277,8 +273,11 @@ def _listed(
     magnet: Magnet,
     limits: CoilLimits,
     can: ListCapability | GeneratedCurrent,
-) -> Drive:
-    """The points nearest to `wave` A within the slew that they may have."""
+) -> tuple[Drive, Waveform]:
+    """The points nearest to `wave` A within the slew that they may have.
+
+    Beside it the field of these points, as the current that would hold it, A.
+    """
     slew, steepest, warning = limits.fastest, wave.steepest, None
     if steepest > slew * (1 + 1e-9):
         wave = cut(slewed(wave, slew, 0.0), wave.end)
@@ -296,20 +295,16 @@ def _listed(
     why = f"{len(points)} points of {each}, loaded in {show(load, 's', 2)}"
     gain = can.input.gain if isinstance(can, GeneratedCurrent) else None
     drive = Drive(wave, points, gain, error=0.0, why=why, warning=warning, load=load)
-    force = magnet.force_for(_field(drive, magnet), beyond="hold")
+    held = cut(
+        Waveform.stairs(np.column_stack([points.starts, points.currents]), wave.end),
+        wave.end,
+    )
+    field, _ = magnet.lag.follow(held, (0.0, 0.0))
+    force = magnet.force_for(field, beyond="hold")
     error = _difference(asked, force)
     # what it is between two points of the list matters to nobody
     time = np.union1d(asked.time, points.starts[points.starts < asked.end])
-    return replace(drive, force=Waveform(time, force.at(time)), error=error)
-
-
-def _field(drive: Drive, magnet: Magnet) -> Waveform:
-    """The field of its points, as the current that would hold it, A."""
-    points = drive.points
-    assert points is not None
-    steps = np.column_stack([points.starts, points.currents])
-    end = drive.current.end
-    return magnet.lag.follow(cut(Waveform.stairs(steps, end), end), (0.0, 0.0))[0]
+    return replace(drive, force=Waveform(time, force.at(time)), error=error), field
 
 
 def _difference(asked: Waveform, given: Waveform) -> float:
