@@ -25,7 +25,7 @@ from gui.ask_file import ask_file
 from gui.banner import Banner
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
-from gui.menu import Acts, GearMenu
+from gui.menu import GearMenu, MenuActions
 from gui.preferences import Preferences
 from gui.run_actions import RunActions
 from gui.screen.panels import Panels
@@ -389,7 +389,7 @@ class Actions(QObject):
 
     def show_menu(self) -> None:
         """Open the menu below its button."""
-        acts = Acts(
+        acts = MenuActions(
             save_scene=self.save_scene,
             about_run=self.runs.about_shown,
             open_skin=self.ask_skin,

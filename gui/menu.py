@@ -22,7 +22,7 @@ Act = Callable[[], object]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Acts:
+class MenuActions:
     """What the menu asks of whoever opens it."""
 
     save_scene: Act
@@ -56,7 +56,7 @@ class GearMenu(QMenu):
         panels: Panels,
         screen: Screen,
         recent: list[Path],
-        acts: Acts,
+        acts: MenuActions,
     ) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -70,14 +70,15 @@ def serial_source(table: CoilSpec, world: World) -> CoilSource:
 def ps3000a(table: ScopeSpec, world: World) -> PicoScope:
     """A PicoScope 3404D at the plant's voltages, behind its vendor's functions."""
     from drivers.picoscope.scope import PicoScope
-    from sim_backend.picoscope.scope import SIMULATED, Make
+    from sim_backend.picoscope.scope import SIMULATED, UnitModel
     from sim_backend.picoscope.sdk import FakePs3000a
 
     clock_error = world.simulated.clock_error
     library = FakePs3000a(
         _wired(world),
         world.clock,
-        world.make or Make(serial=table.serial or SIMULATED, clock_error=clock_error),
+        world.make
+        or UnitModel(serial=table.serial or SIMULATED, clock_error=clock_error),
         world.faults.get("scope", ()),
         world.plant.analogue_input,
     )

@@ -28,7 +28,7 @@ OVERRANGE = 32 + 128
 """Status of an open sensor: temperature and sensor units over range."""
 
 
-class Warm(Protocol):
+class TemperatureSource(Protocol):
     """What has the temperature that is read."""
 
     def temperature(self, time: float) -> float:
@@ -59,7 +59,9 @@ class SimThermometer:
 
     clearing = b""
 
-    def __init__(self, place: Warm, model: str, clock: Clock, *, seed: int = 0) -> None:
+    def __init__(
+        self, place: TemperatureSource, model: str, clock: Clock, *, seed: int = 0
+    ) -> None:
         self._place, self._clock = place, clock
         self._random = np.random.default_rng(seed)
         self.identity, self.inputs, self._digits, self.reply_end = MODELS[model]
@@ -101,7 +103,9 @@ MODELS: dict[str, tuple[str, str, int, bytes]] = {
 """Name, inputs, digits behind the point and terminator of each model, by its row."""
 
 
-def row_thermometer(place: Warm, row: ThermometerDialect, clock: Clock) -> RowParser:
+def row_thermometer(
+    place: TemperatureSource, row: ThermometerDialect, clock: Clock
+) -> RowParser:
     """A simulated thermometer made from its row, at the input the row is for.
 
     Args:
@@ -125,7 +129,7 @@ def row_thermometer(place: Warm, row: ThermometerDialect, clock: Clock) -> RowPa
 
 
 def thermometer_far_end(
-    place: Warm, row: ThermometerDialect, clock: Clock, *, seed: int = 0
+    place: TemperatureSource, row: ThermometerDialect, clock: Clock, *, seed: int = 0
 ) -> SimThermometer | RowParser:
     """The simulated thermometer that speaks `row`, as `coil_far_end`.
 

@@ -35,7 +35,7 @@ NOISE = 10e-6
 """Standard deviation of a reading, V."""
 
 
-class Sourced(Protocol):
+class SourceLoad(Protocol):
     """What a source's terminals are connected to."""
 
     def set_voltage(self, name: str, time: float, volts: float) -> None:
@@ -68,7 +68,9 @@ class VoltagePanel:
 
     clearing, reply_end, gap = b"\x03\x18", b"\n", 0.0
 
-    def __init__(self, plant: Sourced, name: str, clock: Clock, seed: int = 0) -> None:
+    def __init__(
+        self, plant: SourceLoad, name: str, clock: Clock, seed: int = 0
+    ) -> None:
         self._plant, self.name, self._clock = plant, name, clock
         self._random = np.random.default_rng(seed)
         self.setpoint, self.compliance = 0.0, 105e-6
@@ -132,7 +134,9 @@ class VoltagePanel:
 class Keithley2400(VoltagePanel):
     """A simulated Keithley 2400; takes one line at a time."""
 
-    def __init__(self, plant: Sourced, name: str, clock: Clock, seed: int = 0) -> None:
+    def __init__(
+        self, plant: SourceLoad, name: str, clock: Clock, seed: int = 0
+    ) -> None:
         super().__init__(plant, name, clock, seed)
         self._voltage_mode, self._range = False, 21.0
         self._modes = {"output": "NORM", "source": "FIX"}
@@ -211,7 +215,7 @@ class RowVoltageSource(VoltagePanel):
     """
 
     def __init__(
-        self, plant: Sourced, name: str, row: VoltageDialect, clock: Clock
+        self, plant: SourceLoad, name: str, row: VoltageDialect, clock: Clock
     ) -> None:
         super().__init__(plant, name, clock)
         self._row, self.gap = row, row.serial.min_gap
@@ -263,7 +267,7 @@ class RowVoltageSource(VoltagePanel):
 
 
 def voltage_far_end(
-    plant: Sourced, name: str, row: VoltageDialect, clock: Clock, *, seed: int = 0
+    plant: SourceLoad, name: str, row: VoltageDialect, clock: Clock, *, seed: int = 0
 ) -> Keithley2400 | RowVoltageSource:
     """The simulated source that speaks `row`: written from a manual, or from the row.
 

@@ -11,7 +11,7 @@ from gui.dialogs.bench_text import BenchChoice
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, line, line_edit, push, row
 from gui.plots.small_plot import SmallPlot
-from gui.review.conclusion import Concluded
+from gui.review.conclusion import ShownConclusion
 from gui.review.live_plots import loop_plot
 from tactile_lab.arrays import FloatArray
 
@@ -81,7 +81,7 @@ class Calibrating(QWidget):
         self.loop.show_plot(loop_plot(loop))
         self.loop.setVisible(loop.shape[0] > 2)
 
-    def show_conclusion(self, found: Concluded) -> None:
+    def show_conclusion(self, found: ShownConclusion) -> None:
         """Show slope, loop and uncertainty, and offer the file."""
         self._file = found.calibration
         self.findings.setText("\n".join(found.statements))

@@ -15,7 +15,7 @@ from gui.dialogs.bench_text import BenchChoice
 from gui.lanes.lane import title_of
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, empty, label, push, row, say, set_role, sign
-from gui.review.conclusion import Concluded
+from gui.review.conclusion import ShownConclusion
 
 COLUMNS = ("Input", "Signal", "Range", "Offset", "Shunt")
 ROW = 28
@@ -29,7 +29,7 @@ class Wiring(QWidget):
     def __init__(self, choice: BenchChoice, theme: Theme) -> None:
         super().__init__()
         self._choice, self._theme = choice, theme
-        self._concluded: Concluded | None = None
+        self._concluded: ShownConclusion | None = None
         self.table = QTableWidget(0, len(COLUMNS))
         self.table.setAccessibleName("Oscilloscope inputs")
         self.table.setHorizontalHeaderLabels(list(COLUMNS))
@@ -82,7 +82,7 @@ class Wiring(QWidget):
             self._concluded = None
             self._show_verdicts()
 
-    def show_conclusion(self, found: Concluded) -> None:
+    def show_conclusion(self, found: ShownConclusion) -> None:
         """Show what the check found."""
         self._concluded = found
         self._show_verdicts()

@@ -25,7 +25,7 @@ LAMPS = {
 """Icon, colour and words of each: it says its state by shape as well as by colour."""
 
 
-class Room(IntEnum):
+class ChipDetail(IntEnum):
     """How much of each chip is shown."""
 
     FULL = 0
@@ -58,14 +58,14 @@ class Chip(QWidget):
         words = lines(self._name, self._detail, spacing=0)
         bar(self, (10, 4, 11, 4), 9, self._lamp, words, 6, self.value)
         self._show_lamp()
-        self._room = Room.FULL
+        self._room = ChipDetail.FULL
 
     @property
     def lamp(self) -> Lamp:
         """State of the lamp."""
         return self._view.lamp
 
-    def show_room(self, room: Room) -> None:
+    def show_room(self, room: ChipDetail) -> None:
         """Show as much as there is room for."""
         self._room = room
         self._arrange()
@@ -102,14 +102,14 @@ class Chip(QWidget):
 
     def _arrange(self) -> None:
         view, room = self._view, self._room
-        self._name.setText(view.name if room is Room.FULL else view.short)
-        self._name.setVisible(room < Room.BARE)
-        self.value.setVisible(room < Room.LAMP)
+        self._name.setText(view.name if room is ChipDetail.FULL else view.short)
+        self._name.setVisible(room < ChipDetail.BARE)
+        self.value.setVisible(room < ChipDetail.LAMP)
         self._detail.setText(view.detail)
-        self._detail.setVisible(bool(view.detail) and room is Room.FULL)
+        self._detail.setVisible(bool(view.detail) and room is ChipDetail.FULL)
         layout = self.layout()
         assert layout is not None
-        bare = room >= Room.BARE
+        bare = room >= ChipDetail.BARE
         layout.setContentsMargins(*((6, 4, 7, 4) if bare else (10, 4, 11, 4)))
         layout.setSpacing(2 if bare else 9)
         layout.invalidate()

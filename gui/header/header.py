@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFont, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel
 
-from gui.header.chip import Chip, Room
+from gui.header.chip import Chip, ChipDetail
 from gui.header.stop import StopButton
 from gui.look import tokens as look
 from gui.look.icons import pixmap
@@ -27,11 +27,11 @@ _CLOCK_COLOURS = {
 
 
 ROOMS = (
-    (Room.FULL, False),
-    (Room.SHORT, False),
-    (Room.BARE, False),
-    (Room.BARE, True),
-    (Room.LAMP, True),
+    (ChipDetail.FULL, False),
+    (ChipDetail.SHORT, False),
+    (ChipDetail.BARE, False),
+    (ChipDetail.BARE, True),
+    (ChipDetail.LAMP, True),
 )
 """What is tried, the widest first: room of each chip, and whether all stands closer."""
 
@@ -124,16 +124,16 @@ class Header(QFrame):
         for room, tight in ROOMS:
             for chip in self._chips:
                 chip.show_room(room)
-            bare = room >= Room.BARE
-            self._buttons[0].setVisible(room is Room.FULL)
+            bare = room >= ChipDetail.BARE
+            self._buttons[0].setVisible(room is ChipDetail.FULL)
             self._buttons[2].setVisible(not bare)
             self._name.setVisible(not bare)  # six chips, and it is no news
             self._logo.setVisible(not tight)
             self._chip_row.setSpacing(2 if tight else 6)
             layout.setSpacing(6 if tight else 11)
-            least = {Room.FULL: WHOLE, Room.SHORT: SHORT}.get(room, LEAST)
+            least = {ChipDetail.FULL: WHOLE, ChipDetail.SHORT: SHORT}.get(room, LEAST)
             self._title.setMinimumWidth(least)
-            self.badge.setText("SIMULATED BENCH" if room is Room.FULL else "SIM")
+            self.badge.setText("SIMULATED BENCH" if room is ChipDetail.FULL else "SIM")
             layout.invalidate()
             layout.activate()  # nested ones, too
             spare = self.width() - layout.minimumSize().width()

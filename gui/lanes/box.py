@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from gui.lanes import paint
 from gui.lanes.compare import MARKS
-from gui.lanes.floor import AXIS, GUTTER, Stage, row_names, rows_of
+from gui.lanes.floor import AXIS, GUTTER, LaneContext, row_names, rows_of
 from gui.lanes.lane import BAND, Lane
 from gui.lanes.paint import Frame
 from gui.lanes.readings import Painted, values_at
@@ -73,7 +73,7 @@ def heights_of(
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]
     """Numbers and grid of a lane; a drag moves its range, the wheel zooms it."""
 
-    def __init__(self, stage: Stage, box: LaneBox) -> None:
+    def __init__(self, stage: LaneContext, box: LaneBox) -> None:
         self._stage = stage
         # which it holds weakly: a circle would be left to Python's collector
         super().__init__("left", linkView=box)
@@ -110,7 +110,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         top: whether it is the highest, where the names of holds are.
     """
 
-    def __init__(self, lane: Lane, stage: Stage) -> None:
+    def __init__(self, lane: Lane, stage: LaneContext) -> None:
         super().__init__(enableMenu=False, defaultPadding=0.0)
         self.setMouseEnabled(x=False, y=True)
         self.lane, self._stage = lane, stage

@@ -37,7 +37,7 @@ TIME_AXIS = 22
 
 
 @dataclass
-class Stage:
+class LaneContext:
     """What all lanes have in common.
 
     Attributes:
@@ -85,7 +85,7 @@ class Layer(pg.GraphicsObject):  # type: ignore[misc] # pyqtgraph has no types
         height: above or below the lanes' own items, as Qt's z.
     """
 
-    def __init__(self, stage: Stage, height: int) -> None:
+    def __init__(self, stage: LaneContext, height: int) -> None:
         super().__init__()
         self._stage = stage
         self.setZValue(height)
@@ -95,10 +95,10 @@ class Layer(pg.GraphicsObject):  # type: ignore[misc] # pyqtgraph has no types
         return QRectF(0, 0, self._stage.width, self._stage.height)
 
 
-class Floor(Layer):
+class Background(Layer):
     """What lies below all lanes."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: LaneContext) -> None:
         super().__init__(stage, -300)
 
     @guarded
@@ -143,7 +143,7 @@ def _visible(source: Source, frame: Frame) -> list[tuple[Stretch, float, float]]
     ]
 
 
-def hold_names(painter: QPainter, stage: Stage) -> None:
+def hold_names(painter: QPainter, stage: LaneContext) -> None:
     """Write the names of the holds at the top of the highest lane."""
     for hold, left, right in _visible(stage.source, stage.whole()):
         if right - left > 34:

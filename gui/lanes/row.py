@@ -8,7 +8,7 @@ from gui.lanes.box import LaneBox
 from gui.lanes.card import LaneCard
 from gui.lanes.compare import MARKS
 from gui.lanes.expected import starts
-from gui.lanes.floor import Stage
+from gui.lanes.floor import LaneContext
 from gui.lanes.lane import Lane
 from gui.lanes.readings import (
     count_between,
@@ -36,7 +36,7 @@ class LaneRow:
         statistics: of the samples between the cursors; None where nobody knows.
     """
 
-    def __init__(self, lane: Lane, stage: Stage, theme: Theme) -> None:
+    def __init__(self, lane: Lane, stage: LaneContext, theme: Theme) -> None:
         self.lane = lane
         self.card = LaneCard(lane, theme)
         self.card.setAccessibleDescription(

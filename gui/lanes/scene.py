@@ -20,7 +20,7 @@ from PySide6.QtGui import (
 
 from gui.lanes import paint
 from gui.lanes.box import LaneBox
-from gui.lanes.floor import AXIS, TIME_AXIS, Floor, Layer, Stage, hold_names
+from gui.lanes.floor import AXIS, TIME_AXIS, Background, LaneContext, Layer, hold_names
 from gui.lanes.paint import Frame
 from gui.lanes.readings import values_at
 from gui.look.fonts import sized
@@ -51,7 +51,7 @@ class Marks(Layer):
         box: that is being drawn to zoom to, px.
     """
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: LaneContext) -> None:
         super().__init__(stage, 100)
         self.boxes: list[LaneBox] = []
         self.pointer: QPointF | None = None
@@ -148,7 +148,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
     """To where, V."""
     drawn = Signal()
 
-    def __init__(self, stage: Stage, places: Callable[[], Places]) -> None:
+    def __init__(self, stage: LaneContext, places: Callable[[], Places]) -> None:
         super().__init__()
         self.stage = stage
         self._places = places
@@ -161,7 +161,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         self._pressed: QPointF | None = None
         self._from = 0.0
         self._marks = Marks(stage)
-        self._floor = Floor(stage)
+        self._floor = Background(stage)
         for item in (self._floor, self._marks):
             self.addItem(item)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)

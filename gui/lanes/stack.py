@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QFrame, QMenu
 from gui.lanes.arrangement import Arrangement
 from gui.lanes.box import LaneBox
 from gui.lanes.card import LaneAct
-from gui.lanes.floor import Stage
+from gui.lanes.floor import LaneContext
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.navigator import Navigator
 from gui.lanes.readings import Painted
@@ -48,7 +48,7 @@ class LaneStack(QFrame):
     def __init__(self, view: TimeView, theme: Theme) -> None:
         super().__init__()
         self.view = view
-        self.stage = Stage(view, tokens=theme.tokens)
+        self.stage = LaneContext(view, tokens=theme.tokens)
         self.scene = LaneScene(self.stage, self._places)
         self.rows: list[LaneRow] = []
         self.navigator = Navigator(view, theme)

@@ -45,7 +45,7 @@ class Theme(QObject):
         A style sheet of the application is worked out for a widget as often as it has
         parents: that took a second and more with every change of the theme.
         """
-        _Dress(self, window).put_on()
+        _WindowStyle(self, window).put_on()
 
     def _wanted(self) -> Tokens:
         if self.choice != "system":
@@ -58,7 +58,7 @@ class Theme(QObject):
             self.apply()
 
 
-class _Dress(QObject):
+class _WindowStyle(QObject):
     """The style sheet of one window: Qt disconnects a child that goes with it."""
 
     def __init__(self, theme: Theme, window: QWidget) -> None:

@@ -14,7 +14,7 @@ from tactile_lab.plot import Plot
 
 
 @dataclass(frozen=True)
-class Concluded:
+class ShownConclusion:
     """The parts of results.json that the window shows.
 
     Attributes:
@@ -34,7 +34,7 @@ class Concluded:
     calibration: Path | None
 
 
-def conclusion_of(folder: Path) -> Concluded:
+def conclusion_of(folder: Path) -> ShownConclusion:
     """What the report in a run's folder concluded.
 
     Raises:
@@ -45,7 +45,7 @@ def conclusion_of(folder: Path) -> Concluded:
         found = json.loads(file.read_text(encoding="utf-8"))
         values = found["conclusion"] or {}
         made = folder / "calibration.csv"
-        return Concluded(
+        return ShownConclusion(
             protocol=found["protocol"],
             statements=tuple(found.get("statements", ())),
             verdicts=tuple(

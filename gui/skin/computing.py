@@ -41,7 +41,7 @@ class Failed:
     text: str
 
 
-class LeftError(Exception):
+class WindowClosedError(Exception):
     """The window was closed."""
 
 
@@ -77,7 +77,7 @@ class SkinComputation:
             if self._skin is not None:
                 press(self._skin, self._folder, watch=self._trains)
             self._told.put(Film(Events.read(self._folder)))
-        except LeftError:
+        except WindowClosedError:
             return
         except (TactileLabError, OSError) as error:
             self._told.put(Failed(str(error)))
@@ -86,5 +86,5 @@ class SkinComputation:
 
     def _trains(self, first: int, count: NDArray[np.int64], time: FloatArray) -> None:
         if self._leave.is_set():
-            raise LeftError
+            raise WindowClosedError
         self._told.put(TrainsFound(first, count, time))

@@ -21,7 +21,7 @@ SIMULATED = "SIM04/0001"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Make:
+class UnitModel:
     """What a simulated unit is, and how it is connected.
 
     Attributes:
@@ -93,7 +93,7 @@ class SimulatedPicoScope:
 
     source: SampleSource
     clock: Clock
-    make: Make = field(default_factory=Make)
+    make: UnitModel = field(default_factory=UnitModel)
     faults: Sequence[ScopeFault] = ()
     dropped: int = 0
     """Samples a channel that a starved stream has lost so far."""

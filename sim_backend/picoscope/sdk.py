@@ -35,7 +35,7 @@ from sim_backend.picoscope.generator import (
     SimulatedGenerator,
     nowhere,
 )
-from sim_backend.picoscope.scope import Make, SimulatedPicoScope
+from sim_backend.picoscope.scope import SimulatedPicoScope, UnitModel
 from sim_backend.plant.scope_source import SampleSource
 from tactile_lab.clock import Clock
 
@@ -91,13 +91,13 @@ class FakePs3000a:
         self,
         source: SampleSource,
         clock: Clock,
-        make: Make | None = None,
+        make: UnitModel | None = None,
         faults: Sequence[ScopeFault] = (),
         output: Output = nowhere,
     ) -> None:
-        error = (make or Make()).clock_error
+        error = (make or UnitModel()).clock_error
         self.generator = SimulatedGenerator(clock, output, error)
-        self.device = SimulatedPicoScope(source, clock, make or Make(), faults)
+        self.device = SimulatedPicoScope(source, clock, make or UnitModel(), faults)
         self.errors: list[BaseException] = []
         self.in_callback = False
         self._busy = threading.Lock()

@@ -22,7 +22,7 @@ Spikes = tuple[FloatArray, NDArray[Any]]
 
 
 @dataclass(frozen=True)
-class Held:
+class RingContents:
     """What the ring held at one moment; times on the run's axis, s.
 
     Attributes:
@@ -93,7 +93,7 @@ class Ring(Journal):
         self._field: deque[tuple[float, float]] = deque()
         self._events: list[tuple[float, str, str]] = []
 
-    def held(self) -> Held:
+    def held(self) -> RingContents:
         """All it holds now.
 
         Raises:
@@ -102,7 +102,7 @@ class Ring(Journal):
         with self._lock:
             if self._stream is None or not self._blocks:
                 raise RecordingError("Nothing to keep: no sample has come yet.")
-            return Held(
+            return RingContents(
                 self._stream,
                 self._time(self._blocks[0].first),
                 tuple(self._blocks),

@@ -123,7 +123,7 @@ class Residuals:
         return weights
 
 
-class Together:
+class JointResiduals:
     """Residuals of one or several runs as a function of the parameters they share.
 
     Args:

@@ -17,7 +17,13 @@ from scipy.optimize import least_squares
 
 from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.estimate import Z95, Estimate
-from tactile_lab.analysis.evidence import SCALES, VOLTAGES, Residuals, Together, scatter
+from tactile_lab.analysis.evidence import (
+    SCALES,
+    VOLTAGES,
+    JointResiduals,
+    Residuals,
+    scatter,
+)
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
@@ -108,7 +114,7 @@ class Noise:
     offsets: FloatArray
     edges: FloatArray
 
-    def found(self, problem: Together, residual: FloatArray) -> Noise:
+    def found(self, problem: JointResiduals, residual: FloatArray) -> Noise:
         """The same with the scatter that residuals, shape (n,), show."""
         left = self.freed(residual) * self.weights / self.plain
         return replace(self, plain=problem.weights(left))
@@ -190,7 +196,7 @@ def identify_together(
             spikes, unused = None, ("spikes are not used: T1 saturates",)
         told = (circuit, tuple(names), one.force, one.duration, one.V_C1, spikes)
         problems.append(Residuals(*told))
-    problem = Together(problems, scaled=force_scales)
+    problem = JointResiduals(problems, scaled=force_scales)
     if problem.size <= len(problem.names):
         raise NotIdentifiableError(
             f"{problem.size} data points cannot determine {len(problem.names)} "
@@ -230,7 +236,7 @@ _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
 def _displaced(
-    problem: Together, x: FloatArray, displaced: Sequence[Displaced], part: float
+    problem: JointResiduals, x: FloatArray, displaced: Sequence[Displaced], part: float
 ) -> dict[Cause, list[DrivenCircuit]]:
     """Circuit and force of all runs with `part` of the 95 % band of one cause, by it.
 
@@ -248,7 +254,7 @@ def _displaced(
 
 
 def _edges(
-    problem: Together, x: FloatArray, displaced: Sequence[Displaced]
+    problem: JointResiduals, x: FloatArray, displaced: Sequence[Displaced]
 ) -> FloatArray:
     """Variance by which to trust less what a small error of a time moves far, V^2."""
     here, variance = problem.residual(x), np.zeros(problem.size)
@@ -259,7 +265,7 @@ def _edges(
 
 
 def _moved(
-    problem: Together,
+    problem: JointResiduals,
     x: FloatArray,
     displaced: Sequence[Displaced],
     jacobian: FloatArray,
@@ -292,7 +298,7 @@ def _moved(
 
 
 def _identified(
-    problem: Together, x: FloatArray, noise: Noise, displaced: Sequence[Displaced]
+    problem: JointResiduals, x: FloatArray, noise: Noise, displaced: Sequence[Displaced]
 ) -> Identified:
     plain = _jacobian(problem, x)
     jacobian = noise.whitened(plain)
@@ -327,7 +333,7 @@ def _identified(
     )
 
 
-def _jacobian(problem: Together, x: FloatArray) -> FloatArray:
+def _jacobian(problem: JointResiduals, x: FloatArray) -> FloatArray:
     """Central differences in the scaled parameters, shape (points, parameters)."""
     columns = []
     for i in range(x.size):

@@ -247,7 +247,7 @@ class Day:
             write_json(self.out / STATE, {"bench": self.bench, "done": self.done})
 
 
-class _Both(StringIO):
+class _Tee(StringIO):
     """Keeps what is printed, and prints it."""
 
     def __init__(self) -> None:
@@ -263,7 +263,7 @@ class _Both(StringIO):
 def _verb(words: list[str]) -> tuple[str, str]:
     """Call a verb of the command line: what it printed, and what it found wrong."""
     verbs = click.get_current_context().find_root().command
-    with redirect_stdout(_Both()) as printed:
+    with redirect_stdout(_Tee()) as printed:
         try:
             code = verbs.main(words, prog_name="tactile-lab", standalone_mode=False)
         except click.ClickException as refused:

@@ -77,7 +77,7 @@ def _watch(
     kept: dict[str, str],
 ) -> None:
     _listen(sys.stdin, asked)
-    sight = Sight(sys.stderr)
+    sight = SensorLine(sys.stderr)
 
     def look() -> None:
         sight.show(str(monitor.sensor))
@@ -104,7 +104,7 @@ def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:
         warn(f"not recorded: {reason}")
 
 
-class Sight:
+class SensorLine:
     """The sensor's state on stderr: one changing line on a terminal, else lines."""
 
     def __init__(self, stream: TextIO) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.program import SETTLED, Program
-from tactile_lab.acquisition.ring import Held, Ring
+from tactile_lab.acquisition.ring import Ring, RingContents
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.analysis.noise import Noise, noise
@@ -180,7 +180,7 @@ class Monitor(Task[Ending]):
         gain, offset = stream.volts_per_code(row)
         return noise(gain * codes + offset, stream.interval)
 
-    def _write(self, folder: RunFolder, held: Held) -> None:
+    def _write(self, folder: RunFolder, held: RingContents) -> None:
         recorder = Recorder(
             folder, layout(self.plan, self.bench, folder, self._search, held.stream)
         )

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tactile_lab.instruments.serial_dialect import Dialect, Lines, Strict, frozen
+from tactile_lab.instruments.serial_dialect import Dialect, DialectTable, Lines, frozen
 from tactile_lab.scope import ScopeCapability
 
 Numbers = Annotated[tuple[float, ...], BeforeValidator(frozen)]
@@ -19,14 +19,14 @@ def _numbered(table: Any) -> Any:
     return {int(k) if str(k).isdecimal() else k: v for k, v in table.items()}
 
 
-class Timebases(Strict):
+class Timebases(DialectTable):
     """Horizontal scales, s a division, in steps of 1, 2, 5."""
 
     shortest: float = Field(gt=0)
     longest: float = Field(gt=0)
 
 
-class Commands(Strict):
+class Commands(DialectTable):
     """Lines and questions; names in braces are filled in.
 
     `{input}` is an input's name, `{scale}` V a division, `{offset}` V, `{coupling}` DC

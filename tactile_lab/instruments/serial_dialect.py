@@ -40,13 +40,13 @@ def frozen(value: object) -> object:
 Lines = Annotated[tuple[str, ...], BeforeValidator(frozen)]
 
 
-class Strict(BaseModel):
+class DialectTable(BaseModel):
     """A table of a dialect: frozen, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
-class SerialSettings(Strict):
+class SerialSettings(DialectTable):
     """Serial settings and framing of a model.
 
     Attributes:
@@ -93,7 +93,7 @@ class SerialSettings(Strict):
         return bits / self.baud
 
 
-class ListMode(Strict):
+class ListMode(DialectTable):
     """Lines with which a model plays a list of currents by its own clock.
 
     Attributes:
@@ -123,7 +123,7 @@ class ListMode(Strict):
     longest: Duration
 
 
-class AnalogueMode(Strict):
+class AnalogueMode(DialectTable):
     """An input that adds a current to the set-point, in proportion to its voltage.
 
     Attributes:
@@ -140,7 +140,7 @@ class AnalogueMode(Strict):
     off: Lines = ()
 
 
-class Dialect(Strict):
+class Dialect(DialectTable):
     """What every dialect has.
 
     Attributes:

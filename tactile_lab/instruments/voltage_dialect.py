@@ -7,12 +7,12 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BeforeValidator, Field
 
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.serial_dialect import SourceDialect, Strict, frozen
+from tactile_lab.instruments.serial_dialect import DialectTable, SourceDialect, frozen
 from tactile_lab.quantity import Current, Voltage, show
 from tactile_lab.voltage_source import VoltageLimits, VoltageSourceCapability
 
 
-class VoltageRange(Strict):
+class VoltageRange(DialectTable):
     """One range of a source meter.
 
     Attributes:

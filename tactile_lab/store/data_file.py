@@ -14,7 +14,7 @@ import numpy as np
 
 from tactile_lab.scope import Stream
 from tactile_lab.store.columns import Column, SampleColumn
-from tactile_lab.store.durable import Durable
+from tactile_lab.store.durable import DiskSync
 from tactile_lab.store.folder import DATA
 from tactile_lab.store.layout import RECORDS, Layout, declare
 from tactile_lab.store.ledger import LEDGER, Ledger
@@ -27,7 +27,7 @@ class DataFile:
         folder: of the run.
         layout: what to store.
         stream: scaling of the samples; None where the run has no scope.
-        sync: push file and ledger to the disk every second (see `Durable`).
+        sync: push file and ledger to the disk every second (see `DiskSync`).
 
     Attributes:
         samples: one per signal of the layout.
@@ -51,7 +51,7 @@ class DataFile:
         names = layout.signals if stream is not None else ()
         self.samples = [SampleColumn(self._file, name, self._ledger) for name in names]
         self._tables = {name: Column(self._file[name]) for name in RECORDS}
-        self._durable = Durable(folder / DATA, self._path) if sync else None
+        self._durable = DiskSync(folder / DATA, self._path) if sync else None
         self._file.swmr_mode = True
         self._file.flush()
 

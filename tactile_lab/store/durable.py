@@ -10,7 +10,7 @@ EVERY = 1.0
 """Seconds between two syncs; what a power cut can cost beside the block in flight."""
 
 
-class Durable:
+class DiskSync:
     """Syncs files in a thread of its own, because a disk may take its time for it.
 
     What a program has written survives its own death, but lies in the computer's

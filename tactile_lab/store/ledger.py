@@ -64,7 +64,7 @@ class Ledger:
 
 
 @dataclass(frozen=True)
-class Written:
+class LedgerContents:
     """What a ledger says was written.
 
     Attributes:
@@ -79,7 +79,7 @@ class Written:
     chunks: dict[str, dict[int, list[tuple[int, int, int, int]]]]
 
 
-def read_ledger(path: Path) -> Written:
+def read_ledger(path: Path) -> LedgerContents:
     """Read every entry that is as it was written; nothing where there is no file."""
     declared, records = b"", RECORDS
     rows: defaultdict[str, list[Any]] = defaultdict(list)
@@ -91,7 +91,7 @@ def read_ledger(path: Path) -> Written:
             rows[dataset][first:] = np.frombuffer(data, records[dataset]).tolist()
         else:
             chunks[dataset][first] += np.frombuffer(data, CHUNK).tolist()
-    return Written(declared, rows, chunks)
+    return LedgerContents(declared, rows, chunks)
 
 
 def _records(declared: bytes) -> dict[str, np.dtype[Any]]:

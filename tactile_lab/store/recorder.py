@@ -40,7 +40,7 @@ class Recorder:
         folder: of the run.
         layout: what to store.
         reserve: bytes that must stay free on the disk.
-        sync: push the file to the disk every second (see `Durable`); unless given, for
+        sync: push the file to the disk every second (see `DiskSync`); unless given, for
             measured runs, because a simulated one can be computed again.
         when_full: writes in a thread of its own, which the caller waits for where the
             disk does not keep up ("wait") or not ("error"); None: in the caller's.

@@ -27,7 +27,7 @@ from tactile_lab.store.folder import (
     write_info,
 )
 from tactile_lab.store.layout import RECORDS
-from tactile_lab.store.ledger import LEDGER, Written, goes_on, read_ledger
+from tactile_lab.store.ledger import LEDGER, LedgerContents, goes_on, read_ledger
 from tactile_lab.store.progress import Progress, nothing, share
 from tactile_lab.store.run import Run
 
@@ -110,7 +110,7 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
     return recovery
 
 
-def _told_by(killed: Path) -> Written:
+def _told_by(killed: Path) -> LedgerContents:
     """What a data file itself tells was written: older versions kept no ledger.
 
     Nothing where it cannot be opened; tables and chunks as far as they can be read.
@@ -130,8 +130,8 @@ def _told_by(killed: Path) -> Written:
             for name in file.get("samples", ()):
                 chunks[f"samples/{name}"] = _listed(file, name)
     except (OSError, KeyError, RuntimeError, ValueError):
-        return Written(b"", {}, {})
-    return Written(image.getvalue(), rows, chunks)
+        return LedgerContents(b"", {}, {})
+    return LedgerContents(image.getvalue(), rows, chunks)
 
 
 def _declare_again(file: h5py.File, name: str, item: h5py.Dataset | h5py.Group) -> None:
@@ -160,7 +160,7 @@ def _readable_rows(table: h5py.Dataset) -> list[Any]:
 
 
 def _listed(file: h5py.File, name: str) -> dict[int, list[tuple[int, int, int, int]]]:
-    """Chunks of a channel as `Written` has them; the newest may lack its checksum."""
+    """Chunks of a channel as `LedgerContents` has them; the newest may lack its checksum."""
     samples, found = file[f"samples/{name}"], {}
     checks = _readable_rows(file[f"checks/{name}"])
 
@@ -200,7 +200,7 @@ def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:
 
 
 def _fill(
-    file: h5py.File, written: Written, killed: Path, progress: Progress
+    file: h5py.File, written: LedgerContents, killed: Path, progress: Progress
 ) -> tuple[int, int]:
     """Put what was written and can be read into `file`.
 
@@ -251,7 +251,9 @@ class _Chunks:
         length: samples that were written.
     """
 
-    def __init__(self, like: h5py.Dataset, written: Written, killed: Path) -> None:
+    def __init__(
+        self, like: h5py.Dataset, written: LedgerContents, killed: Path
+    ) -> None:
         name = like.name.strip("/")
         self.size = int(like.chunks[0])
         self._killed, self._entries = killed, written.chunks[name]

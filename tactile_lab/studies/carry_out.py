@@ -22,7 +22,7 @@ from tactile_lab.studies.live import LOCK, LiveStudy
 from tactile_lab.studies.points import RUNS, Points, PointTask
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
-from tactile_lab.studies.workers import Alone, Finished, Workers, workers
+from tactile_lab.studies.workers import Finished, InProcess, Workers, workers
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
@@ -215,7 +215,7 @@ def _batches(
     """
     tasks = _tasks(study, missing, named, pace)
     if study.on == "model":
-        yield from Alone(points, shelf).batches(islice(tasks, 1))
+        yield from InProcess(points, shelf).batches(islice(tasks, 1))
     yield from crew.batches(tasks)
 
 

@@ -66,7 +66,7 @@ class Workers(Protocol):
         """
 
 
-class Alone:
+class InProcess:
     """This process, one point after another: what real instruments need.
 
     Args:
@@ -209,7 +209,7 @@ def workers(
                 'on = "bench" plays one run after another on this machine\'s '
                 "instruments; leave --scheduler out."
             )
-        yield Alone(points, shelf)
+        yield InProcess(points, shelf)
     elif scheduler is not None:
         if study.keeps_runs:
             raise SceneError(
@@ -225,7 +225,7 @@ def workers(
                 client.get_executor, study, None, shelf, threads, lost, local=False
             )
     elif count == 1:
-        yield Alone(points, shelf)
+        yield InProcess(points, shelf)
     else:
         count = count or os.cpu_count() or 1
         yield Pool(lambda: _processes(count), study, points.runs, shelf, count)

@@ -20,7 +20,7 @@ from drivers.picoscope.scope import PicoScope
 from sim_backend.coil.list_mode import ListFault
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.picoscope.faults import ScopeFault
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import FarEnd
@@ -39,7 +39,7 @@ class Injection:
     coil: tuple[SerialFault | ListFault, ...] = ()
     scope: tuple[ScopeFault, ...] = ()
     meter: tuple[SerialFault, ...] = ()
-    make: Make | None = None
+    make: UnitModel | None = None
     prepare: Callable[[Bench], Bench] | None = None
     bug: bool = False
     """It stands for a mistake in this program: the traceback is kept, not explained."""
@@ -91,7 +91,7 @@ def _scope(**fault: Any) -> Cause:
 
 
 def _made(**make: Any) -> Cause:
-    return lambda chance: Injection(make=Make(**make))
+    return lambda chance: Injection(make=UnitModel(**make))
 
 
 def _prepared(prepare: Callable[[Bench], Bench]) -> Cause:

@@ -26,7 +26,7 @@ import numpy as np
 from provenance import provenance
 
 from drivers.picoscope.scope import PicoScope
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.clock import RealClock, SimulatedClock
@@ -147,7 +147,7 @@ def paced(rate: float, inputs: int, seconds: float) -> tuple[int, float, float]:
 def starved(fifo: int | None, pause: float) -> tuple[int, str]:
     """Samples the library dropped, and what the driver said."""
     clock = SimulatedClock()
-    lib = FakePs3000a(Pattern(1 << 22), clock, Make(fifo=fifo))
+    lib = FakePs3000a(Pattern(1 << 22), clock, UnitModel(fifo=fifo))
     scope = PicoScope(clock=clock, library=lib, ring=1 << 20)
     said = "nothing"
     with clock.taking_part("benchmark"):

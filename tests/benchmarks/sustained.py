@@ -27,7 +27,7 @@ import numpy as np
 from provenance import provenance
 
 from drivers.picoscope.scope import PicoScope
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.acquisition.intake import Intake
@@ -77,7 +77,7 @@ class Table:
 def one(rate: float, seconds: float, root: Path) -> str:
     """A row of the table: `rate` MS/s for `seconds`."""
     clock = RealClock()
-    library = FakePs3000a(Table(1 << 23), clock, Make(beyond=4))
+    library = FakePs3000a(Table(1 << 23), clock, UnitModel(beyond=4))
     thread = ScopeThread(PicoScope(clock=clock, library=library), clock)
     thread.start()
     clock.wait_for(lambda: thread.settled)

@@ -9,7 +9,7 @@ from replay import read_transcript
 from drivers.attached import ask_name, attached, fitting, try_out
 from drivers.diagnosis import diagnose, disk
 from drivers.picoscope.sdk import bind
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.serve import ServedBench
 from tactile_lab.clock import RealClock
@@ -146,7 +146,7 @@ def test_picosdk_is_asked_where_usb_cannot_be_looked_at(monkeypatch):
     def blind():
         raise NotFoundError("no libusb")
 
-    library = FakePs3000a(None, RealClock(), Make(others=("SIM04/0002",)))
+    library = FakePs3000a(None, RealClock(), UnitModel(others=("SIM04/0002",)))
     monkeypatch.setattr("drivers.attached.present", blind)
     monkeypatch.setattr("drivers.attached.load", lambda: bind(library))
     found = [one for one in attached(ask=False) if one["fits"] == ("ps3000a",)]

@@ -10,7 +10,7 @@ from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.faults import ScopeFault
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
@@ -37,7 +37,7 @@ class Rig:
     """A scope on the simulated library, and a loop that polls it."""
 
     def __init__(
-        self, *faults: ScopeFault, make: Make | None = None, **options: object
+        self, *faults: ScopeFault, make: UnitModel | None = None, **options: object
     ) -> None:
         self.clock = SimulatedClock()
         self.library = FakePs3000a(SOURCE, self.clock, make, faults)
@@ -201,7 +201,7 @@ def test_polling_later_than_the_ring_lasts_is_a_loss() -> None:
 
 
 def test_a_small_fifo_in_the_scope_starves_and_shows() -> None:
-    rig = Rig(make=Make(fifo=1_500))
+    rig = Rig(make=UnitModel(fifo=1_500))
     rig.fails(SamplesLostError, "Samples are missing|few")
     assert rig.library.device.dropped > 0
 
@@ -231,7 +231,7 @@ def test_overrange_on_a_schedule() -> None:
 
 
 def test_usb2_port_is_refused_unless_allowed() -> None:
-    make = Make(usb="2.0", powers=(0x11E,))
+    make = UnitModel(usb="2.0", powers=(0x11E,))
     Rig(make=make).fails(LimitError, "USB 2 port.*allow_usb2 = true")
     rig = Rig(make=make, allow_usb2=True)
     rig.stream(0.1)
@@ -240,7 +240,7 @@ def test_usb2_port_is_refused_unless_allowed() -> None:
 
 
 def test_too_fast_for_usb2() -> None:
-    rig = Rig(make=Make(usb="2.0", powers=(0x11E,)), allow_usb2=True)
+    rig = Rig(make=UnitModel(usb="2.0", powers=(0x11E,)), allow_usb2=True)
     rig.fails(
         LimitError, "sample rate is impossible.*record.sample_rate", interval=64e-9
     )
@@ -248,7 +248,7 @@ def test_too_fast_for_usb2() -> None:
 
 
 def test_missing_mains_adapter_is_refused_unless_allowed() -> None:
-    make = Make(powers=(0x11A,))
+    make = UnitModel(powers=(0x11A,))
     rig = Rig(make=make)
     rig.fails(LimitError, "mains adapter is not connected.*allow_usb_power = true")
     assert not rig.library.device.is_open
@@ -256,13 +256,13 @@ def test_missing_mains_adapter_is_refused_unless_allowed() -> None:
 
 
 def test_two_power_states_one_after_the_other() -> None:
-    make = Make(powers=(0x11A, 0x11E), usb="2.0")
+    make = UnitModel(powers=(0x11A, 0x11E), usb="2.0")
     Rig(make=make, allow_usb_power=True).fails(LimitError, "allow_usb2")
     Rig(make=make, allow_usb2=True, allow_usb_power=True).works()
 
 
 def test_undervoltage_cannot_be_acknowledged() -> None:
-    make = Make(powers=(0x11A, 0x11C))
+    make = UnitModel(powers=(0x11A, 0x11C))
     rig = Rig(make=make, allow_usb_power=True)
     rig.fails(RefusedError, "cannot feed the scope; use the mains adapter")
 
@@ -297,7 +297,7 @@ def test_undervoltage_while_streaming() -> None:
 
 
 def test_inputs_that_are_off_on_usb_power() -> None:
-    make = Make(powers=(0x11A,), usb_powered_inputs="AB")
+    make = UnitModel(powers=(0x11A,), usb_powered_inputs="AB")
     rig = Rig(make=make, allow_usb_power=True)
     rig.fails(RefusedError, r"input C \(V_K\).*connect the mains adapter")
 
@@ -320,7 +320,7 @@ def test_busy_and_overlap_answers_are_asked_again(code: int) -> None:
 
 
 def test_another_program_has_it() -> None:
-    rig = Rig(make=Make(taken=True))
+    rig = Rig(make=UnitModel(taken=True))
     rig.fails(NotFoundError, "close other programs")
 
 
@@ -384,7 +384,7 @@ def test_samples_left_unread_because_it_was_busy_are_no_loss() -> None:
 
 
 def test_an_input_that_has_no_power_counts_as_switched_off() -> None:
-    make = Make(powers=(0x11A,), usb_powered_inputs="AB")
+    make = UnitModel(powers=(0x11A,), usb_powered_inputs="AB")
     rig = Rig(make=make, allow_usb_power=True)
     rig.scope.open()
     rig.scope.start(FOUR[:2], 1e-5)
@@ -392,7 +392,7 @@ def test_an_input_that_has_no_power_counts_as_switched_off() -> None:
 
 
 def test_a_model_with_two_inputs() -> None:
-    rig = Rig(make=Make(variant="3203D"))
+    rig = Rig(make=UnitModel(variant="3203D"))
     rig.scope.open()
     assert rig.scope.capability.inputs == ("A", "B")
     with pytest.raises(LimitError, match="the scope has A, B"):
@@ -440,7 +440,7 @@ def test_samples_lost_shortly_before_the_end_are_told(begins: float) -> None:
 
 def test_a_call_that_takes_longer_than_the_ring_holds_has_lost_nothing() -> None:
     """What the library hands over meanwhile is copied as it comes."""
-    rig = Rig(make=Make(parts=8), ring=3_000, lag_tolerance=0.01)
+    rig = Rig(make=UnitModel(parts=8), ring=3_000, lag_tolerance=0.01)
     device = rig.library.device
     render = device.source.render
 

@@ -10,7 +10,7 @@ from voltages import Voltages
 
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.setup import streaming_interval
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from sim_backend.plant.scope_source import Acquisition, Codes
 from tactile_lab.clock import SimulatedClock
@@ -114,7 +114,9 @@ def test_any_chunking_and_ring_length_gives_the_same_samples(
     ring: int, longest: int | None, parts: int, empty: bool, pauses: list[int]
 ) -> None:
     clock = SimulatedClock()
-    make = Make(parts=parts, longest_part=longest, empty_callbacks=empty, fifo=100_000)
+    make = UnitModel(
+        parts=parts, longest_part=longest, empty_callbacks=empty, fifo=100_000
+    )
     library = FakePs3000a(Counter(), clock, make)
     with PicoScope(clock=clock, library=library, ring=ring, lag_tolerance=1) as scope:
         scope.start(PAIR, 1e-5)

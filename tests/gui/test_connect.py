@@ -21,7 +21,7 @@ from gui.dialogs.bench_text import (
 )
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import InstrumentsPage
-from gui.review.conclusion import Concluded, conclusion_of
+from gui.review.conclusion import ShownConclusion, conclusion_of
 from gui.state import FaultNotice, WindowState
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.ending import Ending
@@ -205,7 +205,7 @@ def test_both_parts_of_the_loop_can_be_read_beside_what_was_found(lab) -> None:
     dialog.show_page(2)
     page, current = dialog.calibration, np.linspace(-1, 1, 21)
     page.show_loop(np.c_[current, 0.011 * current])
-    page.show_conclusion(Concluded("", ("found",) * 4, (), (), (), Path("c.csv")))
+    page.show_conclusion(ShownConclusion("", ("found",) * 4, (), (), (), Path("c.csv")))
     try:
         lab.until(lambda: page.loop.isVisible() and len(page.loop.panels) == 2)
         lab.app.processEvents()

@@ -9,7 +9,7 @@ import pytest
 from drivers.picoscope.scope import PicoScope
 from sim_backend.bench import open_bench
 from sim_backend.picoscope.faults import ScopeFault
-from sim_backend.picoscope.scope import Make
+from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import Event, Message, RunState
@@ -164,7 +164,7 @@ def test_a_scope_that_was_chosen_among_several_is_told(
     tmp_path: Path, serial: str, told: bool
 ) -> None:
     scene = load("demo", (*OVERRIDES, *filter(None, [serial])))
-    make = Make(others=("SIM04/0002",))
+    make = UnitModel(others=("SIM04/0002",))
     seen: list[Event] = []
     bench = open_bench(scene, needs(scene), make=make)
     done = Execution(scene, tmp_path, bench=bench, emit=seen.append).run()

@@ -10,7 +10,7 @@ import pytest
 
 from tactile_lab.errors import RecordingError
 from tactile_lab.store import ledger
-from tactile_lab.store.durable import Durable
+from tactile_lab.store.durable import DiskSync
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.ledger import LEDGER, Ledger, read_ledger
@@ -225,7 +225,7 @@ def test_a_measured_run_is_synced_again_and_again(bench, folder, monkeypatch):
 def test_syncs_come_from_a_thread_of_their_own(tmp_path):
     file = tmp_path / "grows"
     file.write_bytes(b"x")
-    durable = Durable(file, every=0.001)
+    durable = DiskSync(file, every=0.001)
     deadline = 30_000
     while durable.count < 3 and deadline:
         durable._ended.wait(0.001)
