@@ -160,7 +160,7 @@ def _readable_rows(table: h5py.Dataset) -> list[Any]:
 
 
 def _listed(file: h5py.File, name: str) -> dict[int, list[tuple[int, int, int, int]]]:
-    """Chunks of a channel as `LedgerContents` has them; the newest may lack its checksum."""
+    """Chunks as `LedgerContents` has them; the newest may lack its checksum."""
     samples, found = file[f"samples/{name}"], {}
     checks = _readable_rows(file[f"checks/{name}"])
 
