@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 
-from gui.lanes.source import LiveSource, Source
+from gui.lanes.live import LiveSource
+from gui.lanes.source import Source
 from gui.review.conclusion import conclusion_of
 from gui.review.results import ResultsView
 from gui.session.fit import Fit, FitInput, fit_input, fit_steps

@@ -6,7 +6,7 @@ import time
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 

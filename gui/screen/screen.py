@@ -10,7 +10,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from gui.ask_file import ask_file
 from gui.lanes.compare import Comparison
 from gui.lanes.lane import Lane, lanes_for
-from gui.lanes.source import LiveSource, PlanSource, Source
+from gui.lanes.live import LiveSource
+from gui.lanes.source import PlanSource, Source
 from gui.review.run_card import day
 from gui.review.run_results import RunResults
 from gui.screen.panels import Panels

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Signal
 
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.session.live_task import LiveTask
 from gui.session.log import Log, Severity
 from gui.session.status import Status

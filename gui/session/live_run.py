@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Signal
 
 from gui.lanes.expected import Stretch
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.session.live_task import LiveTask
 from gui.session.log import Log, Severity
 from gui.session.status import Status

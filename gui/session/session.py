@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.session.bench import ConnectedBench
 from gui.session.chips import Chips
 from gui.session.form_plan import FormPlan

@@ -28,7 +28,7 @@ from PySide6.QtWidgets import QApplication
 from gui.app import application, begin
 from gui.garbage import collected_here
 from gui.lanes.expected import Stretch
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.look.theme import Theme
 from gui.session.session import Session
 from gui.state import WindowState

@@ -39,7 +39,7 @@ def draw(scale: str) -> None:
 
     from gui.app import application
     from gui.lanes.lane import lanes_for
-    from gui.lanes.source import LiveSource
+    from gui.lanes.live import LiveSource
     from gui.lanes.stack import LaneStack
     from gui.lanes.view import TimeView
     from gui.look.theme import Theme

@@ -3,9 +3,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.expected import Aligned, Preview, Stretch
+from gui.lanes.live import Readings
 from gui.lanes.paint import zigzag
 from gui.lanes.rate import rate_of
-from gui.lanes.source import Readings
 from gui.plots.numbers import decimals, nice_range, number, signed, ticks
 from tactile_lab.pyramid import COARSE, FINE, Pyramid
 from tactile_lab.spikes.rate import rate_at

@@ -7,7 +7,7 @@ from PySide6.QtCore import QPoint, QRectF, qInstallMessageHandler
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator, QSvgRenderer
 
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.look.tokens import DARK, LIGHT
 
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 from gui.lanes.box import heights_of
 from gui.lanes.floor import AXIS
 from gui.lanes.lane import lanes_for
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
 from gui.look.theme import Theme

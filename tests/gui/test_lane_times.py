@@ -5,8 +5,9 @@ import pytest
 
 from gui.lanes import navigator
 from gui.lanes.expected import Preview, Stretch
+from gui.lanes.live import LiveSource
 from gui.lanes.navigator import Navigator
-from gui.lanes.source import LiveSource, PlanSource
+from gui.lanes.source import PlanSource
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from tactile_lab.trace import Trace

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QApplication
 
 from gui.lanes.card import LINE, TITLE, LaneCard
 from gui.lanes.lane import Lane, lanes_for
+from gui.lanes.live import LiveSource
 from gui.lanes.readings import (
     Painted,
     count_between,
@@ -14,7 +15,6 @@ from gui.lanes.readings import (
     values_at,
     view_text,
 )
-from gui.lanes.source import LiveSource
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from tactile_lab.trace import HOLDS, Trace

@@ -12,7 +12,8 @@ from PySide6.QtWidgets import (
 
 from gui.dialogs.help import Help
 from gui.lanes.expected import Preview, Stretch
-from gui.lanes.source import LiveSource, PlanSource
+from gui.lanes.live import LiveSource
+from gui.lanes.source import PlanSource
 from gui.state import CoilKnowledge, WindowState, stop_text, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault

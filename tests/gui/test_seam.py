@@ -5,9 +5,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from gui.lanes.expected import Preview, Stretch
+from gui.lanes.live import LiveSource
 from gui.lanes.phase import phase
 from gui.lanes.rate import rate_of
-from gui.lanes.source import LiveSource
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.spikes.rate import begins
 from tactile_lab.trace import Trace

@@ -13,7 +13,7 @@ from gui import bindings as _first  # noqa: F401  the first of all, as in gui.ap
 from gui.lanes.box import LaneBox
 from gui.lanes.expected import Stretch
 from gui.lanes.lane import lanes_for
-from gui.lanes.source import LiveSource
+from gui.lanes.live import LiveSource
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
