@@ -19,8 +19,8 @@ from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock, write_json
 from tactile_lab.studies.addresses import addresses, seeds_of
-from tactile_lab.studies.answers import plots
 from tactile_lab.studies.dataset import Gathered, gathered
+from tactile_lab.studies.figures import plots
 from tactile_lab.studies.points import BY_POINT, RUNS
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study

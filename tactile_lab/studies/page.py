@@ -43,7 +43,8 @@ def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     # heavy, and a study that is finished needs neither
     from tactile_lab.report.canvas import draw, save
     from tactile_lab.report.html import picture, rendered
-    from tactile_lab.studies.answers import conclude, plots
+    from tactile_lab.studies.answers import conclude
+    from tactile_lab.studies.figures import plots
 
     study, said, drawn = found.study, conclude(found), list(plots(found))
     subtitle = f"{study.scene.name} · {' × '.join(map(str, study.design.shape)) or 1}"

@@ -13,8 +13,9 @@ from tactile_lab import Circuit
 from tactile_lab.cli import cli
 from tactile_lab.model.equations import critical_force
 from tactile_lab.quantity import parse, show, typed
-from tactile_lab.studies.answers import conclude, plots
+from tactile_lab.studies.answers import conclude
 from tactile_lab.studies.carry_out import carry_out
+from tactile_lab.studies.figures import plots
 from tactile_lab.studies.study import load_study
 
 PARTS = {"R1": 9.58e4, "V_GS": 2e-3, "V_th": 5e-3}
