@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 
+NEAR = 0.01
+"""Part of a value, or of its largest change, that is told as no difference."""
+
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
@@ -160,35 +163,35 @@ class Waveform:
         )
         return value
 
-    def arrival(self, at: float, since: float, within: float = 0.01) -> float:
-        """When it came near the value it has at `at` s, to stay until then, s.
+    def arrival(self, at: float, since: float) -> float:
+        """When it came within `NEAR` of the value it has at `at` s, to stay, s.
 
         Args:
             at: s.
             since: nothing before is looked at; the answer where it stayed near, s.
-            within: part of that value that counts as near.
         """
         held = float(self.at(at))
         inside = (self.time >= since) & (self.time <= at)
-        away = np.flatnonzero(np.abs(self.value[inside] - held) > within * abs(held))
+        away = np.flatnonzero(np.abs(self.value[inside] - held) > NEAR * abs(held))
         if not away.size:
             return since
         there = self.time[inside][away[-1] + 1 :]
         return float(there[0]) if there.size else at
 
-    def departure(self, since: float, until: float, within: float = 0.01) -> float:
+    def departure(self, since: float, until: float) -> float:
         """When it begins to leave the value it has at `since` s; or that, if never.
+
+        It has not left while it changes by less than `NEAR` of its largest change.
 
         Args:
             since: s.
             until: nothing beyond is looked at, s.
-            within: part of the largest change that is none yet.
         """
         inside = (self.time >= since) & (self.time <= until)
         apart = np.abs(self.value[inside] - float(self.at(since)))
         if not apart.size or apart.max() == 0:
             return since
-        first = int(np.argmax(apart > within * apart.max()))
+        first = int(np.argmax(apart > NEAR * apart.max()))
         times = self.time[inside]
         return float(times[max(first - 1, 0)])
 

@@ -57,10 +57,10 @@ class FrameHeader:
         return cls(message, tag, size, bool(attributes & _EOM))
 
 
-def message_out(tag: int, payload: bytes, end: bool = True) -> bytes:
+def message_out(tag: int, payload: bytes) -> bytes:
     """DEV_DEP_MSG_OUT with `payload`, padded with zeros to a multiple of 4."""
     pad = -len(payload) % 4
-    header = FrameHeader(DEV_DEP_MSG_OUT, tag, len(payload), end)
+    header = FrameHeader(DEV_DEP_MSG_OUT, tag, len(payload), True)
     return header.pack() + payload + bytes(pad)
 
 

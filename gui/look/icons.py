@@ -95,17 +95,17 @@ def svg(name: str, colour: str) -> bytes:
 
 
 @lru_cache(maxsize=512)
-def pixmap(name: str, colour: str, size: int = 18, ratio: float = 2.0) -> QPixmap:
-    """The icon as a pixmap of `size` px."""
-    made = QPixmap(round(size * ratio), round(size * ratio))
+def pixmap(name: str, colour: str, size: int = 18) -> QPixmap:
+    """The icon as a pixmap of `size` px, sharp on a screen of twice as many."""
+    made = QPixmap(2 * size, 2 * size)
     made.fill(Qt.GlobalColor.transparent)
     painter = QPainter(made)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     QSvgRenderer(QByteArray(svg(name, colour))).render(
-        painter, QRectF(0, 0, size * ratio, size * ratio)
+        painter, QRectF(0, 0, 2 * size, 2 * size)
     )
     painter.end()
-    made.setDevicePixelRatio(ratio)
+    made.setDevicePixelRatio(2)
     return made
 
 

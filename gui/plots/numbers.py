@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+from tactile_lab import quantity
 from tactile_lab.quantity import printed
+
+JOINER = "\u2060"
 
 
 def step_of(span: float, at_most: int) -> float:
@@ -75,3 +78,8 @@ def nice_range(low: float, high: float, least: float) -> tuple[float, float]:
         math.floor((low - 0.06 * span) / step) * step,
         math.ceil((high + 0.06 * span) / step) * step,
     )
+
+
+def unbroken(text: str) -> str:
+    """Text in which no line ends between a number and its unit, or inside a unit."""
+    return quantity.unbroken(text).replace("/", f"{JOINER}/{JOINER}")

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QGraphicsOpacityEffect, QGridLayout, QLabel, QWidg
 from gui.lanes.lane import title_of
 from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, panel, row
-from gui.review.wording import unbroken
+from gui.plots.numbers import unbroken
 from gui.session.fit import Bar, Card
 
 ROW = 19

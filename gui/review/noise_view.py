@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QWidget
 
 from gui.look.theme import Theme
 from gui.parts import STRETCH, Segments, column, label, row
+from gui.plots.numbers import unbroken
 from gui.plots.small_plot import SmallPlot
-from gui.review.wording import unbroken
 from gui.session.session import Session
 from tactile_lab.analysis.noise import MAINS, Noise
 from tactile_lab.engine.engine import Reply

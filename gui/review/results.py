@@ -34,6 +34,7 @@ from gui.parts import (
     stack,
     with_gutter,
 )
+from gui.plots.numbers import unbroken
 from gui.plots.small_plot import SmallPlot
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.live_plots import (
@@ -43,7 +44,6 @@ from gui.review.live_plots import (
     rate_plot,
     train_plot,
 )
-from gui.review.wording import unbroken
 from gui.session.fit import Fit, FittedRate
 from gui.session.steps import cells
 from tactile_lab.arrays import FloatArray

@@ -18,8 +18,8 @@ from gui.parts import (
     stack,
     with_gutter,
 )
+from gui.plots.numbers import unbroken
 from gui.plots.small_plot import SmallPlot
-from gui.review.wording import unbroken
 from tactile_lab.plot import Plot
 
 SCOPES = ("Whole run", "In view", "A to B")

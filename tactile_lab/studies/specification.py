@@ -203,20 +203,18 @@ class Specification:
     seed: int
 
 
-def load_specification(
-    given: str | Path | Mapping[str, Any], name: str = "specification"
-) -> Specification:
+def load_specification(given: str | Path | Mapping[str, Any]) -> Specification:
     """A specification, validated; computes nothing.
 
     Args:
         given: a TOML file, or what one would hold.
-        name: of one that is no file.
 
     Raises:
         SceneError: something cannot be used as written.
     """
     if isinstance(given, Mapping):
-        data, origin, folder = dict(given), name, Path.cwd()
+        origin = name = "specification"
+        data, folder = dict(given), Path.cwd()
     else:
         path = Path(given)
         if not path.is_file():

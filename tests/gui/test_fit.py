@@ -11,9 +11,9 @@ from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QLabel
 
 from gui.lanes.readings import interval_text
+from gui.plots.numbers import unbroken
 from gui.review.fit_view import FitCards, TwinBars
 from gui.review.live_plots import train_plot
-from gui.review.wording import unbroken
 from gui.session.fit import FitInput, fit
 from gui.session.steps import facts_of
 from tactile_lab.measurement import MeasuredTrial
