@@ -37,20 +37,22 @@ def solve(
         )
     par = parameters(circuit)
     S = _memory(state)
+    # whole numbers would have the kernel compiled anew for them
+    span = float(state.time), float(state.force), float(until)
     keep_spikes = "spikes" in need.signals
     if circuit.saturation and need.node_a:
         from tactile_lab.model import coupled
 
         most = MOST_COUPLED
         status, spikes, rows = coupled.run(
-            force.time, force.value, state.time, state.force, until, circuit.k_F, par,
-            S, tolerance, keep_spikes, need.dense, need.dense_V_C2, most,
+            force.time, force.value, *span, circuit.k_F, par, S,
+            tolerance, keep_spikes, need.dense, need.dense_V_C2, most,
         )  # fmt: skip
     else:
         most = MOST_SPIKES
         status, spikes, rows = kernel.run(
-            force.time, force.value, state.time, state.force, until, circuit.k_F, par,
-            S, tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
+            force.time, force.value, *span, circuit.k_F, par, S,
+            tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
             need.dense_V_C2, most,
         )  # fmt: skip
     if status != kernel.DONE:

@@ -6,8 +6,10 @@ import sys
 
 import numpy as np
 import pytest
+from numba import float64
 
 from tactile_lab.errors import ParameterError
+from tactile_lab.model import kernel
 from tactile_lab.model.advance import advance, rest
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1, rest_V_C2
@@ -31,6 +33,13 @@ def test_150_millinewton_gives_the_known_spikes():
     assert result.spike_times.size == 37
     assert result.spike_times[0] == pytest.approx(1.0533804034882868, abs=1e-8)
     assert result.spike_times[-1] == pytest.approx(4.933638227816434, abs=1e-8)
+
+
+def test_whole_numbers_of_seconds_run_the_code_there_is():
+    simulate(Circuit(), SANITY, until=2)
+    advance(Circuit(), rest(Circuit(), time=0, force=0), SANITY, np.float32(0.5))
+    times = {signature[2:5] for signature in kernel.run.signatures}
+    assert times == {(float64, float64, float64)}
 
 
 def test_slices_give_the_spikes_of_the_whole():
