@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,7 +14,7 @@ from tactile_lab.analysis.spike_train import within
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, show
+from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.stimulus.indentation import fall, rise
 from tactile_lab.trial import Trial, Trials
@@ -87,15 +88,19 @@ class Touch(ForceProtocol):
         if not found:
             return Conclusion(missing=("No touch was completed.",))
         known = [t.clock_uncertainty for t in run.results if t.clock_uncertainty]
-        timed = f" ± {show(max(known), 's', 2)}" if known else ""
+        # half of the force comes as late as the field lags
+        half = math.hypot(max(known), run.lag_uncertainty or 0.0) if known else 0.0
+        stated = "lags" if run.lag_uncertainty else "lags of the force not stated"
+        timed = f" (95 %: clocks, {stated})" if known else ""
         rows = tuple(self._row(onset, found) for onset in self.onsets)
         answered = [one for one in found if one.latency is not None]
         said: tuple[str, ...] = ()
         if answered:
             first = min(answered, key=lambda one: one.latency or 0.0)
             said = (
-                f"The shortest latency is {show(first.latency or 0.0, 's', 3)}{timed} "
-                f"after half the force, at an onset of {show(first.asked, 's')}.",
+                "The shortest latency is "
+                f"{plus_minus(first.latency or 0.0, half, 's')} after half the force"
+                f"{timed}, at an onset of {show(first.asked, 's')}.",
             )
         values = [
             {

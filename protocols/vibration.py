@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, ClassVar
@@ -20,7 +21,7 @@ from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError, QuantityError
 from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed
+from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed, show
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
 from tactile_lab.stimulus.indentation import on_indentation
@@ -102,6 +103,7 @@ class Vibration(ForceProtocol):
                 "frequency_Hz": f,
                 "vector_strength": one.strength,
                 "phase_rad": one.phase,
+                "phase_uncertainty_rad_95": _phase_half(run, f, one),
                 "spikes": one.spikes,
                 "chance": one.chance,
             }
@@ -109,7 +111,7 @@ class Vibration(ForceProtocol):
         ]
         table = Table(
             headings=("Frequency", "Spikes", "Vector strength (95 %)", "Phase", "p"),
-            rows=tuple(_row(f, one) for f, one in found.items()),
+            rows=tuple(_row(run, f, one) for f, one in found.items()),
             note=timing_note(run),
         )
         return Conclusion(
@@ -127,9 +129,10 @@ class Vibration(ForceProtocol):
         yield Plot(
             name="summary",
             title="phase locking",
-            caption="Vector strength of the spikes against the force's own cycle, with "
-            "its 95 % interval, and the phase of their mean: 0 is where the force is "
-            "largest. Dotted: what chance alone exceeds in 5 % of cases (Rayleigh).",
+            caption="Vector strength of the spikes against the force's own cycle, "
+            "shaded: its 95 % interval, and the phase of their mean with its own: 0 is "
+            "where the force is largest. Dotted: what chance alone exceeds in 5 % of "
+            "cases (Rayleigh).",
             x_label="Frequency",
             x_unit="Hz",
             x_prefix="",
@@ -141,7 +144,8 @@ class Vibration(ForceProtocol):
                     series=(
                         Series(
                             x=at, y=[one.strength.value for one in known],
-                            y_error=[one.strength.half for one in known], mark="points",
+                            low=[one.strength.low for one in known],
+                            high=[one.strength.high for one in known], mark="points",
                         ),
                         Series(x=at, y=least, mark="dotted", colour="quiet"),
                     ),
@@ -154,6 +158,10 @@ class Vibration(ForceProtocol):
                     series=(
                         Series(
                             x=at, y=[float(np.degrees(one.phase)) for one in known],
+                            y_error=[
+                                float(np.degrees(_phase_half(run, f, one)))
+                                for f, one in found.items()
+                            ],
                             mark="points",
                         ),
                     ),
@@ -189,24 +197,36 @@ def locking_by_label(run: Measurement) -> tuple[dict[float, PhaseLocking], list[
     return found, missing
 
 
-def _row(frequency: float, one: PhaseLocking) -> tuple[str, ...]:
-    strength = one.strength
+def _phase_half(run: Measurement, frequency: float, one: PhaseLocking) -> float:
+    """Half of the 95 % interval of a phase, rad: its scatter, clocks and lag."""
+    late = math.hypot(_aligned(run), run.lag_uncertainty or 0.0)
+    return min(math.hypot(one.phase_half, 2 * math.pi * frequency * late), math.pi)
+
+
+def _aligned(run: Measurement) -> float:
+    """How well the sample clock is aligned with the coil, s; 0 where nobody knows."""
+    return max((t.clock_uncertainty or 0.0 for t in run.results), default=0.0)
+
+
+def _row(run: Measurement, frequency: float, one: PhaseLocking) -> tuple[str, ...]:
+    strength, half = one.strength, _phase_half(run, frequency, one)
     return (
         f"{frequency:.4g} Hz",
         str(one.spikes),
         f"{strength.value:.2f} ({strength.low:.2f} to {strength.high:.2f})",
-        printed(f"{np.degrees(one.phase):.0f}°"),
+        printed(f"{np.degrees(one.phase):.0f}° ± {np.degrees(half):.0f}°"),
         "< 0.001" if one.chance < 1e-3 else f"{one.chance:.2g}",
     )
 
 
 def timing_note(run: Measurement) -> str:
     """How well spikes are timed against the force, which is an error of each phase."""
-    known = [t.clock_uncertainty for t in run.results if t.clock_uncertainty]
-    if not known:
-        return "How well the sample clock is aligned with the coil is not known."
-    return (
-        f"Sample clock and coil are aligned to {1e3 * max(known):.2g} ms or better; at "
-        "100 Hz a millisecond is 36°. The force is that of the applied current behind "
-        "the lags that the bench file states."
-    )
+    told = "Phase: ± 95 %, its scatter over presentations"
+    aligned, lag = _aligned(run), run.lag_uncertainty
+    told += f", clock and coil aligned to {show(aligned, 's', 2)}" if aligned else ""
+    told += f", lags of the force known to {show(lag, 's', 2)}" if lag else ""
+    unknown = [] if aligned else ["how well the sample clock is aligned with the coil"]
+    unknown += [] if lag else ["how well the lags of the force are known"]
+    if unknown:
+        told += f"; not known, and not in it: {', '.join(unknown)}"
+    return f"{told}. p takes spikes as independent."

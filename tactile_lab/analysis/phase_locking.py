@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.analysis.noise import MAINS
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
@@ -42,6 +42,7 @@ class PhaseLocking:
     Attributes:
         strength: vector strength, 0 to 1.
         phase: of the mean vector, rad, -pi to pi; 0 where the force is largest.
+        phase_half: half of its 95 % interval by the scatter of the spikes, rad.
         spikes: how many.
         chance: probability of so large a strength from evenly spread phases
             (Rayleigh; it takes spikes as independent).
@@ -49,6 +50,7 @@ class PhaseLocking:
 
     strength: Estimate
     phase: float
+    phase_half: float
     spikes: int
     chance: float
 
@@ -61,7 +63,7 @@ class PhaseLocking:
 def phase_locking(presentations: Sequence[FloatArray]) -> PhaseLocking:
     """Vector strength of the phases (rad) in each of some equal presentations.
 
-    The interval is a jackknife's, on atanh of the strength: over presentations where
+    Intervals are a jackknife's, the strength's on its atanh: over presentations where
     there are enough of them (the spikes of one are not independent), else over spikes.
 
     Raises:
@@ -82,14 +84,27 @@ def phase_locking(presentations: Sequence[FloatArray]) -> PhaseLocking:
     left_out = np.abs(total - sums) / (phases.size - counts)
     known = np.arctanh(np.clip([strength, *left_out], 0.0, 1 - 1e-9))
     n = sums.size
-    error = math.sqrt((n - 1) / n * float(np.sum((known[1:] - known[1:].mean()) ** 2)))
+    error = _jackknifed(known[1:])
     wide = Estimate.of(float(known[0]), error, n - 1)
+    turned = _jackknifed(np.angle((total - sums) * total.conjugate())) * student_95(
+        n - 1
+    )
     low, high = math.tanh(max(wide.low, 0.0)), math.tanh(wide.high)
     slope = 1 - strength**2
     estimate = Estimate(strength, slope * error, low, high)
     return PhaseLocking(
-        estimate, float(np.angle(total)), phases.size, rayleigh(strength, phases.size)
+        strength=estimate,
+        phase=float(np.angle(total)),
+        phase_half=min(turned, math.pi),
+        spikes=phases.size,
+        chance=rayleigh(strength, phases.size),
     )
+
+
+def _jackknifed(left_out: FloatArray) -> float:
+    """Standard error of what was found with each of n left out, shape (n,)."""
+    apart = left_out - left_out.mean()
+    return math.sqrt((apart.size - 1) / apart.size * float(np.sum(apart**2)))
 
 
 def rayleigh(strength: float, spikes: int) -> float:

@@ -33,9 +33,11 @@ def test_the_interval_covers_the_truth(kappa):
 
     truth = float(i1(kappa) / i0(kappa))
     rng = np.random.default_rng(5)
-    found = [phase_locking(drawn(rng, kappa)).strength for _ in range(300)]
-    covered = np.mean([one.low <= truth <= one.high for one in found])
+    found = [phase_locking(drawn(rng, kappa)) for _ in range(300)]
+    covered = np.mean([one.strength.low <= truth <= one.strength.high for one in found])
     assert 0.91 <= covered <= 0.99
+    near = np.mean([abs(one.phase - 0.7) <= one.phase_half for one in found])
+    assert 0.91 <= near <= 0.99
 
 
 def test_spikes_of_one_presentation_are_not_counted_as_independent():

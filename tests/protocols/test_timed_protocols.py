@@ -1,5 +1,7 @@
 """Protocols that only a source with a clock of its own can play."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -72,13 +74,21 @@ def test_a_vibration_is_the_sine_asked_for_while_it_lasts():
 
 def test_spikes_of_the_model_lock_to_a_strong_vibration():
     protocol = Vibration(count=2, highest=40.0, presentations_each=10)
-    found = protocol.conclude(answered(protocol))
+    run = answered(protocol)
+    found = protocol.conclude(run)
     slow, fast = found.plain["phase_locking"]
     assert slow["frequency_Hz"] == pytest.approx(10.0)
     assert slow["vector_strength"]["value"] > 0.5 and slow["chance"] < 0.01
     assert fast["vector_strength"]["low_95"] > 0.2
     assert "locked to the vibration at 10 Hz" in found.text
-    assert "aligned to 1 ms or better" in found.text
+    note = found.tables[0].note
+    assert "clock and coil aligned to 1 ms; not known, and not in it: how well" in note
+    # a millisecond is 14 degrees at 40 Hz: phases stood there bare
+    lagged = protocol.conclude(replace(run, lag_uncertainty=3e-3))
+    turned = np.hypot(1e-3, 3e-3) * 2 * np.pi * 40
+    _, fast = lagged.plain["phase_locking"]
+    assert turned < fast["phase_uncertainty_rad_95"] < turned + 0.5
+    assert "° ± " in lagged.tables[0].rows[0][3]
 
 
 def test_a_delay_turns_the_phase_and_leaves_the_strength():
@@ -124,13 +134,16 @@ def test_a_profile_of_one_s_own(tmp_path):
 
 def test_faster_touches_are_answered_sooner():
     protocol = Touch(repeats=1)
-    found = protocol.conclude(answered(protocol))
+    run = answered(protocol)
+    found = protocol.conclude(run)
     touches = found.plain["touches"]
     took = [one["onset_10_90_s"] for one in touches]
     assert took == pytest.approx([0.59 * onset for onset in protocol.onsets], rel=0.06)
     latencies = [one["latency_s"] for one in touches]
     assert all(late is not None and late > 0 for late in latencies)
-    assert "The shortest latency" in found.text and "± 1 ms" in found.text
+    assert "± 1.0 ms after half the force (95 %: clocks, lags of the" in found.text
+    lagged = protocol.conclude(replace(run, lag_uncertainty=3e-3))
+    assert "± 3.2 ms after half the force (95 %: clocks, lags)" in lagged.text
 
 
 @pytest.mark.parametrize("kind", [Vibration, Texture, Touch])
