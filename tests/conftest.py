@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import shutil
 import tempfile
@@ -19,8 +21,11 @@ if TYPE_CHECKING:
     from xdist.scheduler import LoadFileScheduling
 
 # what the program keeps for its user, and what its user told it, is no test's
+HOME = Path(tempfile.mkdtemp(prefix="tactile-lab-test-"))
+atexit.register(shutil.rmtree, HOME, ignore_errors=True)
 for _name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"):
-    os.environ[_name] = tempfile.mkdtemp(prefix="tactile-lab-test-")
+    (HOME / _name).mkdir()
+    os.environ[_name] = str(HOME / _name)
 
 COILS = Path(os.environ["XDG_STATE_HOME"], "tactile-lab", "coils")
 
@@ -90,3 +95,9 @@ def pytest_xdist_make_scheduler(
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put what waits first: something is left to compute as long as it waits."""
     items.sort(key=lambda item: item.nodeid.partition("::")[0] not in WAITING)
+
+
+def pytest_collection_finish() -> None:
+    """Look for circles among what tests make, not among all modules and tests, too."""
+    gc.collect()
+    gc.freeze()

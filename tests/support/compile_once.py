@@ -1,18 +1,23 @@
-"""Have what is compiled on its first call compiled, once, before the tests begin.
+"""Have what is compiled on its first use compiled, once, before the tests begin.
 
     python tests/support/compile_once.py
 
-Each worker of the tests would compile for itself what no other has kept yet. One core
-does this while another checks the types.
+Each worker of the tests would compile for itself what no other has kept yet, and each
+would rewrite the assertions of every test. One core does this while another checks the
+types.
 """
 
 import os
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 from tactile_lab.cli import cli
 from tactile_lab.skin.single import simulate_taxel
 from tactile_lab.skin.skin import load_skin
+
+ROOT = Path(__file__).parents[2]
 
 SKIN = """
 duration = "0.1 s"
@@ -44,7 +49,9 @@ COMMANDS = (
 
 
 def main() -> None:
-    """Run one command after another in a folder that is then removed."""
+    """Collect all tests; run one command after another in a folder then removed."""
+    collect = [sys.executable, "-m", "pytest", "--collect-only", "-qq"]
+    subprocess.run(collect, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         Path("plain.toml").write_text(SKIN.format(saturation=""))
