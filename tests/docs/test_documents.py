@@ -106,10 +106,12 @@ def test_each_example_of_the_scripting_how_to_is_expected_to_say_something():
 
 
 @pytest.mark.parametrize("number", range(len(SAID)))
-def test_each_example_of_the_scripting_how_to_stands_alone(tmp_path, number):
-    script = tmp_path / "script.py"
-    script.write_text(blocks(SCRIPTING, "python")[number], encoding="utf-8")
-    said = python(script, folder=tmp_path)
+def test_each_example_of_the_scripting_how_to_stands_alone(
+    tmp_path, monkeypatch, capsys, number
+):
+    monkeypatch.chdir(tmp_path)
+    exec(blocks(SCRIPTING, "python")[number], {"__name__": "__main__"})
+    said = capsys.readouterr().out
     assert re.search(SAID[number], said, flags=re.M), said
     if number == 5:
         tau = float(re.search(r"^tau ([\d.]+)", said, flags=re.M)[1])
