@@ -23,7 +23,7 @@ def run_together(clock: Clock, *works):
             thread.start()
         clock.sleep_until(1e-9)
     for thread in threads:
-        thread.join(10)
+        thread.join(60)
         assert not thread.is_alive()
 
 
@@ -110,7 +110,7 @@ def test_a_thread_outside_may_wait_for_what_happens_inside():
     inside = threading.Thread(target=lambda: run_together(clock, worker))
     inside.start()
     assert clock.wait_for(lambda: bool(done))
-    inside.join(10)
+    inside.join(60)
 
 
 def test_a_thread_outside_cannot_sleep_in_simulated_time():

@@ -106,7 +106,7 @@ def test_two_threads_at_once_are_refused_by_us_before_the_library_is() -> None:
             self, acquisition: Acquisition, first: int, samples: int
         ) -> tuple[Codes, tuple[bool, ...]]:
             inside.set()
-            go_on.wait(10)
+            go_on.wait(60)
             return np.zeros((1, samples), dtype=np.int16), (False,)
 
     library = FakePs3000a(Slow(), clock)
@@ -122,7 +122,7 @@ def test_two_threads_at_once_are_refused_by_us_before_the_library_is() -> None:
 
     thread = threading.Thread(target=owner)
     thread.start()
-    assert inside.wait(10)
+    assert inside.wait(60)
     for attempt in (scope.poll, scope.stop):
         try:
             attempt()
@@ -131,7 +131,7 @@ def test_two_threads_at_once_are_refused_by_us_before_the_library_is() -> None:
     # the library itself notices as well
     assert library.ps3000aPingUnit(1) == 0x43
     go_on.set()
-    thread.join(10)
+    thread.join(60)
     assert "second thread" in str(seen[0])
     assert "under way" in str(seen[1])
     scope.close()
@@ -142,7 +142,7 @@ def test_closing_from_another_thread_is_allowed_when_idle() -> None:
     scope = PicoScope(clock=clock, library=FakePs3000a(Voltages({}), clock))
     thread = threading.Thread(target=scope.open)
     thread.start()
-    thread.join(10)
+    thread.join(60)
     with pytest.raises(RefusedError, match="thread that opened it"):
         scope.start(ONE, 1e-5)
     scope.close()

@@ -60,7 +60,7 @@ class OnScreen:
         """What xdotool says; "" if it finds nothing."""
         done = subprocess.run(
             ["xdotool", *arguments],
-            env=self.environment, capture_output=True, text=True, timeout=20,
+            env=self.environment, capture_output=True, text=True, timeout=LONGEST,
         )  # fmt: skip
         return done.stdout.strip()
 
@@ -157,7 +157,7 @@ def on_screen(tmp_path: Path, source: Source) -> Iterator[OnScreen]:
         for process in reversed(started):
             if process.poll() is None:
                 process.terminate()
-                process.wait(10)
+                process.wait(LONGEST)
 
 
 STOP, MENU = 130, 440
