@@ -46,8 +46,20 @@ def _say_unkept() -> None:
     )
 
 
+SPOILT = (
+    EOFError,
+    UnpicklingError,
+    ValueError,
+    IndexError,
+    AttributeError,
+    ImportError,
+)
+"""What a file of the cache raises that was cut short, or names a class or module of an
+earlier version of the program."""
+
+
 class _CodeOnDisk(FunctionCache):
-    """numba's cache, where a file that was cut short is as good as none.
+    """numba's cache, where a file that cannot be read is as good as none.
 
     numba's own loads all that its compiler knows before it looks on the disk: 0.3 s and
     20 MB, scipy's linear algebra among it, in each process that finds its code there.
@@ -60,6 +72,6 @@ class _CodeOnDisk(FunctionCache):
         try:
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except (EOFError, UnpicklingError, ValueError, IndexError):
+        except SPOILT:
             self.flush()  # type: ignore[no-untyped-call]
             return None

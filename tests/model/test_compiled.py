@@ -1,7 +1,10 @@
 """The first use of the solver on a computer says why it takes long."""
 
+import pickle
 import subprocess
 import sys
+
+import numba
 
 CODE = """
 import numba
@@ -36,7 +39,10 @@ print(kept(twice)(3.0))
 
 
 def test_a_cache_that_cannot_be_used_costs_only_time(tmp_path, monkeypatch):
-    """An empty file of it made every verb end with 130, as EOFError means Ctrl-C."""
+    """An empty file of it made every verb end with 130, as EOFError means Ctrl-C.
+
+    One that names a class of an earlier version ended each in an AttributeError.
+    """
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     (tmp_path / "own.py").write_text(KEPT)
 
@@ -51,11 +57,12 @@ def test_a_cache_that_cannot_be_used_costs_only_time(tmp_path, monkeypatch):
     first = run("unwritable")
     assert "Compiling" in first and "cannot be kept" in first
     assert "Compiling" in run(), "nothing was kept"
-    for spoilt in ("nbi", "nbc"):
+    renamed = pickle.dumps(numba.__version__) + b"ctactile_lab.quantity\nRenamed\n."
+    for spoilt, content in (("nbi", b""), ("nbi", renamed), ("nbc", b"")):
         files = list(tmp_path.glob(f"cache/**/*.{spoilt}"))
         assert files
         for file in files:
-            file.write_bytes(b"")
+            file.write_bytes(content)
         again = run()
         assert "Compiling" in again and "cannot be kept" not in again
         assert not run(), f"a spoilt {spoilt} was not mended"
