@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import (
-    QDrag,
     QDragEnterEvent,
     QGuiApplication,
     QKeyEvent,
@@ -101,7 +100,6 @@ class StopAnywhere(QObject):
 
     def _act(self, reason: str) -> bool:
         self._session.stop(reason)
-        QDrag.cancel()
         while (menu := QApplication.activePopupWidget()) is not None and menu.close():
             pass
         return True

@@ -226,13 +226,17 @@ class Session:
             here = self.now
             if here["state"] == "ready" and here["at"] - pressed > PRESSED:
                 pressed = here["at"] if self.press("Run") else pressed
-            came_late = here["open"] or here["dialogs"]  # of the keys before
-            return here["output"] or here["state"] == "fault" or came_late
+            return here["output"] or here["state"] == "fault" or came_late()
+
+        def came_late() -> bool:  # of the keys before
+            return bool(self.now["open"] or self.now["dialogs"])
 
         for _ in range(TRIES):
             self.clear()
             self.tell("scene")
-            self.wait(lambda: "Run" in self.now["buttons"], 60, "planned")
+            self.wait(
+                lambda: "Run" in self.now["buttons"] or came_late(), 60, "planned"
+            )
             pressed = float("-inf")
             self.wait(runs, 90, "running with the coil on")
             if self.now["output"]:

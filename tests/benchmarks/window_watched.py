@@ -44,10 +44,14 @@ AMOUNTS = {"late": 1.0, "unplug": 2.0}
 """Of faults that have one, s."""
 
 
+TELLING = threading.Lock()
+
+
 def tell(what: object) -> None:
-    """A line for whoever drives the session."""
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
+    """A line for whoever drives the session; from any thread."""
+    with TELLING:
+        sys.stdout.write(json.dumps(what) + "\n")
+        sys.stdout.flush()
 
 
 def listen_to_trouble() -> None:

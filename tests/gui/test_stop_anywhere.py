@@ -1,7 +1,7 @@
 """STOP reaches the coil whatever Qt itself opens."""
 
-from PySide6.QtCore import QEvent, Qt, QTimer
-from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtCore import QEvent, QMimeData, QObject, QPoint, Qt, QTimer
+from PySide6.QtGui import QDragEnterEvent, QGuiApplication, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -68,6 +68,35 @@ def test_a_key_that_is_held_down_acts_once(lab) -> None:
     assert not any(card.isVisible() for card in window.findChildren(Overlay))
     off = [line for line in log.lines[before:] if line.source == "safety"]
     assert not off, "Esc closed the help; nothing was switched off"
+
+
+class KeysTaken(QObject):
+    """As Qt takes them from the whole program while text or a file is dragged."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        return isinstance(event, QKeyEvent)
+
+
+def test_stop_acts_while_something_is_dragged(lab, monkeypatch) -> None:
+    window, taken = lab.window, KeysTaken()
+    stopped: list[str] = []
+    data = QMimeData()  # which the event does not keep
+    enters = QDragEnterEvent(
+        QPoint(300, 300),
+        Qt.DropAction.CopyAction,
+        data,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    with monkeypatch.context() as spied:
+        spied.setattr(lab.session, "stop", stopped.append)
+        lab.app.installEventFilter(taken)
+        try:
+            QApplication.sendEvent(window.windowHandle(), enters)
+            QTest.keyClick(window.windowHandle(), Qt.Key.Key_F12)
+        finally:
+            lab.app.removeEventFilter(taken)
+    assert stopped == ["STOP by F12"]
 
 
 def test_esc_closes_the_dialog_that_got_the_keyboard_below_a_menu(lab) -> None:
