@@ -148,12 +148,15 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
 
 
 def _legend(painter: QPainter, source: Source, tokens: Tokens, right: int) -> None:
-    """Marker and name of each run, beside the title."""
-    names = [f"{m} {one.name}" for m, one in zip(MARKS, source.members, strict=False)]
+    """Marker and name of each run, as far as there is room beside the title."""
+    each, metrics = right // (len(source.members) + 1), painter.fontMetrics()
+    full = [f"{m} {one.name}" for m, one in zip(MARKS, source.members, strict=False)]
+    end = Qt.TextElideMode.ElideRight
+    names = [metrics.elidedText(name, end, each) for name in full]
     for name, colour in zip(
         reversed(names), reversed(tokens.runs[: len(names)]), strict=True
     ):
-        width = painter.fontMetrics().horizontalAdvance(name)
+        width = metrics.horizontalAdvance(name)
         painter.setPen(QColor(colour))
         right -= width
         painter.drawText(QRectF(right, 6, width + 2, 22), name)

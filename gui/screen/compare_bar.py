@@ -77,7 +77,7 @@ class CompareBar(QFrame):
             self._name(number, member.name) for number, member in enumerate(members)
         ]
         short = [self._name(k, m.name.split()[0]) for k, m in enumerate(members)]
-        names = full if self._fits(*full, *self._words) else short
+        names = full if self._fits(*full) else short
         low = self._fits(*names)
         way = QBoxLayout.Direction
         self._rows.setDirection(way.LeftToRight if low else way.TopToBottom)

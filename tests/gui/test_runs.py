@@ -11,6 +11,7 @@ import tactile_lab
 from gui.lanes.compare import MARKS
 from gui.look.theme import Theme
 from gui.review.runs import PAGE, RunsView
+from gui.screen.records import differing
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.summary import RunSummary
 
@@ -172,3 +173,17 @@ def test_arrows_go_from_run_to_run_and_tab_comes_to_one(runs: RunsView, qtbot) -
     qtbot.waitUntil(runs.cards[0].hasFocus)
     QTest.keyClick(runs.cards[0], Qt.Key.Key_Up)
     assert runs.cards[0].hasFocus()
+
+
+def test_compared_runs_say_in_what_they_differ() -> None:
+    same = {"hold": "2 s", "drift_limit": "0.1 V"}
+    runs = [
+        summary("a", "Pulses", "complete", parameters={**same, "levels": levels})
+        for levels in (["0.08 N", "0.12 N"], ["0.09 N"])
+    ]
+    assert differing(runs) == ["levels 80, 120 mN", "levels 90 mN"]
+    assert differing([runs[0], runs[0]]) == ["", ""]
+    other = summary("b", "Step", "complete", parameters={**same, "drift_limit": "1 V"})
+    assert differing([runs[1], other])[1] == "drift limit 1 V; levels —"
+    named = [summary("c", "", "complete", parameters={"order": o}) for o in ("up", [])]
+    assert differing(named) == ["order up", "order —"]
