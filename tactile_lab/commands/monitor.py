@@ -92,6 +92,7 @@ def _watch(
 
 
 def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:
+    from tactile_lab.engine.memory import give_back
     from tactile_lab.errors import TactileLabError
     from tactile_lab.report.from_run import read
     from tactile_lab.report.write import write
@@ -100,6 +101,7 @@ def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:
         folder = monitor.record(out, notes)
         say(f"run     {folder}")
         write(folder, read(folder))
+        give_back()  # it watches on for days
     except (TactileLabError, OSError) as reason:
         warn(f"not recorded: {reason}")
 

@@ -25,6 +25,7 @@ from tactile_lab.analysis.noise import Noise, noise
 from tactile_lab.bench import Bench
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
+from tactile_lab.engine.memory import give_back
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
 from tactile_lab.engine.task import Task
@@ -153,6 +154,8 @@ class Monitor(Task[Ending]):
             keep_scene(folder, self.scene)
             self._write(folder, held)
             write_certificate(folder.path)
+        del held
+        give_back()  # or each record leaves the heap larger by some MB
         return folder.path
 
     def noise(self, signal: str) -> Noise:

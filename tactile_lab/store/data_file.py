@@ -116,6 +116,24 @@ def open_data(path: Path, *, live: bool) -> h5py.File:
             raise refused from None
 
 
+def check_inside(file: h5py.File) -> None:
+    """Refuse what is kept in another file: it is not what was recorded.
+
+    Raises:
+        OSError: something in it is a link, or a table's bytes lie elsewhere.
+    """
+
+    def elsewhere(name: str, link: object) -> str | None:
+        if not isinstance(link, h5py.HardLink):
+            return name
+        node = file[name]
+        outside = isinstance(node, h5py.Dataset) and (node.external or node.is_virtual)
+        return name if outside else None
+
+    if (name := file.visititems_links(elsewhere)) is not None:
+        raise OSError(f"/{name} leads elsewhere, to what this run did not record")
+
+
 HEAP = b"GCOL\x01\x00\x00\x00"
 """With which HDF5 begins a heap of texts (its file format, III.E)."""
 DECLARED = 1 << 20

@@ -24,7 +24,7 @@ from tactile_lab.store.applied import (
     Shunt,
     applied_current,
 )
-from tactile_lab.store.data_file import open_data
+from tactile_lab.store.data_file import check_inside, open_data
 from tactile_lab.store.folder import DATA, SCENE, is_live, read_info
 from tactile_lab.store.layout import NEWER, RECORDS
 from tactile_lab.store.signal import StoredSignal, TimeAxis
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from tactile_lab.scene.scene import Scene
 
 Records = NDArray[Any]
+
+MOST_UNWRITTEN = 1 << 20
+"""Rows that a table may claim beyond those it holds, as one that was cut short does."""
 
 
 class StoredRun:
@@ -75,6 +78,7 @@ class StoredRun:
             opened = open_data(file, live=live)
             try:
                 opened.attrs["schema"], opened["events"]  # the last that was declared
+                check_inside(opened)
             except BaseException:
                 opened.close()
                 raise
@@ -206,10 +210,20 @@ class StoredRun:
         """A table of fixed records by name; see `layout.RECORDS` for its fields.
 
         Empty where the run is older than the table.
+
+        Raises:
+            RunFolderError: it claims far more rows than it holds.
         """
         if name in NEWER and name not in self._file:
             return np.empty(0, RECORDS[name])
-        rows: Records = self._file[name][()]
+        table = self._file[name]
+        held = table.id.get_storage_size() // table.dtype.itemsize
+        if table.size > held + MOST_UNWRITTEN:
+            raise RunFolderError(
+                f"/{name} claims {table.size:,} rows and holds {held:,} at most: "
+                f"{self.path / DATA} is damaged. `tactile-lab verify` says where else."
+            )
+        rows: Records = table[()]
         return rows
 
     def table(self, name: str) -> h5py.Dataset:

@@ -169,7 +169,7 @@ def _tables(run: Run) -> Iterator[Damage]:
     for name in RECORDS:
         try:
             run.records(name)
-        except UNREADABLE as error:
+        except (*UNREADABLE, RunFolderError) as error:
             yield Damage(f"{DATA} /{name}", f"cannot be read ({_brief(error)})")
 
 

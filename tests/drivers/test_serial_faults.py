@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from drivers.coil.guard import SILENCE
 from drivers.coil.source import CoilSource
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
@@ -132,6 +133,23 @@ def test_a_lasting_fault_is_told_and_not_called_safe(serial_bench, kind):
         assert not it.source.output_on and it.source.setpoint == 0.0
     it.end.faults.clear()
     assert it.coil.safe_off().verified
+
+
+@pytest.mark.parametrize("kind", ["deaf", "stuck", "missing"])
+def test_a_silent_source_does_not_make_the_program_look_hung(serial_bench, kind):
+    """The guard killed it while it tried to switch off: exit -9, and no word of why."""
+    it, beats = serial_bench, []
+    it.coil.open()
+    it.coil.energise()
+    it.coil._wire.link._beat = lambda: beats.append(it.clock.now())
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind=kind, times=None))
+    with pytest.raises(InstrumentError):
+        it.drive(0.7)
+    assert not it.coil.safe_off().verified
+    beats.append(it.clock.now())
+    assert beats[-1] - beats[0] > 5
+    assert max(b - a for a, b in itertools.pairwise(beats)) < SILENCE / 2
 
 
 @pytest.mark.parametrize("form", ["usb", "windows", "closed", "reset"])

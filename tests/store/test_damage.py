@@ -67,6 +67,32 @@ def test_a_hole_among_the_texts_of_the_file_is_damage(complete, at):
         Run.load(complete)
 
 
+@pytest.mark.parametrize("soft", [True, False], ids=["soft", "external"])
+def test_samples_that_lie_in_another_file_are_damage(complete, tmp_path, soft):
+    """A run whose samples were a link to another run's was called sound."""
+    other = shutil.copy(complete / "data.h5", tmp_path / "other.h5")
+    with h5py.File(complete / "data.h5", "r+") as file:
+        del file["samples/V_K"]
+        file["samples/V_K"] = (
+            h5py.SoftLink("/samples/V_C1")
+            if soft
+            else h5py.ExternalLink(str(other), "/samples/V_K")
+        )
+    (told,) = verify(complete).findings
+    assert "/samples/V_K leads elsewhere" in str(told)
+    with pytest.raises(RunFolderError, match="leads elsewhere"):
+        Run.load(complete)
+
+
+def test_a_table_that_claims_more_than_it_holds_fills_no_memory(complete):
+    """`verify`, `show` and `report` ended in a MemoryError."""
+    with h5py.File(complete / "data.h5", "r+") as file:
+        file["current"].resize((10**12,))
+    assert "claims 1,000,000,000,000 rows" in str(verify(complete).findings[0])
+    with Run.load(complete) as run, pytest.raises(RunFolderError, match="is damaged"):
+        run.records("current")
+
+
 @pytest.mark.parametrize("kinds", [["samples"], ["samples", "checks", "pyramid"]])
 def test_a_signal_whose_samples_are_gone_is_damage(complete, kinds):
     """One flipped bit in a name is enough to lose it from the file's list."""
