@@ -66,7 +66,8 @@ def line(row: dict) -> tuple[str, float]:
     cells, worst = [], 1.0
     for key, scale in (("seconds", 1.0), ("bytes", 1e6)):
         predicted, measured = (value / scale for value in row[key])
-        cells += [f"{predicted:.3g}", f"{measured:.3g}", f"{predicted / measured:.2f}"]
+        told = [f"{float(f'{v:.3g}'):g}" for v in (predicted, measured)]
+        cells += [*told, f"{predicted / measured:.2f}"]
         worst = max(worst, predicted / measured, measured / predicted)
     return f"| {row['scene']} | {' | '.join(cells)} |", worst
 
