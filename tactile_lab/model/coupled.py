@@ -122,7 +122,7 @@ from tactile_lab.model.transistor import (
 
 PATIENCE = 6
 """After so many steps that stability kept short it is stiff."""
-FEW_UNITS = 20.0
+FEW_UNITS = 4.0
 """A collocated step shorter than this, in units of the fastest rate, is not stiff."""
 
 

@@ -60,6 +60,12 @@ def test_a_spike_takes_a_dozen_steps():
     assert found.stages["V_C1"] <= 13 * found.spike_times.size
 
 
+def test_a_stiff_step_grows():
+    found = simulate(SENSOR, step(1.0), until=0.2)
+    assert found.spike_times.size == 0
+    assert found.stages["V_C1"] < 200
+
+
 def spice_rows():
     with Path(__file__).with_name("saturation.csv").open() as file:
         return list(csv.DictReader(file))
