@@ -51,7 +51,8 @@ COMMANDS = (
 def main() -> None:
     """Collect all tests; run one command after another in a folder then removed."""
     collect = [sys.executable, "-m", "pytest", "--collect-only", "-qq"]
-    subprocess.run(collect, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    # what cannot be collected is told by the tests' own run
+    subprocess.run(collect, cwd=ROOT, check=False, stdout=subprocess.DEVNULL)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         Path("plain.toml").write_text(SKIN.format(saturation=""))
