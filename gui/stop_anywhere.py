@@ -15,7 +15,13 @@ from PySide6.QtGui import (
     QKeySequence,
     QMouseEvent,
 )
-from PySide6.QtWidgets import QApplication, QDialog, QWidget
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QDialog,
+    QLineEdit,
+    QWidget,
+)
 
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
@@ -113,6 +119,8 @@ class StopAnywhere(QObject):
             mains = [stop.window() for stop in self._stops]
             if self._drags or QApplication.activePopupWidget() or window not in mains:
                 return False  # Qt lets go of what is dragged, and closes what has keys
+            if _edits_cell():
+                return False  # which Qt ends; what else was typed in the card stays
             if left := self._open():
                 left[-1].close()
                 return True
@@ -149,3 +157,10 @@ def _window_of(watched: QObject) -> QWidget | None:
         return watched.window()
     windows = QApplication.topLevelWidgets()
     return next((one for one in windows if one.windowHandle() == watched), None)
+
+
+def _edits_cell() -> bool:
+    """Whether the keyboard is in a cell of a table that is being typed into."""
+    focus = QApplication.focusWidget()
+    inside = focus.parentWidget() if isinstance(focus, QLineEdit) else None
+    return inside is not None and isinstance(inside.parentWidget(), QAbstractItemView)

@@ -3,7 +3,7 @@
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
 from gui.dialogs.connect import Connect
 from gui.dialogs.preferring import PreferencesCard
@@ -123,3 +123,16 @@ def test_a_lane_is_made_higher(lab, window) -> None:
     weight = stack.arrangement.weight
     assert weight(upper.lane) > before[0] and weight(lower.lane) < before[1]
     stack.forget_arrangement()
+
+
+def test_esc_in_a_note_that_is_typed_ends_the_typing_alone(lab, window) -> None:
+    """It closed the card, and all that was typed in it was lost."""
+    card = window.runs.card
+    card.show_run(lab.runs(1)[0])
+    card.add.click()
+    lab.until(lambda: isinstance(lab.app.focusWidget(), QLineEdit))
+    lab.until(lambda: lab.app.focusWidget() is not card.title)
+    press(lab, KEY.Key_Escape)
+    assert card.isVisible() and lab.session.state is WindowState.READY
+    press(lab, KEY.Key_Escape)
+    assert not card.isVisible()
