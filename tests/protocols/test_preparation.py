@@ -116,6 +116,20 @@ def test_the_film_s_own_memory_is_no_drift():
     assert watch.before(after, push.end) == pytest.approx(0, abs=1e-4)
 
 
+def test_a_force_that_is_there_from_its_first_moment_is_remembered_too():
+    """A wave may begin at its force, where the one before ended at none."""
+    rest, found = rest_V_C1(Circuit()), []
+    for time, force in (
+        ([0.0, 0.0, 1.0, 1.0, 2.0], [0.0, 0.2, 0.2, 0.0, 0.0]),
+        ([0.0, 1.0, 1.0, 2.0], [0.2, 0.2, 0.0, 0.0]),
+    ):
+        watch = Drift(Circuit(), lambda current: current.scaled(0.2), limit=0.1)
+        watch.before(rest, 0.0)
+        watch.plays(Waveform(np.array(time), np.array(force)).scaled(5.0), 0.0)
+        found.append(watch.before(rest, 2.0))
+    assert found[1] == pytest.approx(found[0]) and abs(found[0]) > 0.01
+
+
 def test_only_a_sensor_at_rest_is_judged():
     watch = Drift(Circuit(), lambda current: current, limit=0.1)
     watch.before(4.35, 0.0)
