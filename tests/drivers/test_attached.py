@@ -9,11 +9,16 @@ from replay import read_transcript
 from drivers.attached import ask_name, attached, fitting, try_out
 from drivers.diagnosis import diagnose, disk
 from drivers.picoscope.sdk import bind
+from sim_backend.coil.source import SimCoilSource
 from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
-from sim_backend.serve import ServedBench
-from tactile_lab.clock import RealClock
+from sim_backend.serial_line.wires import plug_in
+from sim_backend.serve import Gate, ServedBench
+from sim_backend.teslameter import SimTeslameter
+from sim_backend.voltage_source import voltage_far_end
+from tactile_lab.clock import RealClock, SimulatedClock
 from tactile_lab.errors import BadReplyError, InstrumentError, NotFoundError
+from tactile_lab.instruments.dialects import load_dialect
 
 
 @pytest.fixture
@@ -97,14 +102,6 @@ def test_a_port_that_is_gone_tells_those_there_are(monkeypatch):
     assert "(there now: /dev/ttyUSB1)" in problem
 
 
-@pytest.fixture
-def keithleys():
-    bench = ServedBench(coil="tcp:0", voltage_source="tcp:0", coil_row="keithley-2400")
-    bench.start()
-    yield bench.addresses
-    bench.close()
-
-
 KEITHLEY, GATE = ("coil", "keithley-2400"), ("voltage_source", "keithley-2400-voltage")
 KEPCO, METER = ("coil", "kepco-bop"), ("field_meter", "lakeshore-425")
 
@@ -124,22 +121,31 @@ KEPCO, METER = ("coil", "kepco-bop"), ("field_meter", "lakeshore-425")
     ],
     ids=lambda value: value if isinstance(value, str) else value[1],
 )
-def test_a_row_with_a_wrong_line_is_found_out(request, tmp_path, row, line):
+def test_a_row_with_a_wrong_line_is_found_out(
+    monkeypatch, resistor, tmp_path, row, line
+):
     """It passed, and the first run with it failed."""
-    folder, name = row
-    is_keithley = row in (KEITHLEY, GATE)
-    ports = request.getfixturevalue("keithleys" if is_keithley else "served")
-    port = ports["teslameter" if row is METER else folder]
-    shipped = resources.files("tactile_lab.instruments") / "rows" / folder
-    text = (shipped / f"{name}.toml").read_text(encoding="utf-8")
+    (folder, name), clock = row, SimulatedClock()
+    shipped, wire = load_dialect(name), load_dialect(name).serial
+    far = {
+        "coil": lambda: SimCoilSource(resistor, name, clock),
+        "field_meter": lambda: SimTeslameter(resistor, name, clock),
+        "voltage_source": lambda: voltage_far_end(Gate(), "V_GS", shipped, clock),
+    }[folder]()
+    rows = resources.files("tactile_lab.instruments") / "rows" / folder
+    text = (rows / f"{name}.toml").read_text(encoding="utf-8")
     key = line.split(" ")[0]
     file = tmp_path / "mine.toml"
     file.write_text(re.sub(rf"^{key} = .*$", lambda _: line, text, flags=re.MULTILINE))
     assert line in file.read_text()
-    right = try_out(port, name)
-    assert (":READ?" in right.get("not_tried", "")) is is_keithley
-    with pytest.raises(InstrumentError):
-        try_out(port, str(file))
+    end = plug_in(far, wire, clock)
+    monkeypatch.setattr("drivers.attached.RealClock", lambda: clock)
+    with clock.taking_part("test"):
+        right = try_out(end.url, name)
+        is_keithley = row in (KEITHLEY, GATE)
+        assert (":READ?" in right.get("not_tried", "")) is is_keithley
+        with pytest.raises(InstrumentError):
+            try_out(end.url, str(file))
 
 
 def test_picosdk_is_asked_where_usb_cannot_be_looked_at(monkeypatch):
