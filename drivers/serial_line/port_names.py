@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tactile_lab.errors import RecordingError
 from tactile_lab.lab import kept_of_port
-from tactile_lab.store.folder import replacing
+from tactile_lab.store.folder import write_text
 
 BY_ID = Path("/dev/serial/by-id")
 """Where Linux names serial ports by their adapters."""
@@ -57,8 +57,9 @@ class PortNames:
             return
         self._lasting, self.identity = lasting, identity
         # unkept, it costs only that the next program does not find it elsewhere
-        with suppress(OSError, RecordingError), replacing(self._file) as part:
-            part.write_text(json.dumps({"lasting": lasting, "identity": identity}))
+        with suppress(OSError, RecordingError):
+            text = json.dumps({"lasting": lasting, "identity": identity})
+            write_text(self._file, text)
 
     @property
     def elsewhere(self) -> str | None:

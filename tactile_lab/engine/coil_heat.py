@@ -21,7 +21,7 @@ from tactile_lab.errors import LimitError
 from tactile_lab.lab import kept_of_port
 from tactile_lab.planning.heat import cool_down
 from tactile_lab.scene.scene import Scene
-from tactile_lab.store.folder import lock, replacing
+from tactile_lab.store.folder import lock, write_text
 
 BOOT = Path("/proc/sys/kernel/random/boot_id")
 """Where Linux tells one start of the computer from another."""
@@ -121,8 +121,7 @@ class CoilHeat:
             "boot": _boot(),
         }
         try:
-            with replacing(self.path) as part:
-                part.write_text(json.dumps(told), encoding="utf-8")
+            write_text(self.path, json.dumps(told))
         except OSError as reason:
             raise LimitError(
                 f"How warm the coil is left cannot be kept for the next program: "

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.neuro import circuit_brian2, circuit_nestml, last_stage_nir
 from tactile_lab.neuro.formats import circuit_format_of
 from tactile_lab.neuro.solved import Solved
-from tactile_lab.store.folder import replacing
+from tactile_lab.store.folder import replacing, write_text
 
 
 def write(solved: Solved, file: Path) -> list[Path]:
@@ -40,6 +40,5 @@ def write(solved: Solved, file: Path) -> list[Path]:
             opened, time=solved.force.time, force=solved.force.value,
             duration=solved.result.duration, spikes=solved.spikes,
         )  # fmt: skip
-    with replacing(file) as part:
-        part.write_text(module.text(solved), encoding="utf-8")
+    write_text(file, module.text(solved))
     return [file, force]

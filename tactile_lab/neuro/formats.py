@@ -117,7 +117,7 @@ def write(events: Events, file: Path, name: str | None = None) -> list[Path]:
         RecordingError: there is no room.
         OSError: it cannot be written.
     """
-    from tactile_lab.store.folder import replacing
+    from tactile_lab.store.folder import replacing, write_text
 
     name = name or format_of(file)
     one = SPIKES[name]
@@ -127,8 +127,7 @@ def write(events: Events, file: Path, name: str | None = None) -> list[Path]:
         spikes = file.with_name(file.name.removesuffix(one.ending) + ".spikes.npz")
         with replacing(spikes) as part:
             write_spikes(events, part)
-        with replacing(file) as part:
-            part.write_text(script(name), encoding="utf-8")
+        write_text(file, script(name))
         return [file, spikes]
     module = importlib.import_module(f"tactile_lab.neuro.{one.spikes}")
     with replacing(file) as part:

@@ -22,7 +22,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
 from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
-from tactile_lab.store.folder import replacing
+from tactile_lab.store.folder import replacing, write_text
 
 # Any: matplotlib types the keys as some 400 literals
 STYLE: Any = {
@@ -404,6 +404,5 @@ def save(figure: Figure, stem: Path, *, pdf: bool = False) -> tuple[Path, str]:
             with replacing(stem.with_suffix(".pdf")) as new:
                 figure.savefig(new)
         figure.savefig(buffer, format="svg", metadata={"Date": None})
-    with replacing(stem.with_suffix(".svg")) as new:
-        new.write_text(buffer.getvalue(), encoding="utf-8")
+    write_text(stem.with_suffix(".svg"), buffer.getvalue())
     return png, buffer.getvalue()

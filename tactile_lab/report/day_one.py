@@ -12,7 +12,7 @@ from urllib.parse import quote
 from tactile_lab.errors import RunFolderError
 from tactile_lab.report.html import Picture, inlined, rendered
 from tactile_lab.scene.bench_file import BenchSpec
-from tactile_lab.store.folder import read_info, replacing
+from tactile_lab.store.folder import read_info, write_text
 
 FIGURE, REPORT = "figure.svg", "report.html"
 
@@ -77,8 +77,7 @@ def write_day(
         steps=[{**vars(step), **_shown(folder, step)} for step in steps],
         none="none",
     )
-    with replacing(page) as new:
-        new.write_text(text, encoding="utf-8")
+    write_text(page, text)
 
 
 def _shown(folder: Path, step: DayStep) -> dict[str, Picture | str | None]:

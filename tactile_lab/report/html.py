@@ -18,7 +18,7 @@ from tactile_lab.quantity import unbroken
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT
 from tactile_lab.report.taxel_map import TaxelMaps
-from tactile_lab.store.folder import replacing
+from tactile_lab.store.folder import write_text
 
 FITS = 12
 """Letters that any column of names holds."""
@@ -119,10 +119,14 @@ def write_page_of_runs(
         said=said,
         picture=drawn,
         tables=tables,
-        made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
+        made=written(),
     )
-    with replacing(file) as new:
-        new.write_text(text, encoding="utf-8")
+    write_text(file, text)
+
+
+def written() -> str:
+    """When a page was written, for its foot."""
+    return f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC."
 
 
 def _colours() -> str:

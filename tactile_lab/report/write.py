@@ -12,7 +12,7 @@ from tactile_lab.report.findings import Findings, find
 from tactile_lab.report.page import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
-from tactile_lab.store.folder import replacing
+from tactile_lab.store.folder import replacing, write_text
 from tactile_lab.store.progress import Progress, counted, nothing, share
 
 FOUND = 0.3
@@ -59,8 +59,7 @@ def write(
     progress(FOUND)
     results = folder / "results.json"
     # the numbers first: they survive if drawing should fail
-    with replacing(results) as new:
-        new.write_text(as_json(findings), encoding="utf-8")
+    write_text(results, as_json(findings))
     _keep(folder, findings.conclusion.files)
     pictures = []
     plots = findings.plots
@@ -75,8 +74,7 @@ def write(
             said = f"No plot {plot.name!r}: it cannot be drawn ({error})"
             findings = replace(findings, missing=(*findings.missing, said))
     html = folder / "report.html"
-    with replacing(html) as new:
-        new.write_text(page(findings, pictures), encoding="utf-8")
+    write_text(html, page(findings, pictures))
     return Report(
         findings=findings,
         png=folder / "figure.png",

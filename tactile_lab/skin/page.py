@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from matplotlib.figure import Figure
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import show
 from tactile_lab.report.canvas import draw, save
-from tactile_lab.report.html import picture, rendered
+from tactile_lab.report.html import picture, rendered, written
 from tactile_lab.report.taxel_map import TaxelMap, TaxelMaps, draw_maps
 from tactile_lab.skin.adaptation import SkinAdaptation
 from tactile_lab.skin.events import Events
@@ -24,6 +23,7 @@ from tactile_lab.skin.press import Pressed
 from tactile_lab.skin.receptive import receptive_plot
 from tactile_lab.skin.skin import Skin
 from tactile_lab.skin.squares import Squares, squares_of
+from tactile_lab.store.folder import write_text
 
 FRAMES = 200
 """Of a film."""
@@ -77,12 +77,12 @@ def write_page(
         ],
         settings=settings(skin),
         none="none",
-        made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC. Spike times are as "
+        made=f"{written()} Spike times are as "
         "exact as said above for the force in straight pieces; taxels left out were "
         "shown to stay below threshold and not solved.",
     )
     html = folder / "report.html"
-    html.write_text(text, encoding="utf-8")
+    write_text(html, text)
     return html
 
 

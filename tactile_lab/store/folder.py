@@ -220,6 +220,17 @@ def replacing(path: Path, size: int = 0) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Replace `path` in one step by this text, in UTF-8.
+
+    Raises:
+        RecordingError: there is no room.
+        OSError: it cannot be written.
+    """
+    with replacing(path, len(text)) as part:
+        part.write_text(text, encoding="utf-8")
+
+
 def is_live(path: Path) -> bool:
     """Whether a process still writes the run in folder `path`."""
     try:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import show
-from tactile_lab.store.folder import replacing, write_json
+from tactile_lab.store.folder import write_json, write_text
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import MADE_OF, Gathered, is_written
@@ -42,7 +41,7 @@ def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
 def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     # heavy, and a study that is finished needs neither
     from tactile_lab.report.canvas import draw, save
-    from tactile_lab.report.html import picture, rendered
+    from tactile_lab.report.html import picture, rendered, written
     from tactile_lab.studies.answers import conclude
     from tactile_lab.studies.figures import plots
 
@@ -71,11 +70,10 @@ def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
         axes={axis.key: described(axis) for axis in design.axes},
         kept={one.name: one.expression for one in study.kept},
         none="none",
-        made=f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.",
+        made=written(),
     )
     html = folder / REPORT
-    with replacing(html) as new:
-        new.write_text(text, encoding="utf-8")
+    write_text(html, text)
     # last, for `told_before`
     results = {
         MADE_OF: study_digest(study),

@@ -15,7 +15,7 @@ from typing import Any
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.folder import replacing
+from tactile_lab.store.folder import replacing, write_text
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
@@ -84,8 +84,7 @@ def export(
         )
     text = json.dumps(crate(run), indent=2, ensure_ascii=False) + "\n"
     if file.suffix != ".zip":
-        with replacing(file, len(text)) as part:
-            part.write_text(text, encoding="utf-8")
+        write_text(file, text)
         return [file]
     files, whole, done = list(_files(run.path)), size(run, selection), 0
     with replacing(file, whole) as part, zipfile.ZipFile(part, "w") as packed:
