@@ -56,7 +56,7 @@ class Chip(QWidget):
         self._detail = label("", "hsub")
         self.value = label("—", "hvalue")
         words = lines(self._name, self._detail, spacing=0)
-        bar(self, (10, 4, 11, 4), 9, self._lamp, words, 6, self.value)
+        self._row = bar(self, (10, 4, 11, 4), 9, self._lamp, words, 6, self.value)
         self._show_lamp()
         self._room = ChipDetail.FULL
 
@@ -107,9 +107,7 @@ class Chip(QWidget):
         self.value.setVisible(room < ChipDetail.LAMP)
         self._detail.setText(view.detail)
         self._detail.setVisible(bool(view.detail) and room is ChipDetail.FULL)
-        layout = self.layout()
-        assert layout is not None
-        bare = room >= ChipDetail.BARE
+        bare, layout = room >= ChipDetail.BARE, self._row
         layout.setContentsMargins(*((6, 4, 7, 4) if bare else (10, 4, 11, 4)))
         layout.setSpacing(2 if bare else 9)
         layout.invalidate()

@@ -119,8 +119,7 @@ class Header(QFrame):
 
     def _fit(self) -> None:
         """Chips at their widest that fit; where it is narrow, no minor button."""
-        layout = self.layout()
-        assert layout is not None
+        layout = self._row
         for room, tight in ROOMS:
             for chip in self._chips:
                 chip.show_room(room)
@@ -185,10 +184,10 @@ class Header(QFrame):
         words.setContentsMargins(0, 13, 0, 11)
         clock = lines(self._state, self._clock, spacing=1)
         clock.setContentsMargins(0, 14, 0, 12)
-        whole = bar(
+        self._row = bar(
             self, (16, 0, 14, 0), 11, self._logo, words, 8, self._chip_row, STRETCH
         )
-        filled(whole, (*self.folds, *self._buttons, 6, clock, self.stop))
+        filled(self._row, (*self.folds, *self._buttons, 6, clock, self.stop))
 
 
 def _colour(snapshot: Snapshot) -> str:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.analysis.adaptation import Adaptation
 from tactile_lab.arrays import FloatArray
-from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
+from tactile_lab.measurement import Measurement, RecordedSignal
 from tactile_lab.plot import Guide, Panel, Plot, Series, spike_train
 from tactile_lab.quantity import show
 from tactile_lab.report.splice import ClosedTime
@@ -226,7 +227,7 @@ def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
     if not rates.size:
         return [train]
     fits = [
-        _fit(t, start)
+        _fit(t.adaptation, start)
         for t, start in zip(trials, starts, strict=True)
         if t.adaptation is not None
     ]
@@ -251,7 +252,6 @@ def _rates(spikes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     return np.concatenate(at), np.concatenate(rates)
 
 
-def _fit(trial: MeasuredTrial, start: float) -> Series:
-    assert trial.adaptation is not None
-    held, rate = trial.adaptation.drawn
+def _fit(fit: Adaptation, start: float) -> Series:
+    held, rate = fit.drawn
     return Series(x=held + start, y=rate, mark="dashed", colour="ink")
