@@ -25,6 +25,7 @@ from gui.ask_file import ask_file
 from gui.banner import Banner
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
+from gui.look.theme import Theme
 from gui.menu import GearMenu, MenuActions
 from gui.preferences import Preferences
 from gui.run_actions import RunActions
@@ -33,6 +34,7 @@ from gui.screen.screen import Screen
 from gui.session.log import Severity
 from gui.stop_anywhere import StopAnywhere
 from gui.tab_order import enter_next, scroll
+from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 
 IN_CARDS = ("PgUp", "PgDown", "Return", "Enter")
@@ -74,6 +76,8 @@ class Actions(QObject):
     """Fold a side panel, or unfold it."""
     lanes_asked = Signal()
     """Put the lanes into a window of their own, or back."""
+    _skin_read = Signal(object)
+    _skin_failed = Signal(str)
 
     def __init__(
         self,
@@ -98,6 +102,8 @@ class Actions(QObject):
         )
         stop = StopAnywhere(window, panels.stops, closing, panels.session, once)
         self._is_held = stop.keys.is_held
+        self._skin_read.connect(self._show_skin)
+        self._skin_failed.connect(self._say_skin)
         panels.header.help_asked.connect(lambda: self.show_help())
         for button, topic in (
             (panels.setup.help, "Protocol"),
@@ -348,14 +354,23 @@ class Actions(QObject):
 
     def open_skin(self, path: Path) -> None:
         """Compute an array, or play its events; what prevents it is told in the log."""
-        from gui.skin.window import open_skin
+        out = self.panels.session.out.parent / "skins"
 
-        panels = self.panels
-        out = panels.session.out.parent / "skins"
-        try:
-            open_skin(path, panels.theme, out, self.window).show()
-        except (TactileLabError, OSError) as error:
-            panels.session.log.add(Severity.ERROR, "skin", str(error))
+        def work() -> None:  # STOP would wait for it in the window's thread
+            from gui.skin.window import open_skin
+
+            try:
+                self._skin_read.emit(open_skin(path, out))
+            except (TactileLabError, OSError) as error:
+                self._skin_failed.emit(str(error))
+
+        start(work, "open skin", finishes=True)
+
+    def _show_skin(self, made: Callable[[Theme, QWidget], QWidget]) -> None:
+        made(self.panels.theme, self.window).show()
+
+    def _say_skin(self, why: str) -> None:
+        self.panels.session.log.add(Severity.ERROR, "skin", why)
 
     def show_studies(self) -> None:
         """Show the studies beside the runs, and those among them."""

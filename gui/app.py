@@ -112,7 +112,7 @@ def show_skin(path: Path, out: Path, theme: str) -> None:
     chosen.apply()
     from gui.skin.window import open_skin
 
-    window = open_skin(path, chosen, out)
+    window = open_skin(path, out)(chosen, None)
     fit(window, window.screen().availableSize())
     window.show()
     _close_on_signals(window.close)

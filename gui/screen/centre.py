@@ -84,6 +84,10 @@ class EmptyCard(QFrame):
             self.place()
         return False
 
+    def _wanted_height(self) -> int:
+        self._rows.activate()
+        return self._rows.totalHeightForWidth(self.width())
+
     def place(self) -> None:
         """Lie in the middle; where there is little room, say and offer less."""
         below, minor = (
@@ -97,14 +101,12 @@ class EmptyCard(QFrame):
         self.setFixedWidth(min(MOST, below.width() - 16))
         for part in minor:
             part.show()
-        for part in (None, *minor):
-            if part is not None:
-                part.hide()
-            self._rows.activate()
-            height = self._rows.totalHeightForWidth(self.width())
-            if height <= below.height() - 16:
+        room = below.height() - 16
+        for part in minor:
+            if self._wanted_height() <= room:
                 break
-        self.setFixedHeight(min(height, below.height() - 16))
+            part.hide()
+        self.setFixedHeight(min(self._wanted_height(), room))
         self.move(
             (below.width() - self.width()) // 2,
             max((below.height() - self.height()) // 2, 8),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as wall
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,16 +29,18 @@ STEPS = 2000
 """Of the slider."""
 
 
-def open_skin(
-    path: Path, theme: Theme, out: Path, parent: QWidget | None = None
-) -> SkinWindow:
-    """A window on a skin file, which is computed now, or on events on disk.
+def open_skin(path: Path, out: Path) -> Callable[[Theme, QWidget | None], SkinWindow]:
+    """Read a skin file, which is computed then, or events on disk.
+
+    Takes seconds, most of all the first time on a computer: for a thread of its own
+    wherever a window has to answer.
 
     Args:
         path: a skin file (TOML), a folder with events, or their file.
-        theme: of the window.
         out: where the folder of a skin that is computed is put.
-        parent: whose window it goes with.
+
+    Returns:
+        Makes the window on it, from a theme and whose window it goes with, if any.
 
     Raises:
         SceneError, ParameterError: the skin cannot be used as written.
@@ -45,16 +48,23 @@ def open_skin(
     """
     if not path.exists():
         raise RunFolderError(f"{path} does not exist; give a skin's file or folder.")
+    warnings: tuple[str, ...] = ()
     if path.is_dir() or path.suffix == Path(FILE).suffix:
         events = Events.read(path)
         skin = load_skin(events.about["skin"], events.about["name"], folder=path)
-        return SkinWindow(skin, SkinComputation(None, path), theme, parent)
-    from tactile_lab.skin.press import highest
+        computed, folder = None, path
+    else:
+        from tactile_lab.skin.press import highest
 
-    skin = load_skin(path)
-    _, warnings = highest(skin)
-    computing = SkinComputation(skin, out / skin.name)
-    return SkinWindow(skin, computing, theme, parent, warnings)
+        computed = skin = load_skin(path)
+        _, warnings = highest(skin)
+        folder = out / skin.name
+
+    def made(theme: Theme, parent: QWidget | None) -> SkinWindow:
+        computing = SkinComputation(computed, folder)
+        return SkinWindow(skin, computing, theme, parent, warnings)
+
+    return made
 
 
 class SkinWindow(QWidget):

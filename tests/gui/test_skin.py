@@ -1,5 +1,7 @@
 """An array of sensors in a window of its own."""
 
+import threading
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -10,11 +12,11 @@ from shiboken6 import isValid
 
 from gui.skin.computing import SkinComputation
 from gui.skin.film import DOTS, Dots, pixels
-from gui.skin.window import open_skin
+from gui.skin.window import SkinWindow, open_skin
 from tactile_lab.commands.skin import command
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.skin.events import Events
-from tactile_lab.skin.press import press
+from tactile_lab.skin.press import highest, press
 from tactile_lab.skin.skin import load_skin
 
 BALL = """
@@ -46,7 +48,7 @@ def events(folder):
 
 
 def shown(lab, path, folder):
-    window = open_skin(path, lab.window.panels.theme, folder / "skins")
+    window = open_skin(path, folder / "skins")(lab.window.panels.theme, None)
     window.show()
     lab.until(lambda: window.film is not None)
     return window
@@ -57,7 +59,7 @@ def test_trains_come_while_it_is_computed_and_are_played_after(lab, folder, even
     computing = SkinComputation(skin, folder / "again")
     computing.thread.join()
     told = computing.told()
-    assert [type(one).__name__ for one in told] == ["Trains", "Film"]
+    assert [type(one).__name__ for one in told] == ["TrainsFound", "Film"]
     trains, film = told
     assert trains.first == 0
     np.testing.assert_array_equal(trains.count, events.count)
@@ -131,14 +133,14 @@ def test_play_moves_on_to_the_end_and_stops_there(lab, folder, events):
 def test_what_cannot_be_shown_is_refused_or_told(lab, folder, tmp_path):
     theme = lab.window.panels.theme
     with pytest.raises(RunFolderError, match="does not exist"):
-        open_skin(tmp_path / "none.toml", theme, tmp_path)
+        open_skin(tmp_path / "none.toml", tmp_path)
     with pytest.raises(RunFolderError, match="holds no events"):
-        open_skin(tmp_path, theme, tmp_path)
+        open_skin(tmp_path, tmp_path)
     (tmp_path / "bad.toml").write_text(BALL.replace("[5, 4]", "[5, 0]"))
     with pytest.raises(SceneError):
-        open_skin(tmp_path / "bad.toml", theme, tmp_path)
+        open_skin(tmp_path / "bad.toml", tmp_path)
     (tmp_path / "file").write_text("in the way")
-    window = open_skin(folder / "ball.toml", theme, tmp_path / "file")
+    window = open_skin(folder / "ball.toml", tmp_path / "file")(theme, None)
     window.show()
     lab.until(window.warning.isVisible)
     assert "file" in window.warning.text()
@@ -157,7 +159,7 @@ def test_closing_the_window_ends_the_computing(folder, tmp_path):
     computing.leave()
     computing.thread.join()
     told = [type(one).__name__ for one in computing.told()]
-    assert told in ([], ["Trains", "Film"])  # it may have been done already
+    assert told in ([], ["TrainsFound", "Film"])  # it may have been done already
 
 
 def test_a_closed_window_is_no_longer_dressed(lab, folder, events):
@@ -175,7 +177,23 @@ def test_the_menu_opens_it_and_tells_what_prevents_it(lab, folder, tmp_path):
     (dialog,) = lab.window.findChildren(QFileDialog)
     dialog.close()
     actions.open_skin(tmp_path / "none.toml")
-    assert "does not exist" in lab.session.log.lines[-1].text
+    lab.until(lambda: "does not exist" in lab.session.log.lines[-1].text)
+
+
+def test_stop_does_not_wait_while_a_skin_is_read(lab, folder, monkeypatch):
+    """The kernel is compiled then, on a new computer for 20 s."""
+    threads = []
+
+    def noted(skin):
+        threads.append(threading.current_thread())
+        return highest(skin)
+
+    monkeypatch.setattr("tactile_lab.skin.press.highest", noted)
+    lab.window.actions_.open_skin(folder / "ball.toml")
+    lab.until(lambda: lab.window.findChildren(SkinWindow))
+    for window in lab.window.findChildren(SkinWindow):
+        window.close()
+    assert threads and threading.main_thread() not in threads
 
 
 def test_dots_are_thinned_evenly():

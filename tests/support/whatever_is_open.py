@@ -63,6 +63,10 @@ def openers(lab, tmp_path: Path) -> dict[str, tuple[Open, ...]]:
         at = plot.mapFromScene(plot.panels[0].box.sceneBoundingRect().center())
         QTest.mouseClick(plot.viewport(), Qt.MouseButton.RightButton, pos=at)
 
+    def open_skin() -> None:
+        acts.open_skin(skin)
+        lab.until(lambda: window.findChildren(SkinWindow))
+
     def lane_menu() -> None:
         box = stack.rows[0].box
         stack.scene.menu_asked.emit(box, QPointF(200, 40), QPoint(300, 300))
@@ -94,7 +98,7 @@ def openers(lab, tmp_path: Path) -> dict[str, tuple[Open, ...]]:
         "screen/screen.py": (window.screen_.ask_scene, window.screen_.ask_run),
         "setup/fields.py": (window.setup.form.field("levels")._choose_file,),
         "setup/preset_button.py": (window.setup.star.open_menu,),
-        "skin/window.py": (lambda: acts.open_skin(skin),),
+        "skin/window.py": (open_skin,),
     }
 
 
