@@ -145,10 +145,11 @@ class Lag:
         ends = wave.time[1:][pieces] + 2 * fine
         first = np.round(begin / fine).astype(int)
         stop = first + np.ceil((ends - begin) / fine).astype(int)
-        moves = np.zeros(stop.max(initial=0) + 1, dtype=int)  # how many pieces do
-        np.add.at(moves, first, 1)
-        np.subtract.at(moves, stop, 1)
-        inside = np.flatnonzero(np.cumsum(moves)) * fine
+        reach = np.append(-np.inf, np.maximum.accumulate(stop)[:-1])
+        apart = np.flatnonzero(first > reach)  # where none that began before lasts
+        lasts = np.maximum.reduceat(stop, apart) if apart.size else apart
+        spans = map(np.arange, first[apart], lasts)
+        inside = np.concatenate([np.empty(0), *spans]) * fine
         # no point so near an end that what differs there would be a jump
         inside = inside[
             (inside > wave.start + fine / 2) & (inside < wave.end - fine / 2)
