@@ -20,9 +20,16 @@ from tactile_lab.errors import SolverError
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at
+from tactile_lab.model.solver import MOST_SPIKES
 from tactile_lab.model.spiking import grown
 from tactile_lab.validation.problem import Answer, Problem
-from tactile_lab.validation.rivals import FINISHED, NO_NUMBER, answered, check_steps
+from tactile_lab.validation.rivals import (
+    FINISHED,
+    NO_NUMBER,
+    OUT_OF_EVALUATIONS,
+    answered,
+    check_steps,
+)
 
 
 @inner
@@ -103,7 +110,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if end < par[V_FIRE]:
                         v = end
                         break
+                    before = at
                     at += rise_time(v, Q, slope, h - at, par)
+                    if at == before or count >= MOST_SPIKES:  # without end
+                        return OUT_OF_EVALUATIONS, spikes[:count], y, evaluations
                     spikes = grown(spikes, count)
                     spikes[count] = t0 + (s + at)
                     count += 1
@@ -122,7 +132,8 @@ def exact_firing(problem: Problem, cap: float, dt: float) -> Answer:
     """Spikes on a grid of about `dt` s that starts anew at each point of the force.
 
     Raises:
-        OutOfTimeError: so many steps need more than `cap` s of CPU time.
+        OutOfTimeError: so many steps need more than `cap` s of CPU time, or it fires
+            without end.
         SolverError: V_C2 acts back on its current, or the solution is NaN.
     """
     if problem.circuit.saturation:

@@ -87,6 +87,13 @@ def test_exact_firing_is_of_order_two_and_keeps_resets_off_the_grid(firing):
         exact_firing(Problem("", Circuit(saturation=True), force, 0.1), 1.0, 1e-3)
 
 
+def test_exact_firing_gives_up_where_v_c1_has_lost_its_way():
+    """By a step of 5 N it fired at once without end, and the sweeps never came back."""
+    jump = Waveform.through([(0, 0), (0.1, 0), (0.1, 5.0)])
+    with pytest.raises(OutOfTimeError, match="stopped after"):
+        exact_firing(Problem("", Circuit(), jump, 0.6), 1.0, 1e-5)
+
+
 def test_where_t1_saturates_ours_needs_fewer_evaluations_than_the_rivals():
     """Of what no load changes; by collocation alone it took three times theirs."""
     force = Waveform.through([(0, 0), (0.05, 0), (0.05, 0.2)])
