@@ -23,7 +23,7 @@ DONE = ROOT / "runs" / "reports.json"
 BENCHMARKS = "tests/benchmarks"
 STEPS: dict[str, tuple[float, str]] = {
     "accuracy": (20, "-m tactile_lab validate accuracy --out docs"),
-    "sweeps": (30, "-m tactile_lab validate sweeps --out docs"),
+    "sweeps": (3, "-m tactile_lab validate sweeps --out docs"),
     "honesty": (120, "-m tactile_lab validate honesty --scenes 1000 --out docs"),
     "stability": (10, "-m tactile_lab validate stability --out docs"),
     "fit recovery": (15, "docs/make_fit_recovery.py"),
