@@ -36,9 +36,6 @@ STEADY = 0.2
 SAME_RANGE = 0.1
 """Part of a range by which its name may differ from what it reaches: 2 V from 2.1 V."""
 
-REHEARSED = 0.01
-"""Set-point that shows, with the output off, whether a row's lines are right, V."""
-
 DEVIATING_READINGS = 3
 """Readings in a row that must differ before it counts."""
 
@@ -124,7 +121,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
     def rehearse(self) -> list[str]:
         """Say what a run says beyond `open`: is a row understood?
 
-        With the output off, the set-point goes to `REHEARSED` and back. One that is on
+        With the output off, the set-point goes to 10 mV and back. One that is on
         holds a sensor's voltage: it is measured, and not touched.
 
         Returns:
@@ -134,7 +131,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
             InstrumentError: a line is refused, or a question not answered.
         """
         if not self._on:
-            return self._wire.rehearse(REHEARSED)
+            return self._wire.rehearse()
         self._wire.measured()
         return [self.dialect.set, *self.dialect.on]
 

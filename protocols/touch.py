@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -87,9 +86,9 @@ class Touch(ForceProtocol):
         found = self.touches(run)
         if not found:
             return Conclusion(missing=("No touch was completed.",))
-        known = [t.clock_uncertainty for t in run.results if t.clock_uncertainty]
+        known = run.clock_uncertainty is not None
         # half of the force comes as late as the field lags
-        half = math.hypot(max(known), run.lag_uncertainty or 0.0) if known else 0.0
+        half = run.force_timing if known else 0.0
         stated = "lags" if run.lag_uncertainty else "lags of the force not stated"
         timed = f" (95 %: clocks, {stated})" if known else ""
         rows = tuple(self._row(onset, found) for onset in self.onsets)

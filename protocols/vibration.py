@@ -199,13 +199,8 @@ def locking_by_label(run: Measurement) -> tuple[dict[float, PhaseLocking], list[
 
 def _phase_half(run: Measurement, frequency: float, one: PhaseLocking) -> float:
     """Half of the 95 % interval of a phase, rad: its scatter, clocks and lag."""
-    late = math.hypot(_aligned(run), run.lag_uncertainty or 0.0)
-    return min(math.hypot(one.phase_half, 2 * math.pi * frequency * late), math.pi)
-
-
-def _aligned(run: Measurement) -> float:
-    """How well the sample clock is aligned with the coil, s; 0 where nobody knows."""
-    return max((t.clock_uncertainty or 0.0 for t in run.results), default=0.0)
+    late = 2 * math.pi * frequency * run.force_timing
+    return min(math.hypot(one.phase_half, late), math.pi)
 
 
 def _row(run: Measurement, frequency: float, one: PhaseLocking) -> tuple[str, ...]:
@@ -222,7 +217,7 @@ def _row(run: Measurement, frequency: float, one: PhaseLocking) -> tuple[str, ..
 def timing_note(run: Measurement) -> str:
     """How well spikes are timed against the force, which is an error of each phase."""
     told = "Phase: ± 95 %, its scatter over presentations"
-    aligned, lag = _aligned(run), run.lag_uncertainty
+    aligned, lag = run.clock_uncertainty, run.lag_uncertainty
     told += f", clock and coil aligned to {show(aligned, 's', 2)}" if aligned else ""
     told += f", lags of the force known to {show(lag, 's', 2)}" if lag else ""
     unknown = [] if aligned else ["how well the sample clock is aligned with the coil"]

@@ -6,6 +6,7 @@ It knows neither how a run is stored nor how it was made; whoever has a run fill
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -210,6 +211,20 @@ class Measurement:
             if t.level is not None or t.hold is not None or t.spike_times.size
         )
         return telling or played
+
+    @property
+    def clock_uncertainty(self) -> float | None:
+        """How well sample clock and coil are aligned, s; None if not known."""
+        known = [t.clock_uncertainty for t in self.results if t.clock_uncertainty]
+        return max(known, default=None)
+
+    @property
+    def force_timing(self) -> float:
+        """Half of the 95 % band in which spikes are timed against the force, s.
+
+        What is not known of clocks and lags is not in it.
+        """
+        return math.hypot(self.clock_uncertainty or 0.0, self.lag_uncertainty or 0.0)
 
     def circuit_adaptation(
         self, trial: MeasuredTrial

@@ -19,9 +19,6 @@ from tactile_lab.errors import InstrumentError, InterlockError, LimitError, Unsa
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
 
-REHEARSED = 0.01
-"""Set-point that shows, with the output off, whether a row's lines are right, A."""
-
 
 class CoilSource(SerialInstrument[CoilWire]):
     """A current source behind a serial port.
@@ -176,7 +173,7 @@ class CoilSource(SerialInstrument[CoilWire]):
     def rehearse(self) -> list[str]:
         """Say what a run says beyond `open`, with the output off: is a row understood?
 
-        The set-point goes to `REHEARSED` and back.
+        The set-point goes to 10 mA and back.
 
         Returns:
             What of the row can be tried with the output on alone.
@@ -188,7 +185,7 @@ class CoilSource(SerialInstrument[CoilWire]):
         self._prepare()
         if row.measures_when_off:
             self._wire.voltage()
-        untried = self._wire.rehearse(REHEARSED)
+        untried = self._wire.rehearse()
         modes = {"[list]": row.list, "[analogue]": row.analogue}
         return untried + [name for name, mode in modes.items() if mode is not None]
 

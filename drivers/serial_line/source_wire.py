@@ -17,6 +17,9 @@ RECONNECT = 1.0
 VERIFICATIONS = 3
 """Times the state to leave it in is commanded and read back before giving up."""
 
+REHEARSED = 0.01
+"""Set-point, A or V, that shows whether a row is right while the output is off."""
+
 NOT_UNDERSTOOD = r"^\s*-1\d\d\b"
 """SCPI's errors of a line that an instrument does not know or cannot read."""
 
@@ -95,11 +98,10 @@ class SourceWire(Conversation[S]):
                 f'lines of its dialect "{self.dialect.id}".'
             )
 
-    def rehearse(self, small: float) -> list[str]:
+    def rehearse(self) -> list[str]:
         """Try with the output off what a run says with it on: is a row understood?
 
-        Args:
-            small: set-point that is set, read back and taken back to 0, A or V.
+        The set-point goes to `REHEARSED` and back.
 
         Returns:
             Lines that can be tried with the output on alone.
@@ -109,9 +111,9 @@ class SourceWire(Conversation[S]):
             BadReplyError: what is measured is no number.
         """
         row = self.dialect
-        for value in (small, 0.0):
+        for value in (REHEARSED, 0.0):
             self.command(row.set_line(value))
-            self.confirm("set-point", row.set_query, value, small / 2)
+            self.confirm("set-point", row.set_query, value, REHEARSED / 2)
         untried = [*row.on]
         for line, pattern in (
             (row.measure_voltage, row.voltage_match),
