@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QTimer, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
+from gui.on_desktop import open_on_desktop
 from gui.parts import STRETCH, Combo, column, label, push, row, say, scrolling
 from gui.plots.small_plot import SmallPlot
 from tactile_lab.errors import RunFolderError, TactileLabError
@@ -178,8 +178,7 @@ class StudiesCard(Overlay):
 
     def _open_page(self) -> None:
         if self._chosen is not None:
-            page = (self._chosen / REPORT).resolve()
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(page)))
+            say(self.hint, open_on_desktop(self._chosen / REPORT))
 
 
 def show_studies(

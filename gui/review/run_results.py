@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.live import LiveSource
 from gui.lanes.source import Source
+from gui.on_desktop import open_on_desktop
 from gui.review.conclusion import conclusion_of
 from gui.review.results import ResultsView
 from gui.session.fit import Fit, FitInput, fit_input, fit_steps
@@ -43,6 +43,9 @@ class RunResults(QObject):
 
     fitted = Signal(object)
     """The laws of the rate that were fitted: traces in Hz."""
+
+    unopened = Signal(str)
+    """Why a report or a folder could not be opened."""
 
     def __init__(self, view: ResultsView, session: Session, parent: QObject) -> None:
         super().__init__(parent)
@@ -170,11 +173,15 @@ class RunResults(QObject):
     def open_report(self) -> None:
         """Open the report of the run on screen in the browser."""
         if self.folder is not None:
-            _open(self.folder / "report.html")
+            self._open(self.folder / "report.html")
 
     def open_folder(self, out: Path) -> None:
         """Open the folder of the run on screen, else that of all runs."""
-        _open(self.folder or out)
+        self._open(self.folder or out)
+
+    def _open(self, path: Path) -> None:
+        if problem := open_on_desktop(path):
+            self.unopened.emit(problem)
 
     def _conclude(self, folder: Path) -> None:
         try:
@@ -187,7 +194,3 @@ class RunResults(QObject):
         self._view.show_steps(
             self.steps, total=self._total, running=running, whole=self._whole
         )
-
-
-def _open(path: Path) -> None:
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))

@@ -44,6 +44,11 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     folder = lab.runs(1)[0]
     window.screen_.open_run(folder)
     lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    said = window.centre.notice
+    window.review.results.report_asked.emit()
+    assert said.text() == f"There is no report.html in {folder}."
+    window.review.export.click()  # this screen has no desktop behind it
+    assert said.text() == f"No program of this computer opens it; it is at {folder}."
     run, stack, view = window.screen_.run, window.centre.stack, window.centre.view
     begin, _ = run.holds[-1].held
     run.spikes = np.array([begin - 0.5, begin + 0.05, begin + 0.15, begin + 0.29])
