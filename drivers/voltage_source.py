@@ -132,7 +132,8 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
         """
         if not self._on:
             return self._wire.rehearse()
-        self._wire.measured()
+        _, voltage = self._wire.measured()
+        voltage()
         return [self.dialect.set, *self.dialect.on]
 
     def step_to(self, volts: float) -> bool:
@@ -159,8 +160,8 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
                 row.
         """
         wire, wanted = self._wire, self._known_setpoint()
-        voltage, current = wire.measured()
-        now = self._clock.now()
+        current, measured = wire.measured()
+        voltage, now = measured(), self._clock.now()
         if now - self._commanded > STEADY:
             self._compare(wanted, voltage, current)
         return HeldVoltage(time=now, setpoint=wanted, voltage=voltage, current=current)

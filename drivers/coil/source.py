@@ -317,11 +317,9 @@ class CoilSource(SerialInstrument[CoilWire]):
             return Reading(self._clock.now(), self._wire.current_when_off())
         self._trip_on(self._interlock.before_setting(self._clock.now()))
         asked = self._clock.now()
-        measured = self._wire.current()
+        measured, voltage = self._wire.measured()
         now = self._clock.now()
-        self._trip_on(
-            self._interlock.after_reading(asked, now, measured, self._wire.voltage)
-        )
+        self._trip_on(self._interlock.after_reading(asked, now, measured, voltage))
         return Reading(now, measured)
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import TypeVar
 
 from drivers.serial_line.conversation import Conversation
@@ -73,16 +74,20 @@ class SourceWire(Conversation[S]):
         """Measured voltage, V."""
         return self.number(self.dialect.measure_voltage, self.dialect.voltage_match)
 
-    def measured(self) -> tuple[float, float]:
-        """Measured voltage, V, and current, A; asked once where one answer has both."""
+    def measured(self) -> tuple[float, Callable[[], float]]:
+        """Measured current, A, and what gives the voltage, V, measured with it.
+
+        The voltage is a question of its own only where no answer holds both.
+        """
         row = self.dialect
-        if row.measure_voltage == row.measure_current:
-            answer = self.query(row.measure_voltage)
-            voltage = self.parsed(answer, row.voltage_match)
-            current = self.parsed(answer, row.current_match)
-            if voltage is not None and current is not None:
-                return voltage, current
-        return self.voltage(), self.current()
+        if row.measure_voltage != row.measure_current:
+            return self.current(), self.voltage
+        answer = self.query(row.measure_current)
+        current = self.parsed(answer, row.current_match)
+        voltage = self.parsed(answer, row.voltage_match)
+        if current is None or voltage is None:
+            return self.current(), self.voltage
+        return current, lambda: voltage
 
     def confirm(self, what: str, query: str, wanted: float, within: float) -> None:
         """Read back that a setting was taken.
