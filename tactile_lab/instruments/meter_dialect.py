@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from tactile_lab.errors import SceneError, choices
-from tactile_lab.instruments.serial_dialect import (
-    Lines,
-    Pattern,
-    SerialDialect,
-    frozen,
-)
+from tactile_lab.instruments.line import Line, Lines, takes
+from tactile_lab.instruments.serial_dialect import Pattern, SerialDialect
 from tactile_lab.quantity import Pause, Unit
 
 MULTIPLIERS = {"": 1.0, "u": 1e-6, "m": 1e-3, "k": 1e3}
@@ -27,7 +23,7 @@ class MeterDialect(SerialDialect):
         interval: shortest time between two readings, s.
     """
 
-    report: dict[str, str] = Field(default={})
+    report: dict[str, Line] = Field(default={})
     interval: Pause = 0.1
 
 
@@ -42,9 +38,9 @@ class TeslameterDialect(MeterDialect):
     """
 
     role: Literal["field meter"]
-    field: str
+    field: Line
     scale: float = 1.0
-    multiplier: str | None = None
+    multiplier: Line | None = None
     overload: Pattern = r"(?i)^\s*O(V)?L"
 
 
@@ -60,25 +56,25 @@ class ThermometerDialect(MeterDialect):
     """
 
     role: Literal["thermometer"]
-    temperature: str
+    report: dict[str, Annotated[Line, takes("input")]] = Field(default={})
+    temperature: Annotated[Line, takes("input")]
     zero: Annotated[float, Unit("K", least=0.0)] = 0.0
-    inputs: Annotated[Lines, BeforeValidator(frozen)] = ("",)
-    status: str | None = None
+    inputs: Lines = ("",)
+    status: Annotated[Line, takes("input")] | None = None
     status_ok: Pattern = r"^\+?0+$"
 
     def try_templates(self, where: str) -> None:
-        """Fill in every template.
+        """Refuse inputs that cannot be told apart.
 
         Raises:
-            SceneError: a placeholder that is not known.
+            SceneError: the question is the same for all.
         """
-        try:
-            self.at(None)
-        except (KeyError, IndexError, ValueError) as reason:
+        if len(self.inputs) > 1 and "{input}" not in self.temperature:
             raise SceneError(
-                f"Dialect {where}: a template cannot be filled in ({reason!r}); it "
-                "takes {input} for the input of the sensor."
-            ) from reason
+                f'Dialect {where}: temperature = "{self.temperature}" would read the '
+                f"same of {len(self.inputs)} inputs. Write {{input}} where its name "
+                "belongs."
+            )
 
     def at(self, name: str | None) -> ThermometerDialect:
         """The row with its queries for the input `name`; its first where None is given.

@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tactile_lab.instruments.serial_dialect import Dialect, DialectTable, Lines, frozen
+from tactile_lab.instruments.line import Line, Lines, frozen, takes
+from tactile_lab.instruments.serial_dialect import Dialect, DialectTable
 from tactile_lab.scope import ScopeCapability
 
 Numbers = Annotated[tuple[float, ...], BeforeValidator(frozen)]
@@ -17,6 +18,13 @@ def _numbered(table: Any) -> Any:
     if not isinstance(table, dict):
         return table
     return {int(k) if str(k).isdecimal() else k: v for k, v in table.items()}
+
+
+Plain = Annotated[Line, takes()]
+Input = Annotated[Line, takes("input")]
+Wiring = Annotated[Line, takes("input", "coupling", "scale", "offset")]
+Timing = Annotated[Line, takes("depth", "timebase")]
+Bound = Annotated[Line, takes("first", "last")]
 
 
 class Timebases(DialectTable):
@@ -35,22 +43,22 @@ class Commands(DialectTable):
     matter, `preamble` the ten numbers of a Rigol, `data` a block of bytes.
     """
 
-    identify: str
-    error: str
-    input_off: Lines
-    input_on: Lines
-    acquire: Lines
-    rate: str
-    arm: Lines
-    status: str
-    waiting: str
-    done: str
-    force: str
-    stop: Lines
-    select: Lines
-    preamble: str
-    bounds: Lines
-    data: str
+    identify: Line
+    error: Line
+    input_off: Annotated[tuple[Input, ...], BeforeValidator(frozen)]
+    input_on: Annotated[tuple[Wiring, ...], BeforeValidator(frozen)]
+    acquire: Annotated[tuple[Timing, ...], BeforeValidator(frozen)]
+    rate: Line
+    arm: Annotated[tuple[Plain, ...], BeforeValidator(frozen)]
+    status: Line
+    waiting: Line
+    done: Line
+    force: Line
+    stop: Annotated[tuple[Plain, ...], BeforeValidator(frozen)]
+    select: Annotated[tuple[Input, ...], BeforeValidator(frozen)]
+    preamble: Line
+    bounds: Annotated[tuple[Bound, ...], BeforeValidator(frozen)]
+    data: Line
 
 
 class ScopeDialect(Dialect):

@@ -15,6 +15,15 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from tactile_lab.bench import CoilLimits
 from tactile_lab.current_list import ListCapability
 from tactile_lab.errors import SceneError
+from tactile_lab.instruments.line import (
+    Characters,
+    Line,
+    Lines,
+    amount,
+    decimals,
+    frozen,
+    needs,
+)
 from tactile_lab.quantity import Current, Duration, Pause, Unit, Voltage, show
 
 MARGIN = 1.5
@@ -29,15 +38,22 @@ def _pattern(text: str) -> str:
     return text
 
 
+def _with_group(text: str) -> str:
+    if re.compile(_pattern(text)).groups < 1:
+        raise ValueError("it picks nothing out; put the number's part into (...)")
+    return text
+
+
 Pattern = Annotated[str, AfterValidator(_pattern)]
 
+Picking = Annotated[str, AfterValidator(_with_group)]
+"""A pattern whose group 1 is what is wanted of an answer."""
 
-def frozen(value: object) -> object:
-    """TOML arrays as tuples."""
-    return tuple(value) if isinstance(value, list) else value
+Timeout = Annotated[float, Unit("s", above=0.0, most=0.8)]
+"""The guard kills a program that is silent for 1 s: no answer is waited for so long."""
 
-
-Lines = Annotated[tuple[str, ...], BeforeValidator(frozen)]
+Gap = Annotated[float, Unit("s", least=0.0, most=0.5)]
+"""For the same reason."""
 
 
 class DialectTable(BaseModel):
@@ -72,15 +88,15 @@ class SerialSettings(DialectTable):
     rtscts: bool = False
     dsrdtr: bool = False
     dtr: bool | None = None
-    send_end: str = "\n"
-    reply_end: str = "\n"
-    min_gap: Pause = 0.0
+    send_end: Characters = "\n"
+    reply_end: Characters = "\n"
+    min_gap: Gap = 0.0
     latency: Pause = 0.010
-    timeout: Duration = 0.2
+    timeout: Timeout = 0.2
     max_line: int = Field(default=127, ge=16)
     echo: bool = False
-    strip: str = ""
-    preamble: str = ""
+    strip: Characters = ""
+    preamble: Characters = ""
 
     def at(self, baud: int | None) -> SerialSettings:
         """The same at another rate; as they are where None is given."""
@@ -109,11 +125,11 @@ class ListMode(DialectTable):
     """
 
     clear: Lines = ()
-    points: str
-    dwells: str
-    count: str
-    points_query: str | None = None
-    dwells_query: str | None = None
+    points: Annotated[Line, needs("values")]
+    dwells: Annotated[Line, needs("values")]
+    count: Annotated[Line, needs("n")]
+    points_query: Line | None = None
+    dwells_query: Line | None = None
     start: Lines
     stop: Lines
     max_points: int = Field(ge=2)
@@ -155,7 +171,7 @@ class Dialect(DialectTable):
     role: str
     title: str
     match: Pattern
-    unverified: Lines = ()
+    unverified: Annotated[tuple[str, ...], BeforeValidator(frozen)] = ()
 
     def try_templates(self, where: str) -> None:
         """Fill in every template: a mistake must not reach a bench.
@@ -183,15 +199,15 @@ class SerialDialect(Dialect):
     """
 
     serial: SerialSettings = SerialSettings()
-    identify: str = "*IDN?"
+    identify: Line = "*IDN?"
     optional: Lines = ()
     init: Lines = ()
-    confirm: dict[str, Pattern] = Field(default={})
+    confirm: dict[Line, Pattern] = Field(default={})
     release: Lines = ()
-    error: str | None = None
+    error: Line | None = None
     error_ok: Pattern = r"^[+-]?0\b"
     serial_number: str = ""
-    number: Pattern = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[A-Za-z]*$"
+    number: Picking = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[A-Za-z]*$"
 
     def verified(self, line: str) -> tuple[str, ...]:
         """`line` with the error query behind it."""
@@ -224,20 +240,20 @@ class SourceDialect(SerialDialect):
     sets: ClassVar[Literal["i", "v"]]
     """What its set-point is, as `set` has it; the other is its compliance."""
     digits: int = Field(default=5, ge=2, le=8)
-    limit: str
-    limit_query: str
-    set: str
-    set_query: str
+    limit: Line
+    limit_query: Line
+    set: Line
+    set_query: Line
     on: Lines
     off: Lines
-    on_query: str
+    on_query: Line
     on_match: Pattern = r"^\s*\+?(1|ON)\s*$"
     off_match: Pattern = r"^\s*\+?(0|OFF)\s*$"
-    measure_current: str
-    measure_voltage: str
-    current_match: Pattern | None = None
-    voltage_match: Pattern | None = None
-    join: str = ";:"
+    measure_current: Line
+    measure_voltage: Line
+    current_match: Picking | None = None
+    voltage_match: Picking | None = None
+    join: Line = ";:"
 
     def verified(self, line: str) -> tuple[str, ...]:
         """`line` with the error query behind it, as one line or two."""
@@ -258,7 +274,12 @@ class SourceDialect(SerialDialect):
         return self.limit.format(**{"v" if self.sets == "i" else "i": value})
 
     def _try_lines(self, lines: Iterable[str], where: str) -> None:
-        """Refuse lines that are longer than a line may be."""
+        """Refuse lines that are too long, and set-points that lose digits."""
+        if decimals(self.set) < self.digits:
+            raise SceneError(
+                f'Dialect {where}: set = "{self.set}" has {decimals(self.set)} '
+                f"decimals, less than digits = {self.digits}. Write as many."
+            )
         for line in (part for one in lines for part in self.verified(one)):
             if len(line) + len(self.serial.send_end) > self.serial.max_line:
                 raise SceneError(
@@ -282,6 +303,8 @@ class CoilDialect(SourceDialect):
 
     role: Literal["coil"]
     sets: ClassVar[Literal["i", "v"]] = "i"
+    set: Annotated[Line, amount("i")]
+    limit: Annotated[Line, amount("v")]
     polarity: Literal["both", "positive"]
     current: Current
     voltage: Voltage
@@ -293,23 +316,13 @@ class CoilDialect(SourceDialect):
         """Fill in every template with extremes.
 
         Raises:
-            SceneError: a placeholder that is not known, or a line that is too long.
+            SceneError: a line is too long, or set too coarse for its digits.
         """
-        try:
-            extremes = (-self.current, 0.0, self.current)
-            self._try_lines(map(self.set_line, extremes), where)
-            self.limit_line(self.voltage)
-            if self.list is not None:
-                self.list.count.format(n=1)
-                self._try_list_lines(self.list, where)
-        except (KeyError, IndexError, ValueError) as reason:
-            if isinstance(reason, SceneError):
-                raise
-            raise SceneError(
-                f"Dialect {where}: a template cannot be filled in ({reason!r}); it "
-                "takes {i} for the current and {v} for the voltage, in a list "
-                "{values} and {n}."
-            ) from reason
+        extremes = (-self.current, 0.0, self.current)
+        lines = [*map(self.set_line, extremes), self.limit_line(self.voltage)]
+        self._try_lines(lines, where)
+        if self.list is not None:
+            self._try_list_lines(self.list, where)
 
     def _try_list_lines(self, mode: ListMode, where: str) -> None:
         """Refuse more points a line than a line can hold."""

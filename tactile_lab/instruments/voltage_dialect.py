@@ -7,7 +7,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BeforeValidator, Field
 
 from tactile_lab.errors import SceneError
-from tactile_lab.instruments.serial_dialect import DialectTable, SourceDialect, frozen
+from tactile_lab.instruments.line import Line, amount, frozen
+from tactile_lab.instruments.serial_dialect import DialectTable, SourceDialect
 from tactile_lab.quantity import Current, Voltage, show
 from tactile_lab.voltage_source import VoltageLimits, VoltageSourceCapability
 
@@ -41,30 +42,24 @@ class VoltageDialect(SourceDialect):
 
     role: Literal["voltage source"]
     sets: ClassVar[Literal["i", "v"]] = "v"
+    set: Annotated[Line, amount("v")]
+    limit: Annotated[Line, amount("i")]
     current: Current
     ranges: Annotated[tuple[VoltageRange, ...], BeforeValidator(frozen)] = Field(
         min_length=1
     )
-    range: str | None = None
-    range_query: str | None = None
+    range: Annotated[Line, amount("v")] | None = None
+    range_query: Line | None = None
 
     def try_templates(self, where: str) -> None:
         """Fill in every template with extremes.
 
         Raises:
-            SceneError: a placeholder that is not known, or a line that is too long.
+            SceneError: a line is too long, or set too coarse for its digits.
         """
         most = self.ranges[-1].full
-        try:
-            lines = [self.set_line(-most), self.limit_line(self.current)]
-            self._try_lines([*lines, *self.range_lines(most)], where)
-        except (KeyError, IndexError, ValueError) as reason:
-            if isinstance(reason, SceneError):
-                raise
-            raise SceneError(
-                f"Dialect {where}: a template cannot be filled in ({reason!r}); set "
-                "and range take {v} for the voltage, limit takes {i} for the current."
-            ) from reason
+        lines = [self.set_line(-most), self.limit_line(self.current)]
+        self._try_lines([*lines, *self.range_lines(most)], where)
 
     def range_lines(self, volts: float) -> tuple[str, ...]:
         """Lines that choose the range that reaches `volts`, V."""

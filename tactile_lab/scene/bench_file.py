@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, cast
+from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field, ValidationInfo
 from typing_extensions import TypedDict
@@ -23,6 +24,7 @@ from tactile_lab.instruments.registry import (
     ThermometerDriverName,
     VoltageDriverName,
 )
+from tactile_lab.instruments.serial_dialect import Timeout
 from tactile_lab.magnetics import Magnet
 from tactile_lab.quantity import Unit, Voltage
 from tactile_lab.scope import Channel
@@ -47,10 +49,32 @@ def _located(name: str, info: ValidationInfo) -> str:
 Located = AfterValidator(_located)
 """Of a name that may be a file's: its path is relative to the bench file."""
 
-Port = Annotated[str, Field(min_length=1)]
+SCHEMES = ("socket", "rfc2217", "spy", "hwgrep", "loop", "alt", "cp2110", "sim")
+"""What stands before `://` of a port; all but the last are pyserial's."""
+
+
+def _addressed(port: str) -> str:
+    scheme, url, _ = port.partition("://")
+    if url and scheme not in SCHEMES:
+        raise ValueError(
+            f"no port is reached by {scheme}://; {choices(scheme, SCHEMES)}"
+        )
+    if scheme not in ("socket", "rfc2217"):
+        return port
+    try:
+        where = urlsplit(port)
+        known = where.hostname and where.port
+    except ValueError:  # a number that is none, or too large for one
+        known = None
+    if not known:
+        raise ValueError(
+            f'host and number of the port are needed, such as "{scheme}://10.0.0.7:5025"'
+        )
+    return port
+
+
+Port = Annotated[str, Field(min_length=1), AfterValidator(_addressed)]
 Baud = Annotated[int, Field(ge=50, le=4_000_000)]
-Timeout = Annotated[float, Unit("s", above=0.0, most=0.8)]
-"""The guard kills a program that is silent for 1 s: no answer is waited for so long."""
 
 
 @dataclass(frozen=True, kw_only=True)

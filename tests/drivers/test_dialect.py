@@ -176,7 +176,31 @@ def test_a_dialects_file_bears_its_id(name):
         ("baud = 9600", 'baud = "fast"', 'mine.toml: [serial] baud = "fast": a whole'),
         ('current = "5 A"', "current = 5", "mine.toml: current: 5 has no unit"),
         ('role = "coil"', 'role = "pump"', 'role = "pump" is not known; write one of'),
-        ("{v:.3f}", "{volts:.3f}", "mine.toml: a template cannot be filled in"),
+        (
+            "VOLT {v:.3f}",
+            "VOLT {volts:.3f}",
+            'mine.toml: limit = "VOLT {volts:.3f}": {volts:.3f} cannot be filled in; '
+            "what can is {v}.",
+        ),
+        ("{v:.3f}", "{v.real}", "{v.real} cannot be filled in; what can is {v}."),
+        ("VOLT {v:.3f}", "VOLT 20", 'limit = "VOLT 20": {v} must stand in it once.'),
+        ("{v:.3f}", "{v:g}", "write {v:.5f} for five decimals."),
+        ("{v:.3f}", "{v:999999999.3f}", "write {v:.5f} for five decimals."),
+        ("{v:.3f}", "{v", '"VOLT {v": its braces cannot be read: expected'),
+        ("{i:.5f}", "{i:.2f}", "has 2 decimals, less than digits = 5. Write as many."),
+        ("COUN {n}", "COUN 0", '[list] count = "LIST:COUN 0": {n} must stand in it'),
+        ('"OUTP 1"', '"OUTP 1\\n"', r"on number 1 = "),
+        (
+            '"OUTP 1"',
+            '"OUTP \u2460"',
+            "on number 1 = \"OUTP \u2460\": '\u2460' is no ASCII",
+        ),
+        ("baud = 9600", 'baud = 9600\ntimeout = "2 s"', "[serial] timeout"),
+        (
+            "[confirm]",
+            "voltage_match = 'V=.*'\n[confirm]",
+            'voltage_match = "V=.*": it picks',
+        ),
     ],
 )
 def test_a_mistake_is_told_with_file_key_and_what_is_allowed(old, new, told):

@@ -138,7 +138,11 @@ def test_a_row_of_ones_own_in_celsius_at_another_input():
 
 
 def test_mistakes_in_a_row_are_told():
-    with pytest.raises(SceneError, match=r"takes \{input\}"):
-        parse_dialect(OWN.replace("{input}", "{channel}"), "bath.toml")
+    with pytest.raises(
+        SceneError, match=r'temperature = "T\{chan\}\?": .*is \{input\}'
+    ):
+        parse_dialect(OWN.replace("{input}", "{chan}"), "bath.toml")
+    with pytest.raises(SceneError, match="would read the same of 2 inputs"):
+        parse_dialect(OWN.replace("{input}", ""), "bath.toml")
     with pytest.raises(SceneError, match=r'input = "3".* Known: 1, 2'):
         parse_dialect(OWN, "bath.toml").at("3")

@@ -278,6 +278,24 @@ def test_a_real_instrument_needs_a_port(tmp_path):
     assert load_bench(path).simulated
 
 
+@pytest.mark.parametrize(
+    ("port", "told"),
+    [
+        ("socket://10.0.0.1", 'such as "socket://10.0.0.7:5025"'),
+        ("socket://:5025", "host and number of the port are needed"),
+        ("rfc2217://lab:99999", "host and number of the port are needed"),
+        ("tcp://lab:5025", "no port is reached by tcp://; Known: socket"),
+    ],
+)
+def test_a_port_that_no_link_can_open_is_refused_beforehand(tmp_path, port, told):
+    path = tmp_path / "lab.toml"
+    path.write_text(LAB.replace("COM3", port))
+    with pytest.raises(SceneError) as refused:
+        load_bench(path)
+    assert f'lab.toml: [coil] port = "{port}": ' in str(refused.value)
+    assert told in str(refused.value)
+
+
 def test_a_dialect_of_the_users_own_is_found_beside_the_bench_file(tmp_path):
     path = tmp_path / "lab.toml"
     path.write_text(LAB.replace("[coil]\n", '[coil]\ndialect = "mine.toml"\n'))
