@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QRect, QRectF, QSize, Qt
+from PySide6.QtCore import QBuffer, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 
@@ -88,7 +88,7 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
         if ending == ".csv":
             path.write_text(table(stack, title), encoding="utf-8")
         elif ending == ".svg":
-            _svg(stack, title, path)
+            path.write_bytes(_svg(stack, title))
         elif not picture(stack, title).save(str(path)):
             raise OSError(f"{path} cannot be written as a picture; end it in .png.")
     except OSError as error:
@@ -111,18 +111,18 @@ def picture(stack: LaneStack, title: str, scale: int = 2) -> QImage:
     return image
 
 
-def _svg(stack: LaneStack, title: str, path: Path) -> None:
+def _svg(stack: LaneStack, title: str) -> bytes:
     size = _size(stack)
+    written = QBuffer()
     generator = QSvgGenerator()
-    generator.setFileName(str(path))
+    generator.setOutputDevice(written)
     generator.setSize(size)
     generator.setViewBox(QRect(0, 0, size.width(), size.height()))
     generator.setTitle(title)
-    painter = QPainter()
-    if not painter.begin(generator):
-        raise OSError(f"{path} cannot be written.")
+    painter = QPainter(generator)
     _draw(painter, stack, title, size)
     painter.end()
+    return bytes(written.data().data())
 
 
 def _size(stack: LaneStack) -> QSize:

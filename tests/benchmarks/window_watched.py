@@ -22,12 +22,14 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu, QWi
 
 from gui.app import application, begin, fit
 from gui.dialogs.overlay import Overlay
+from gui.garbage import collected_here
 from gui.look.theme import Theme
 from gui.session.log import LogLine
 from gui.session.session import Session
 from gui.window import Window
 from sim_backend.serial_line import wires
 from sim_backend.serial_line.faults import SerialFault
+from tactile_lab.engine.memory import map_large, share_heap
 
 SCENE = """
 [protocol]
@@ -194,11 +196,14 @@ class Watched:
 
 def main(folder: Path) -> None:
     sys.setswitchinterval(1e-3)
+    share_heap()  # as the program does
+    map_large()
     listen_to_trouble()
     watched = Watched(folder)
     QApplication.setQuitOnLastWindowClosed(True)
-    watched.app.exec()
-    watched.session.close()
+    with collected_here():
+        watched.app.exec()
+        watched.session.close()
 
 
 if __name__ == "__main__":

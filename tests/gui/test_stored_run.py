@@ -3,6 +3,7 @@
 import numpy as np
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
+from PySide6.QtSvg import QSvgRenderer
 
 
 def test_old_run_opens_in_the_same_lanes(lab) -> None:
@@ -95,6 +96,10 @@ def test_view_is_exported(lab) -> None:
     for name in ("view.png", "view.svg", "VIEW.CSV", "view.csv"):
         write_view(window.panels, None, folder / name)
         assert (folder / name).stat().st_size > 100
+    assert QSvgRenderer(str(folder / "view.svg")).isValid()
+    for name in ("gone/view.png", "gone/view.svg", "gone/view.csv"):
+        write_view(window.panels, None, folder / name)
+        assert "not exported" in window.session.log.lines[-1].text
     header = (folder / "view.csv").read_text().splitlines()[1]
     assert "V_C1_time_s" in header and "force_mean_N" in header
     write_scene(window.panels, folder / "saved.toml")
