@@ -91,11 +91,8 @@ def periodic() -> Plot:
         force = force.then(one)
     time, period = np.linspace(0, force.end, 3201), one.end
     currents = np.array(
-        [
-            simulate(c, force, keep=("I_DS",)).sample("I_DS", time)
-            for c in specimens()
-        ]
-    )  # fmt: skip
+        [simulate(c, force, keep=("I_DS",)).sample("I_DS", time) for c in specimens()]
+    )
     within = np.linspace(0, period, 201)
     aligned = [
         np.array([np.interp(within + k * period, time, c) for c in currents])

@@ -63,7 +63,7 @@ class Bipolar(Levels):
             for t in pushed
             if t.held is not None
             and not run.left_range("I_DS", t.start - BEFORE, t.held[1])
-        ]  # fmt: skip
+        ]
         cut = tuple(
             f"No drain current at {t.label}: V_C1 left its channel's range."
             for t in pushed
@@ -196,11 +196,11 @@ def _changes(
     moved = [fitted(*cause) for cause in ((code, 0.0), (0.0, steps)) if any(cause)]
     log_tau = math.log(decay.tau.value)
     logarithm = Estimate(
-        log_tau, decay.tau.error / decay.tau.value,
-        math.log(decay.tau.low), math.log(decay.tau.high),
-    ).widened(
-        *(abs(math.log(other.tau.value) - log_tau) for other, _ in moved)
-    )  # fmt: skip
+        log_tau,
+        decay.tau.error / decay.tau.value,
+        math.log(decay.tau.low),
+        math.log(decay.tau.high),
+    ).widened(*(abs(math.log(other.tau.value) - log_tau) for other, _ in moved))
     tau = Estimate(
         decay.tau.value, decay.tau.value * logarithm.error,
         math.exp(logarithm.low), math.exp(logarithm.high),

@@ -196,7 +196,8 @@ class SineSweep(ForceProtocol):
                         Series(
                             y=[g.gain.value for g in found],
                             y_error=[g.gain.half for g in found],
-                            name=run.origin, **measured,
+                            name=run.origin,
+                            **measured,
                         ),
                         Series(
                             y=[g.gain.value for g in expected], name="model", **model
@@ -215,14 +216,12 @@ class SineSweep(ForceProtocol):
                             y_error=[math.degrees(g.phase.half) for g in found],
                             **measured,
                         ),
-                        Series(
-                            y=[_degrees(g.phase.value) for g in expected], **model
-                        ),
+                        Series(y=[_degrees(g.phase.value) for g in expected], **model),
                     ),
                     height=1.55,
                 ),
             ),
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)

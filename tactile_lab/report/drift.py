@@ -50,7 +50,7 @@ def drift_plot(run: Measurement) -> Plot | None:
                 height=1.6,
             ),
         ),
-    )  # fmt: skip
+    )
 
 
 def drift_sentence(run: Measurement) -> str:

@@ -37,9 +37,7 @@ def _four_pulses() -> Waveform:
     points = [(0.0, 0.0)]
     for k, level in enumerate((0.08, 0.12, 0.16, 0.2)):
         t = 4.5 * k
-        points += [
-            (t + 0.25, level), (t + 2.25, level), (t + 2.5, 0.0), (t + 4.5, 0.0)
-        ]  # fmt: skip
+        points += [(t + 0.25, level), (t + 2.25, level), (t + 2.5, 0.0), (t + 4.5, 0.0)]
     return Waveform.through(points)
 
 

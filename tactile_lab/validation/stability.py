@@ -112,9 +112,8 @@ def _solve(case: Extreme, tolerance: float = 1e-9) -> Result:
     p = case.problem
     keep = ("statistics",) if case.statistics else ("spikes", "statistics")
     return simulate(
-        p.circuit, p.force, until=p.until, start=p.start, keep=keep,
-        tolerance=tolerance,
-    )  # fmt: skip
+        p.circuit, p.force, until=p.until, start=p.start, keep=keep, tolerance=tolerance
+    )
 
 
 def _ours(case: Extreme, exact: Truth | None) -> tuple[str, str, str]:

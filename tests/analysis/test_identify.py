@@ -11,10 +11,9 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
 
-FORCE = (
-    Waveform.pulse(0.12, ramp=0.25, hold=4.0, rest=2.0)
-    .then(Waveform.pulse(0.18, ramp=0.25, hold=6.0, rest=4.0))
-)  # fmt: skip
+FORCE = Waveform.pulse(0.12, ramp=0.25, hold=4.0, rest=2.0).then(
+    Waveform.pulse(0.18, ramp=0.25, hold=6.0, rest=4.0)
+)
 
 
 def run_of(circuit, *, noise=3e-3, jitter=0.0, seed=0, bins=600):

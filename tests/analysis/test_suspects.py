@@ -18,10 +18,9 @@ from tactile_lab.waveform import Waveform
 
 MAGNET = Magnet(r=6e-3, coil_lag=1.1e-3, eddy_lag=3e-3, lag_uncertainty=1e-3)
 FOLLOWERS = Followers(input_bias_uncertainty=20e-12, offset_uncertainty=3e-3)
-FORCE = (
-    Waveform.pulse(0.13, ramp=0.1, hold=1.5, rest=1.0)
-    .then(Waveform.pulse(0.18, ramp=0.1, hold=1.5, rest=1.0))
-)  # fmt: skip
+FORCE = Waveform.pulse(0.13, ramp=0.1, hold=1.5, rest=1.0).then(
+    Waveform.pulse(0.18, ramp=0.1, hold=1.5, rest=1.0)
+)
 BELIEF = Belief(
     circuit=Circuit(I_bias=65e-12),
     magnet=MAGNET,

@@ -66,9 +66,7 @@ def test_every_force_protocol_offers_the_same_preparation(kind, tmp_path):
         kind(demagnetise=True, demagnetise_from=0.5, force_at_zero=True, **given)
     )
     labels = [t.label for t in prepared]
-    assert labels == [
-        "demagnetise", "recovery", "F(0) before", *plain, "F(0) after",
-    ]  # fmt: skip
+    assert labels == ["demagnetise", "recovery", "F(0) before", *plain, "F(0) after"]
     assert prepared[0].current.peak == pytest.approx(0.5)
     assert prepared[2].force.peak == prepared[-1].force.peak == 0
     assert not prepared[2].pause

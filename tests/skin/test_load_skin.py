@@ -113,9 +113,7 @@ def test_braille_is_as_printed():
 
 def test_rows_are_numbered_from_the_top_left_and_hexagons_lie_between():
     places = skin({"grid": [2, 3], "pitch": "2 mm"}).array.places * 1e3
-    assert places.tolist() == [
-        [-2, 1], [0, 1], [2, 1], [-2, -1], [0, -1], [2, -1],
-    ]  # fmt: skip
+    assert places.tolist() == [[-2, 1], [0, 1], [2, 1], [-2, -1], [0, -1], [2, -1]]
     hexagons = skin({"hexagonal": [3, 4], "pitch": "2 mm"}).array.places
     apart = np.linalg.norm(hexagons[:, None] - hexagons, axis=2)
     assert np.min(apart[apart > 0]) == pytest.approx(2e-3)
