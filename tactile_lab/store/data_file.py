@@ -129,11 +129,13 @@ def check_inside(file: h5py.File) -> None:
         outside = kind != h5py.h5l.TYPE_HARD
         if not outside:
             try:
-                node = file[name]
+                node = h5py.h5o.open(file.id, name)
             except (OSError, KeyError, RuntimeError):
                 continue  # damaged: said where it is read
-            if isinstance(node, h5py.Dataset):
-                outside = bool(node.external) or node.is_virtual
+            if isinstance(node, h5py.h5d.DatasetID):
+                made = node.get_create_plist()
+                virtual = made.get_layout() == h5py.h5d.VIRTUAL
+                outside = virtual or made.get_external_count() > 0
         if outside:
             raise OSError(
                 f"/{name.decode()} leads elsewhere, to what this run did not record"
