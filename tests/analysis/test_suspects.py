@@ -1,6 +1,7 @@
 """The one thing that is other than believed is named, with its size; or none is."""
 
 from dataclasses import replace
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -151,3 +152,11 @@ def test_what_a_cause_leaves_is_said_beside_what_the_belief_leaves():
         "With it the misfit falls from 180 to 1 times the noise; the next best, R1, "
         "leaves 9 times."
     ) in found.text
+
+
+@pytest.mark.parametrize(("seconds", "kept"), [(1, True), (401, False)])
+def test_the_force_of_a_long_run_is_not_kept_when_none_needs_it(seconds, kept):
+    time = np.arange(0, seconds, 0.02)
+    stairs = Waveform.stairs(np.column_stack([time, time % 0.3]), seconds)
+    force = ref(Deviation().driven(Circuit(), MAGNET, stairs).force)
+    assert (force() is not None) is kept
