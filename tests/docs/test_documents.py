@@ -2,15 +2,17 @@
 
 import json
 import re
+import runpy
 import shlex
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib import pyplot
 
 from tactile_lab.cli import cli
 
@@ -20,18 +22,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 def blocks(document, language):
     text = (DOCS / document).read_text(encoding="utf-8")
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.S)
-
-
-def python(*arguments, folder):
-    done = subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 @pytest.fixture
@@ -47,9 +37,11 @@ def tactile_lab(tmp_path, monkeypatch):
     return typed
 
 
-def test_the_tutorial_ends_with_a_fitted_time_constant(tmp_path):
-    said = python(DOCS / "tutorial" / "adaptation.py", tmp_path / "runs", folder=DOCS)
-    match = re.search(r"time constant ([\d.]+) s", said)
+def test_the_tutorial_ends_with_a_fitted_time_constant(tmp_path, monkeypatch, capsys):
+    file = str(DOCS / "tutorial" / "adaptation.py")
+    monkeypatch.setattr(sys, "argv", [file, str(tmp_path / "runs")])
+    runpy.run_path(file, run_name="__main__")
+    match = re.search(r"time constant ([\d.]+) s", capsys.readouterr().out)
     assert match is not None
     assert 1 < float(match[1]) < 8
     (folder,) = (tmp_path / "runs").iterdir()
@@ -118,11 +110,14 @@ def test_each_example_of_the_scripting_how_to_stands_alone(
         assert tau == pytest.approx(8.69, rel=0.1)
 
 
-def test_the_python_of_the_readme_runs(tmp_path):
+def test_the_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    matplotlib.use("Agg")
     (source,) = blocks("../README.md", "python")
-    script = tmp_path / "script.py"
-    script.write_text("import matplotlib\n\nmatplotlib.use('Agg')\n" + source)
-    assert "<Run of hold_10s: complete" in python(script, folder=tmp_path)
+    exec(source, {"__name__": "__main__"})
+    assert len(pyplot.gcf().axes) == 3
+    pyplot.close("all")
+    assert "<Run of hold_10s: complete" in capsys.readouterr().out
 
 
 def test_the_how_to_analyse_a_run_is_true(tmp_path, monkeypatch, capsys):
@@ -165,8 +160,7 @@ def test_the_skin_of_its_page_is_pressed_and_its_python_runs(tmp_path, tactile_l
     (tmp_path / "ball.toml").write_text(toml, encoding="utf-8")
     assert "256 taxels" in tactile_lab("skin", "ball.toml", "--plan")
     (source,) = blocks("skin.md", "python")
-    (tmp_path / "press.py").write_text(source, encoding="utf-8")
-    python("press.py", folder=tmp_path)
+    exec(source, {"__name__": "__main__"})
 
 
 def test_the_circuit_of_a_taxel_is_written_as_its_page_says(tmp_path, monkeypatch):
