@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,17 +35,24 @@ class Picture:
 
 def rendered(template: str, **names: Any) -> str:
     """A page: the template in this folder with these names, and the house style."""
+    text = _templates().get_template(template).render(**names)
+    return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
+
+
+@cache
+def _templates() -> Environment:
+    loader = PackageLoader("tactile_lab", "report")
     kept = Environment(
-        loader=PackageLoader("tactile_lab", "report"),
+        loader=loader,
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     kept.filters |= {"unbroken": unbroken, "breakable": _breakable}
-    style = kept.loader.get_source(kept, "page.css")[0] if kept.loader else ""
-    text = kept.get_template(template).render(style=Markup(_colours() + style), **names)
-    return re.sub(r"\n\s*\n+", "\n", text).lstrip() + "\n"
+    style = loader.get_source(kept, "page.css")[0]
+    kept.globals["style"] = Markup(_colours() + style)
+    return kept
 
 
 def _breakable(name: str) -> Markup:
