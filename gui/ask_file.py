@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+
+CLOSING = 50
+"""Time in which Qt comes back from a question that was closed, ms."""
 
 
 def ask_file(
@@ -38,7 +41,7 @@ def ask_file(
         other.close()
     dialog = QFileDialog(parent, title, "", kinds)
     dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.finished.connect(lambda: _forget(dialog))
     dialog.setFileMode(
         QFileDialog.FileMode.Directory if folder else QFileDialog.FileMode.AnyFile
     )
@@ -59,6 +62,17 @@ def ask_file(
 
     dialog.fileSelected.connect(chosen)
     dialog.show()
+
+
+def _forget(dialog: QFileDialog) -> None:
+    """Delete a closed dialog; while it asks itself, a function of it still runs."""
+    asking = dialog.findChildren(QMessageBox)
+    for box in asking:
+        box.close()
+    if asking:
+        QTimer.singleShot(CLOSING, dialog, lambda: _forget(dialog))
+    else:
+        dialog.deleteLater()
 
 
 def _ask_to_replace(

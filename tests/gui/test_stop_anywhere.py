@@ -55,6 +55,28 @@ def test_a_question_of_a_file_dialog_is_not_modal(lab) -> None:
     dialog.close()
 
 
+def test_a_file_dialog_that_asks_outlives_its_question(lab) -> None:
+    """Its own function waits within: the program ended by a "double free"."""
+    window = lab.window
+    window.screen_.ask_run()
+    (dialog,) = window.findChildren(QFileDialog)
+    dialog.findChild(QLineEdit, "fileNameEdit").setText("/no/such/folder")
+    outlived: list[bool] = []
+
+    def close_while_it_asks() -> None:
+        window.screen_.ask_run()  # closes the one before
+        lab.app.processEvents()
+        outlived.append(isValid(dialog) and not dialog.isVisible())
+
+    QTimer.singleShot(0, close_while_it_asks)
+    dialog.accept()
+    assert outlived == [True]
+    lab.until(lambda: not isValid(dialog))
+    (after,) = window.findChildren(QFileDialog)
+    assert after.isVisible()
+    after.close()
+
+
 def test_a_key_that_is_held_down_acts_once(lab) -> None:
     window, log = lab.window, lab.session.log
     window.actions_.show_help()
