@@ -86,6 +86,8 @@ class SerialLink:
         self._doubtful = False
         self._half_sent = False
         self._names_due = 0
+        self._echoes: list[str] = []
+        """Lines without an answer whose echo comes before the next answer."""
 
     @property
     def is_open(self) -> bool:
@@ -105,6 +107,7 @@ class SerialLink:
             return
         self._serial = open_port(self.port, self.wire, self._what)
         try:
+            self._echoes.clear()
             with self._mapped():
                 self._serial.reset_input_buffer()
             self._rest_from(self._clock.now())  # whoever spoke to it before
@@ -148,6 +151,8 @@ class SerialLink:
         """
         self._settle()
         self._send(line)
+        if self.wire.echo:
+            self._echoes.append(line)
 
     def query(self, line: str, *, blank: bool = False) -> str:
         """Send `line` and return its answer without terminator and flow control.
@@ -207,6 +212,7 @@ class SerialLink:
             BadReplyError: it keeps talking, or answers with another name.
         """
         self._resume()
+        self._echoes.clear()
         self.drain()
         self._send_preamble()
         answer = ""
@@ -277,10 +283,11 @@ class SerialLink:
     def _exchange(self, line: str, blank: bool = False) -> str:
         self._doubtful = True
         self._send(line)
-        if self.wire.echo:
-            repeated = self._receive(line)
-            if repeated != line:
-                raise self._bad(line, repeated.encode())
+        for sent in (*self._echoes, line) if self.wire.echo else ():
+            repeated = self._receive(sent)
+            if repeated != sent:
+                raise self._bad(sent, repeated.encode())
+        self._echoes.clear()
         answer = self._receive(line, blank)
         if answer == line:
             raise BadReplyError(

@@ -279,17 +279,24 @@ def test_echo_at_connect_is_named(serial_bench):
         it.coil.open()
 
 
-def test_a_row_with_echo_reads_past_it(serial_bench):
+@pytest.mark.parametrize("join", [";:", ""])
+def test_a_row_with_echo_reads_past_it(serial_bench, join):
     it = serial_bench
     it.end.faults.add(SerialFault(kind="echo", times=None))
     row = coil_dialect("kepco-bop")
     wire = row.serial.model_copy(update={"echo": True})
-    row = row.model_copy(update={"serial": wire})
-    coil = CoilSource(row, it.end.url, CoilLimits(), it.clock, baud=19200)
+    row = row.model_copy(update={"serial": wire, "join": join})
+    sent = []
+    coil = CoilSource(
+        row, it.end.url, CoilLimits(), it.clock, baud=19200,
+        spy=lambda way, text, _: sent.append(text) if way == ">" else None,
+    )  # fmt: skip
     coil.open()
     coil.energise()
     assert coil.safe_off().verified
     coil.close()
+    # nothing was taken for a stranger's answer, after which its name is asked again
+    assert sent.count(b"*IDN?\n") == 1
 
 
 def test_another_instrument_on_the_port_is_refused(serial_bench):
