@@ -140,7 +140,11 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     if summary["spikes"] is not None:
         yield "spikes", str(summary["spikes"])
     for trial in summary["trials"]:
-        times = f"{trial['start_s']:.3f} to {trial['end_s']:.3f} s"
+        begun = f"{trial['start_s']:.3f}"
+        if trial["start_s"] < trial["end_s"]:
+            times = f"{begun} to {trial['end_s']:.3f} s"
+        else:  # prepared, and the run ended before it
+            times = f"would have begun at {begun} s"
         cut = "" if trial["complete"] else ", cut short"
         told = count(trial["spikes"], "spike")
         yield "trial", f"{trial['label']:<12} {times}, {told}{cut}"

@@ -25,6 +25,9 @@ SCHEMA = 1
 SEAL = "sha256"
 """Key of `run.json` with the hash of all the others; runs of older versions lack it."""
 
+CHANGED = "changed_before_recovery"
+"""Key of `run.json`: its hash was wrong when the run was recovered."""
+
 DATA, LOG, SCENE = "data.h5", "log.jsonl", "scene.toml"
 
 INPUTS = "inputs"
@@ -157,6 +160,11 @@ def seal(info: Mapping[str, Any]) -> str:
     """SHA-256 of what `run.json` says, however it is laid out."""
     said = {name: value for name, value in info.items() if name != SEAL}
     return digest(json.dumps(said, sort_keys=True, default=str).encode())
+
+
+def as_written(info: Mapping[str, Any]) -> bool:
+    """Whether `run.json` is what was written; one of an older version cannot tell."""
+    return SEAL not in info or seal(info) == info[SEAL]
 
 
 def read_info(path: Path) -> dict[str, Any]:

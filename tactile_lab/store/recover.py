@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import zlib
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -19,8 +20,10 @@ from tactile_lab.store.certificate import redetect, write_certificate
 from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import (
+    CHANGED,
     DATA,
     RESERVE,
+    as_written,
     check_space,
     is_live,
     read_info,
@@ -81,6 +84,8 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
             f"{path} was not cut short (status {info['status']}); nothing to recover. "
             "`tactile-lab verify` checks it."
         )
+    if not as_written(info):  # what is written now gets a hash of its own
+        info = {**info, CHANGED: True}
     # a recovery that was cut short itself has put it there already
     killed = path / KEPT if (path / KEPT).exists() else path / DATA
     listed = written = read_ledger(path / LEDGER)
@@ -93,21 +98,34 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
         written.rows["segments"] = _told_by(killed).rows.get("segments", [])
     check_space(path, killed.stat().st_size + RESERVE)
     new = path / "data.recovering.h5"
-    try:
-        new.write_bytes(written.declared)
-        with h5py.File(new, "r+", libver="latest") as file:
-            told = share(progress, 0.0, FILLING)
-            samples, dropped = _fill(file, written, killed, told)
-    except OSError as error:
-        new.unlink(missing_ok=True)
-        raise RecordingError(f"{new} cannot be written: {error}.") from error
+    with _writing(path):
+        try:
+            new.write_bytes(written.declared)
+            with h5py.File(new, "r+", libver="latest") as file:
+                told = share(progress, 0.0, FILLING)
+                samples, dropped = _fill(file, written, killed, told)
+        except OSError:
+            with suppress(OSError):  # it is not there on a disk that may only be read
+                new.unlink(missing_ok=True)
+            raise
     killed.rename(path / KEPT)
     new.replace(path / DATA)
-    recovery = _derive(path, samples, dropped)
+    recovery = _derive(path, info, samples, dropped)
     progress(1.0)
     if listed.declared:  # else somebody may have a better copy of it
         (path / LEDGER).unlink()
     return recovery
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(
+            f"{path} cannot be written: {error.strerror or error}. Copy it to where "
+            "there is room and the right to write, and recover it there."
+        ) from error
 
 
 def _told_by(killed: Path) -> LedgerContents:
@@ -192,9 +210,10 @@ def _refuse_if_there_may_be_samples(path: Path, killed: Path) -> None:
 def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:
     """A run that died before its first sample."""
     kept = None
-    if (path / DATA).exists():
-        kept = (path / DATA).rename(path / KEPT)
-    (path / LEDGER).unlink(missing_ok=True)
+    with _writing(path):
+        if (path / DATA).exists():
+            kept = (path / DATA).rename(path / KEPT)
+        (path / LEDGER).unlink(missing_ok=True)
     write_info(path, {**info, "status": "recovered", "samples": {}})
     return Recovered(0, 0, 0, kept)
 
@@ -280,7 +299,7 @@ class _Chunks:
         return np.empty(0, np.int16)
 
 
-def _derive(path: Path, samples: int, dropped: int) -> Recovered:
+def _derive(path: Path, info: dict[str, Any], samples: int, dropped: int) -> Recovered:
     """Find the spikes again, count, and patch `run.json`."""
     with Run.load(path) as run:
         found = redetect(run)
@@ -297,7 +316,7 @@ def _derive(path: Path, samples: int, dropped: int) -> Recovered:
             for name in run.signals
         }
         info = {
-            **run.info,
+            **info,
             "status": "recovered",
             "samples": counters,
             "spikes_online": rows.size,

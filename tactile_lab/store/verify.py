@@ -23,12 +23,12 @@ from tactile_lab.store.certificate import (
 )
 from tactile_lab.store.columns import pyramid_of
 from tactile_lab.store.folder import (
+    CHANGED,
     DATA,
-    SEAL,
+    as_written,
     digest,
     is_live,
     read_info,
-    seal,
 )
 from tactile_lab.store.layout import BIN, RECORDS
 from tactile_lab.store.progress import Progress, counted, each, nothing
@@ -128,8 +128,12 @@ def verify(path: Path, progress: Progress = nothing) -> Verification:
 def _sealed(info: dict[str, Any], found: list[Damage]) -> Iterator[Damage]:
     """Whether `run.json` is as it was written, where nothing else tells of it."""
     known = any(finding.where.startswith(INFO) for finding in found)
-    if not known and SEAL in info and seal(info) != info[SEAL]:
+    if not known and not as_written(info):
         yield Damage(INFO, "was changed after it was written (SHA-256 differs)")
+    if info.get(CHANGED):
+        yield Damage(
+            INFO, "was changed before the run was recovered (SHA-256 differed)"
+        )
 
 
 def _constants(run: Run) -> Iterator[Damage]:

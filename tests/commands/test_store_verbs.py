@@ -86,6 +86,17 @@ def test_export_writes_beside_the_data(run):
     assert "--from: " in wrong.output and "unit V" in wrong.output
 
 
+def test_a_trial_that_the_run_ended_before_is_not_said_to_end_before_it_begins(run):
+    from tactile_lab.commands.show import describe, rows
+
+    told = describe(run)
+    told["trials"] = [
+        {"label": "9 N", "start_s": 4.7, "end_s": 3.1, "spikes": 0, "complete": False}
+    ]
+    (trial,) = (text for name, text in rows(told) if name == "trial")
+    assert trial.split(maxsplit=2)[2].startswith("would have begun at 4.700 s, 0 ")
+
+
 @pytest.mark.parametrize("verb", ["show", "verify", "recover"])
 def test_a_folder_that_is_no_run_is_one_clear_message(verb, tmp_path):
     missing = tell(verb, tmp_path / "nothing")

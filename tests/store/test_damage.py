@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_lab.errors import RunFolderError
+from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
@@ -386,6 +386,27 @@ def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(
     with pytest.raises(RunFolderError, match=r"may hold samples\. Nothing was changed"):
         recover(path)
     assert before == {f.name: f.read_bytes() for f in path.iterdir() if f.is_file()}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+def test_a_recovery_does_not_make_a_changed_run_json_good(killed_late, tmp_path):
+    path = shutil.copytree(killed_late[0], tmp_path / killed_late[0].name)
+    told = (path / "run.json").read_text()
+    (path / "run.json").write_text(told.replace("started", "starved"))
+    recover(path)
+    (found,) = verify(path).findings
+    assert str(found).startswith("run.json: was changed before the run was recovered")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+def test_a_recovery_that_cannot_write_says_what_to_do(killed_late, tmp_path):
+    path = shutil.copytree(killed_late[0], tmp_path / killed_late[0].name)
+    # neither written nor removed, as on a disk that may only be read
+    (path / "data.recovering.h5").mkdir()
+    with pytest.raises(RecordingError, match=r"cannot be written.*Copy it to where"):
+        recover(path)
+    (path / "data.recovering.h5").rmdir()
+    assert recover(path).samples >= killed_late[1] - 1024
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
