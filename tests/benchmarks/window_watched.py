@@ -46,6 +46,9 @@ AMOUNTS = {"late": 1.0, "unplug": 2.0}
 """Of faults that have one, s."""
 
 
+DRAGS = "QDragManager::drag in possibly invalid state"
+"""A press came before Qt was back from the drag before: nothing is dragged then."""
+
 TELLING = threading.Lock()
 
 
@@ -63,7 +66,7 @@ def listen_to_trouble() -> None:
         tell({"problem": "".join(traceback.format_exception(kind, error, trace))})
 
     def warned(kind, context, text) -> None:
-        if kind is not QtMsgType.QtDebugMsg:
+        if kind is not QtMsgType.QtDebugMsg and text != DRAGS:
             stack = "".join(traceback.format_stack()[:-1])
             tell({"problem": f"Qt: {text}\n{stack}"})
 
