@@ -110,16 +110,17 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if end < par[V_FIRE]:
                         v = end
                         break
-                    before = at
                     at += rise_time(v, Q, slope, h - at, par)
-                    if at == before or count >= MOST_SPIKES:  # without end
+                    fires = t0 + (s + at)
+                    again = count > 0 and fires == spikes[count - 1]
+                    if again or count >= MOST_SPIKES:  # without end
                         return OUT_OF_EVALUATIONS, spikes[:count], y, evaluations
                     spikes = grown(spikes, count)
-                    spikes[count] = t0 + (s + at)
+                    spikes[count] = fires
                     count += 1
                     v = par[V_RESET]
                     if par[T_EPS] > 0.0:
-                        resume = t0 + (s + at) + par[T_EPS]
+                        resume = fires + par[T_EPS]
         return FINISHED, spikes[:count].copy(), y, evaluations
 
     return run
