@@ -76,19 +76,12 @@ def test_an_unknown_verb_names_the_nearest(capsys):
     assert told.out == ""
 
 
-def test_simulate_opens_no_bench():
-    names = loaded_after("simulate", "spikes_only")
-    tops = {name.split(".")[0] for name in names}
-    assert not tops & {"serial", "usb", "PySide6", "h5py", "matplotlib", "sim_backend"}
-    assert "drivers" not in tops
-    assert "tactile_lab.acquisition" not in names
-
-
 def test_plan_opens_nothing_and_draws_only_when_asked():
     names = loaded_after("plan", "v_c1_only")
     tops = {name.split(".")[0] for name in names}
     assert not tops & {"serial", "usb", "PySide6", "h5py", "matplotlib", "sim_backend"}
     assert not names & {"drivers.coil.source", "drivers.teslameter"}
+    assert "tactile_lab.commands.one_run" not in names
 
 
 def test_a_pipe_that_lacks_our_characters_is_no_error():

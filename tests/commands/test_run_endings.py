@@ -46,13 +46,18 @@ def test_nothing_in_the_report_changes_how_the_run_ended(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes are POSIX's")
-@pytest.mark.parametrize("closed", ["stdout", "stderr", "both"])
-def test_a_terminal_that_was_closed_does_not_end_the_run(tmp_path, closed):
+@pytest.mark.parametrize(
+    ("closed", "options"),
+    [("stdout", ["--no-report"]), ("stderr", ["--no-report"]), ("both", [])],
+    ids=["stdout", "stderr", "both"],
+)
+def test_a_terminal_that_was_closed_does_not_end_the_run(tmp_path, closed, options):
     read, write = os.pipe()
     os.close(read)
     ends = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     ends |= {name: write for name in ends if closed in (name, "both")}
-    command = [sys.executable, "-m", "tactile_lab", "run", *SHORT, "--out", tmp_path]
+    asked = ["run", *SHORT, *options, "--out", tmp_path]
+    command = [sys.executable, "-m", "tactile_lab", *asked]
     done = subprocess.run(command, **ends, check=False)
     os.close(write)
     assert done.returncode == 0

@@ -151,17 +151,6 @@ def test_a_port_that_is_taken_is_refused_before_anything_is_opened(
     assert not (tmp_path / "runs").exists()
 
 
-def test_nothing_of_it_is_loaded_unless_asked(tmp_path):
-    source = (
-        "import sys\nfrom tactile_lab.cli import main\n"
-        "try:\n    main(['plan', 'demo', '--keys'])\nexcept SystemExit:\n    pass\n"
-        "assert 'tactile_lab.commands.one_run' not in sys.modules\n"
-        "import tactile_lab.commands.run\n"
-        "assert 'tactile_lab.commands.status_server' not in sys.modules\n"
-    )
-    subprocess.run([sys.executable, "-c", source], check=True, capture_output=True)
-
-
 def test_so_many_programs_may_watch_and_a_place_becomes_free(server):
     links = [connected(server) for _ in range(MOST_PROGRAMS)]
     for link in links:

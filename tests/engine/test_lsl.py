@@ -1,7 +1,6 @@
 """Spikes, envelopes and events of a run, heard by LSL's own library."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
@@ -147,19 +146,6 @@ def test_streams_that_fail_are_told_of_once_and_the_run_goes_on(streams, tmp_pat
     assert "the library is gone" in told
     with Run.load(done.folder) as stored:
         assert stored.spikes.size == done.spikes > 0
-
-
-def test_a_run_without_it_imports_nothing_of_it(tmp_path):
-    source = (
-        "import sys\nfrom tactile_lab.cli import main\n"
-        "try:\n    main(['run', 'demo', '--no-report', '--out', sys.argv[1],"
-        " '--set', 'protocol.levels=[\"100 mN\"]', '--set', 'protocol.hold=0.2 s'])\n"
-        "except SystemExit as end:\n    assert end.code == 0\n"
-        "loaded = {'pylsl', 'tactile_lab.engine.lsl'} & set(sys.modules)\n"
-        "assert not loaded, loaded\n"
-    )
-    asked = [sys.executable, "-c", source, str(tmp_path)]
-    subprocess.run(asked, check=True, capture_output=True)
 
 
 def test_without_the_library_it_is_refused_before_anything_is_opened(monkeypatch):
