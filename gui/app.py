@@ -35,13 +35,14 @@ def application(arguments: Sequence[str] = ()) -> QApplication:
     """The one application, in Fusion style with the bundled font."""
     found = QApplication.instance()
     app = found if isinstance(found, QApplication) else QApplication(list(arguments))
+    if app.findChildren(ToolTips):
+        return app  # all that is open would be styled anew
     app.setApplicationName("Tactile Lab")
     app.setOrganizationName("tactile-lab")
     app.setStyle("Fusion")
     app.setFont(fonts.load())
-    if not app.findChildren(ToolTips):
-        ToolTips(app)
-        WithinReach(app)
+    ToolTips(app)
+    WithinReach(app)
     return app
 
 
