@@ -1,5 +1,6 @@
 """A protocol file of the user's own concludes and draws, or says where it fails."""
 
+import html
 import json
 import re
 import shutil
@@ -13,6 +14,7 @@ from tactile_lab.cli import cli
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import ParameterError, SceneError
 from tactile_lab.plot import Panel, Plot, Series
+from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
@@ -122,15 +124,14 @@ def test_an_error_of_its_code_names_file_and_line_and_costs_nothing_else(
     made, tmp_path, old, new, says
 ):
     folder = kept(made, tmp_path, old, new)
-    report = write(folder, read(folder))
-    (said,) = report.findings.missing
+    found = find(read(folder))
+    (said,) = found.missing
     assert says in said
     if says not in ("return a Conclusion", "TypeError"):  # raised when it was done
         assert f"own.py, line {line_of(new, folder)}: " in said
-    found = json.loads(report.results.read_text())
-    assert found["missing"] == [said] and len(found["trials"]) == 1
-    assert bool(found["statements"]) != bool(found["plots"]), "the other one is kept"
-    assert report.png.exists() and says in report.html.read_text(encoding="utf-8")
+    assert len(found.run.trials) == 1
+    concluded, drawn = found.conclusion.sentences, found.answers
+    assert bool(concluded) != bool(drawn), "the other one is kept"
 
 
 @pytest.mark.parametrize(
@@ -151,6 +152,9 @@ def test_what_cannot_be_shown_is_told_and_costs_nothing_else(
     assert said.exit_code == 0 and re.search(says, said.stderr)
     found = json.loads((folder / "results.json").read_text())
     assert bool(found["statements"]) != bool(found["plots"]), "the other one is kept"
+    assert len(found["trials"]) == 1 and re.search(says, found["missing"][0])
+    page = html.unescape((folder / "report.html").read_text(encoding="utf-8"))
+    assert found["missing"][0] in page and (folder / "figure.png").exists()
 
 
 @pytest.mark.parametrize(
