@@ -76,7 +76,6 @@ def test_a_scene_runs_from_plan_to_export(tmp_path, bench, rate, signals, cover)
     assert f"{proof.covered:.4g} of {proof.streamed:.4g} s; gaps by design" in (
         (folder / "report.html").read_text()
     )
-    tell("report", folder)
     tell("export", folder, "--to", "csv", "--until", "200 ms")
 
 
