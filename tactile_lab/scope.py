@@ -13,6 +13,9 @@ from tactile_lab.generator import GeneratorCapability
 from tactile_lab.quantity import Unit
 from tactile_lab.table import SceneTable
 
+CLOCK_ERROR = 1e-4
+"""Largest relative difference of the scope's sample clock and this computer's."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Channel(SceneTable):

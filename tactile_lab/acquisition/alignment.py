@@ -15,6 +15,7 @@ import numpy as np
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import CurrentList
+from tactile_lab.scope import CLOCK_ERROR
 from tactile_lab.trace import Trace
 
 SMALLEST = 0.03
@@ -22,9 +23,6 @@ SMALLEST = 0.03
 
 COIL_LAG = 2e-3
 """Longest time the coil's L/R takes to bring the current half the way, s."""
-
-CLOCK_ERROR = 1e-4
-"""Largest relative difference of the scope's sample clock and this computer's."""
 
 STEEPEST = 5e-4
 """Drift up to which edges of one end are still compared with each other, s/s."""

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.alignment import CLOCK_ERROR
 from tactile_lab.acquisition.channel_mean import ChannelMean
 from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Reading
 from tactile_lab.errors import SamplesLostError
-from tactile_lab.scope import Block, Stream
+from tactile_lab.scope import CLOCK_ERROR, Block, Stream
 from tactile_lab.signals import AVERAGED
 
 if TYPE_CHECKING:  # compiled code, which a run without spikes does not load

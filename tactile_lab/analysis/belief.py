@@ -35,6 +35,8 @@ class Belief:
         followers: and how well they are known; None: there are none.
         temperature: half of the 95 % band of the sensor's, K; None: not stated.
         clock: how far measured times may lie from the current's, s.
+        dated: whether the samples show when the current changed, so that its times are
+            by the clock that measured times are by.
         deviation: of all that, to be tried.
     """
 
@@ -44,6 +46,7 @@ class Belief:
     followers: Followers | None = None
     temperature: float | None = None
     clock: float = 0.0
+    dated: bool = True
     deviation: Deviation = NOWHERE
 
     @cached_property

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from tactile_lab.analysis.estimate import correlated
+from tactile_lab.analysis.estimate import Z95, correlated
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
@@ -29,8 +29,11 @@ SCALES = {**dict.fromkeys(VOLTAGES, 0.01), "I_bias": 1e-10, "g31": 0.004}
 """Steps of parameters fitted as they are; all others are fitted by their logarithm."""
 STEP = 2e-3
 """Grid on which I_C is integrated between spikes, s."""
-LEAST = 0.15e-3
-"""What V_C2 at firing is known to at best, V."""
+LEAST = 1e-9
+"""Smallest scatter of any evidence, V."""
+OFFSET = "V_C1's offset"
+"""The cause by which all of V_C1 is off alike."""
+Moved = Callable[[Circuit, Mapping[str, float]], DrivenCircuit]
 LONGEST = 1.0
 """Intervals longer than this tell little about rate and much about drift, s."""
 
@@ -46,8 +49,11 @@ class Residuals:
         duration: float,
         V_C1: Measured | None,
         spike_times: FloatArray | None,
+        causes: Sequence[str] = (),
+        moved: Moved | None = None,
     ) -> None:
         self.names = names
+        self.causes, self._moved = tuple(causes), moved
         self.force = force
         self._circuit, self._duration = circuit, duration
         self._trace = V_C1
@@ -80,9 +86,12 @@ class Residuals:
             return self._circuit.reset_voltage
         return float(getattr(self._circuit, name))
 
-    def residual(self, x: FloatArray) -> FloatArray:
-        """All residuals at scaled parameters `x`, V."""
-        return self.under(DrivenCircuit(self.circuit(x), self.force))
+    def driven(self, x: FloatArray, parts: Mapping[str, float]) -> DrivenCircuit:
+        """Circuit and force at scaled parameters `x`, by parts of the causes' bands."""
+        mine = {name: part for name, part in parts.items() if name in self.causes}
+        if self._moved is None:
+            return DrivenCircuit(self.circuit(x), self.force)
+        return self._moved(self.circuit(x), mine)
 
     def under(self, driven: DrivenCircuit) -> FloatArray:
         """All residuals of a circuit and its force, V: of V_C1, then at firing."""
@@ -111,24 +120,21 @@ class Residuals:
             misses[i] = charge + kept - circuit.fire_voltage
         return misses
 
-    def weights(self, residual: FloatArray) -> FloatArray:
-        """One over the scatter of each kind of evidence; V_C1's bins may err alike."""
-        traced, fired = residual[: self.bins], residual[self.bins :]
-        weights = np.empty(self.size)
-        if traced.size:
-            alike = math.sqrt(correlated(traced))
-            weights[: self.bins] = 1 / max(scatter(traced) * alike, 1e-9)
-        if fired.size:
-            weights[self.bins :] = 1 / max(scatter(fired), LEAST)
-        return weights
-
 
 class JointResiduals:
-    """Residuals of one or several runs as a function of the parameters they share.
+    """Residuals of one or several runs as a function of what they share.
+
+    That is x: the parameters, scaled; if asked, the logarithm of a factor of each run's
+    force; and of each cause of uncertainty the part of its 95 % band.
 
     Args:
         runs: of each run its residuals, of the same parameters, begun alike.
         scaled: whether the force of each run has a factor of its own that is fitted.
+
+    Attributes:
+        names: what is fitted.
+        causes: what else is open, within bands; the offset of V_C1 among them.
+        size: so many data.
     """
 
     def __init__(self, runs: Sequence[Residuals], *, scaled: bool = False) -> None:
@@ -137,53 +143,73 @@ class JointResiduals:
         self._scaled = scaled
         factors = (f"force_{i}" for i in range(1, len(runs) + 1))
         self.names = (*self._shared, *(factors if scaled else ()))
+        causes = dict.fromkeys(cause for run in runs for cause in run.causes)
+        shifted = any(run.bins and run.offset for run in runs)
+        self.causes = (*causes, *((OFFSET,) if shifted else ()))
         self.size = sum(run.size for run in runs)
-        ends = np.cumsum([run.size for run in runs])
-        self.parts = [slice(e - r.size, e) for e, r in zip(ends, runs, strict=True)]
-        traced, offsets = np.zeros(self.size, dtype=bool), np.zeros(self.size)
-        for run, part in zip(runs, self.parts, strict=True):
-            traced[part][: run.bins] = True
-            offsets[part][: run.bins] = run.offset
-        self.traced = traced
-        self.offsets = offsets
+        bins = [np.arange(run.size) < run.bins for run in runs]
+        offsets = [of * run.offset for of, run in zip(bins, runs, strict=True)]
+        self.traced = np.concatenate(bins)
+        self._offsets = np.concatenate(offsets)
 
     def driven(self, x: FloatArray) -> list[DrivenCircuit]:
-        """Circuit and force of each run at scaled parameters `x`."""
+        """Circuit and force of each run."""
         shared = x[: len(self._shared)]
-        return [
-            DrivenCircuit(run.circuit(shared), run.force.scaled(scale))
-            for run, scale in zip(self._runs, self.scales(x), strict=True)
-        ]
+        moved = dict(zip(self.causes, x[len(self.names) :], strict=True))
+        found = []
+        for run, factor in zip(self._runs, self._factors(x), strict=True):
+            circuit, force = run.driven(shared, moved)
+            found.append(DrivenCircuit(circuit, force.scaled(factor)))
+        return found
 
-    def scales(self, x: FloatArray) -> list[float]:
-        """The factor of each run's force."""
-        factors = x[len(self._shared) :] if self._scaled else np.zeros(len(self._runs))
-        return list(map(float, np.exp(factors)))
+    def circuit(self, x: FloatArray) -> Circuit:
+        """Of the first run, no cause counted."""
+        return self._runs[0].circuit(x[: len(self._shared)])
 
     def values(self, x: FloatArray) -> dict[str, float]:
-        """The parameters at scaled `x`, SI, by name."""
-        circuit = self.driven(x)[0].circuit
+        """What is fitted, SI, by name."""
+        circuit = self.circuit(x)
         found = {name: float(getattr(circuit, name)) for name in self._shared}
-        factors = zip(self.names, x, strict=True)
+        factors = zip(self.names, x, strict=False)
         return found | {n: float(np.exp(y)) for n, y in factors if n not in found}
 
     def residual(self, x: FloatArray) -> FloatArray:
-        """All residuals at scaled parameters `x`, V, run after run."""
-        return self.under(self.driven(x))
+        """Of all data, V, run after run; then how far each cause is off.
 
-    def under(self, driven: Sequence[DrivenCircuit]) -> FloatArray:
-        """All residuals of a circuit and its force for each run, V."""
-        pairs = zip(self._runs, driven, strict=True)
-        return np.concatenate([run.under(one) for run, one in pairs])
+        That is in standard deviations, so that with `weights` the sum of squares weighs
+        one with the other. Shape (size + causes,).
+        """
+        parts = x[len(self.names) :]
+        pairs = zip(self._runs, self.driven(x), strict=True)
+        data = np.concatenate([run.under(one) for run, one in pairs])
+        if OFFSET in self.causes:
+            data -= parts[-1] * self._offsets
+        return np.concatenate([data, Z95 * parts])
 
-    def first_weights(self) -> FloatArray:
+    @property
+    def first(self) -> FloatArray:
         """A few millivolts for either kind of evidence, before anything is known."""
-        return np.full(self.size, 1 / 5e-3)
+        return np.append(np.full(self.size, 1 / 5e-3), np.ones(len(self.causes)))
 
     def weights(self, residual: FloatArray) -> FloatArray:
-        """One over the scatter of each kind of evidence of each run."""
-        pairs = zip(self._runs, self.parts, strict=True)
-        return np.concatenate([run.weights(residual[part]) for run, part in pairs])
+        """One over the scatter of each kind of evidence, of all runs; of causes 1.
+
+        Neighbours may err alike. One scatter for all runs: of several that do not agree
+        none is then followed for having fitted best.
+        """
+        weights = np.ones(residual.size)
+        for kind in (self.traced, ~self.traced):
+            seen, of = residual[: self.size][kind], weights[: self.size]
+            if seen.size:
+                of[kind] /= max(scatter(seen) * math.sqrt(correlated(seen)), LEAST)
+        return weights
+
+    def _factors(self, x: FloatArray) -> list[float]:
+        """Of each run's force."""
+        count = len(self._runs)
+        at = len(self._shared)
+        factors = x[at : at + count] if self._scaled else np.zeros(count)
+        return list(map(float, np.exp(factors)))
 
 
 def scatter(residual: FloatArray) -> float:

@@ -1,40 +1,34 @@
 """Identification: fit chosen sensor parameters to a run, and say what it cannot tell.
 
-What it is fitted to: `tactile_lab.analysis.evidence`.
+What it is fitted to: `tactile_lab.analysis.evidence`. Whatever the bench states a band
+for, and one offset of V_C1's channel, is fitted with them and held by its band: the
+data say how much of it they need, and an interval holds what they leave of it.
 """
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from tactile_lab.analysis.belief import PART
-from tactile_lab.analysis.estimate import Z95, Estimate
+from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.evidence import (
     SCALES,
     VOLTAGES,
     JointResiduals,
+    Moved,
     Residuals,
     scatter,
 )
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
-from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import PARAMETERS, Circuit, units
 from tactile_lab.quantity import printed
 from tactile_lab.waveform import Waveform
-
-Displaced = Callable[[Circuit, float], Iterable[tuple[str, DrivenCircuit]]]
-Cause = tuple[str, int]
-"""Name of a cause of uncertainty, and the how manieth of that name."""
 
 ALIKE = 0.98
 """Two parameters whose estimates correlate more than this are hardly told apart."""
@@ -44,13 +38,14 @@ LOOSE = 0.5
 """A parameter known worse than this part of itself is not identified."""
 LOOSE_VOLTAGE = 0.1
 """The same for voltages, V."""
-TIMES = ("clocks", "lag")
-"""Causes of uncertainty that move V_C1 at the edges of the force, and hardly elsewhere.
-"""
-DIFFERENCE = np.array(1e-4)
-ROUNDS, LONGEST = 4, 3.0
-"""Of a fit repeated where a cause is at the end of its band; how far it may go, in the
-steps of the parameters."""
+STEP = 1e-3
+"""Of a parameter or a part of a band, for differences."""
+CLOSE = 1e-4
+"""Of the sum of squares, at which a first fit is near enough."""
+ROUNDS = 3
+"""So often slopes are taken anew, and with each the scatter."""
+ALIKE_SLOPES = 1e-7
+"""Slopes that differ by less, as a part of them, are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +80,9 @@ class Evidence:
         V_C1: measured, decimated; its bins must be independent. Its resolution is taken
             for what the channel's offset is known to.
         spike_times: detected spikes, s.
-        displaced: what a circuit and its force become if either is moved by a part of
-            its 95 % band, for each independent cause of uncertainty.
+        causes: what is known of the bench within a band only.
+        moved: what a circuit and its force become with each cause moved by a part of
+            its 95 % band; None where nothing is open.
     """
 
     circuit: Circuit
@@ -94,60 +90,8 @@ class Evidence:
     duration: float
     V_C1: Measured | None = None
     spike_times: FloatArray | None = None
-    displaced: Displaced = lambda _circuit, _part: ()
-
-
-@dataclass(frozen=True, eq=False)
-class Noise:
-    """How residuals err: each by its own scatter, and those of V_C1 by one offset.
-
-    An offset adds to what the model says, so that it can be left open exactly: what the
-    shape of V_C1 tells is then not lost with its level.
-
-    Attributes:
-        plain: one over the scatter of each, shape (n,), errors of times aside.
-        offsets: half of the 95 % band of each one's offset, V, shape (n,).
-        edges: variance that errors of times add to each, V^2, shape (n,).
-    """
-
-    plain: FloatArray
-    offsets: FloatArray
-    edges: FloatArray
-
-    def found(self, problem: JointResiduals, residual: FloatArray) -> Noise:
-        """The same with the scatter that residuals, shape (n,), show."""
-        left = self.freed(residual) * self.weights / self.plain
-        return replace(self, plain=problem.weights(left))
-
-    @cached_property
-    def weights(self) -> FloatArray:
-        """One over the scatter of each, shape (n,)."""
-        found: FloatArray = 1 / np.sqrt(1 / self.plain**2 + self.edges)
-        return found
-
-    def whitened(self, residual: FloatArray) -> FloatArray:
-        """Residuals made independent and of scatter 1, shape (n,) or (n, k)."""
-        scaled = (residual.T * self.weights).T
-        return scaled - self._along(scaled, 1 - 1 / math.sqrt(1 + self._power))
-
-    def freed(self, residual: FloatArray) -> FloatArray:
-        """Residuals, shape (n,), less the offset that its band and they make best."""
-        scaled = residual * self.weights
-        part = self._power / (1 + self._power)
-        return residual - self._along(scaled, part) / self.weights
-
-    @cached_property
-    def _offset(self) -> FloatArray:
-        """One standard deviation of the offset, in each one's scatter."""
-        return self.offsets * self.weights / Z95
-
-    @cached_property
-    def _power(self) -> float:
-        return float(self._offset @ self._offset)
-
-    def _along(self, scaled: FloatArray, part: float) -> FloatArray:
-        along: FloatArray = np.multiply.outer(self._offset, self._offset @ scaled)
-        return along * part / (self._power or 1.0)
+    causes: Sequence[str] = ()
+    moved: Moved | None = None
 
 
 def identify(
@@ -158,10 +102,11 @@ def identify(
     *,
     V_C1: Measured | None = None,
     spike_times: FloatArray | None = None,
-    displaced: Displaced = lambda _circuit, _part: (),
+    causes: Sequence[str] = (),
+    moved: Moved | None = None,
 ) -> Identified:
     """Fit the parameters `names` to one run; see `Evidence` and `identify_together`."""
-    seen = Evidence(circuit, force, duration, V_C1, spike_times, displaced)
+    seen = Evidence(circuit, force, duration, V_C1, spike_times, causes, moved)
     return identify_together([seen], names)
 
 
@@ -171,8 +116,8 @@ def identify_together(
     """Fit one set of the parameters `names` to all runs, begun at the first's circuit.
 
     Other parameters stay as each run's circuit has them. Intervals hold the scatter of
-    the data, and what the offset of V_C1 and each cause of uncertainty would move the
-    estimate by; a cause is taken to be the same in all runs, as of one bench.
+    the data, and what they leave open of the offset of V_C1 and of each cause of
+    uncertainty; one of a name is taken to be the same in all runs, as of one bench.
 
     Args:
         runs: at least one.
@@ -195,27 +140,21 @@ def identify_together(
             # between spikes I_C is then no function of V_C1 alone
             spikes, unused = None, ("spikes are not used: T1 saturates",)
         told = (circuit, tuple(names), one.force, one.duration, one.V_C1, spikes)
-        problems.append(Residuals(*told))
+        problems.append(Residuals(*told, one.causes, one.moved))
     problem = JointResiduals(problems, scaled=force_scales)
     if problem.size <= len(problem.names):
         raise NotIdentifiableError(
             f"{problem.size} data points cannot determine {len(problem.names)} "
             "parameters" + "".join(f" ({why})" for why in unused)
         )
-    x, displaced = np.zeros(len(problem.names)), [one.displaced for one in runs]
-    noise = Noise(problem.first_weights(), problem.offsets, np.zeros(problem.size))
-    for _ in range(3):  # the scatter of the two kinds of evidence is itself estimated
-
-        def whitened(x: FloatArray, noise: Noise = noise) -> FloatArray:
-            return noise.whitened(problem.residual(x))
-
-        solved = least_squares(
-            whitened, x, x_scale="jac", diff_step=DIFFERENCE, method="lm"
-        )
-        x = np.asarray(solved.x, dtype=np.float64)
-        noise = replace(noise, edges=_edges(problem, x, displaced))
-        noise = noise.found(problem, problem.residual(x))
-    found = _identified(problem, x, noise, displaced)
+    x = _nearby(problem)
+    for _ in range(ROUNDS):  # the scatter of either kind is itself estimated
+        slope, residual = _slope(problem, x), problem.residual(x)
+        for _ in range(ROUNDS):
+            weights = problem.weights(residual)
+            x = x - _fit(slope * weights[:, np.newaxis], residual * weights)
+            residual = problem.residual(x)
+    found = _identified(problem, x, weights)
     return replace(found, warnings=(*unused, *found.warnings))
 
 
@@ -235,77 +174,18 @@ def _check(circuit: Circuit, names: Sequence[str]) -> None:
 _OPTIONS = frozenset({"t1", "firing", "saturation"})
 
 
-def _displaced(
-    problem: JointResiduals, x: FloatArray, displaced: Sequence[Displaced], part: float
-) -> dict[Cause, list[DrivenCircuit]]:
-    """Circuit and force of all runs with `part` of the 95 % band of one cause, by it.
-
-    The n-th cause of a name is the same one in every run.
-    """
-    driven, scales = problem.driven(x), problem.scales(x)
-    found: dict[Cause, list[DrivenCircuit]] = {}
-    for number, (one, causes_of) in enumerate(zip(driven, displaced, strict=True)):
-        met: Counter[str] = Counter()
-        for name, moved in causes_of(one.circuit, part):
-            scaled = DrivenCircuit(moved.circuit, moved.force.scaled(scales[number]))
-            found.setdefault((name, met[name]), list(driven))[number] = scaled
-            met[name] += 1
-    return found
-
-
-def _edges(
-    problem: JointResiduals, x: FloatArray, displaced: Sequence[Displaced]
-) -> FloatArray:
-    """Variance by which to trust less what a small error of a time moves far, V^2."""
-    here, variance = problem.residual(x), np.zeros(problem.size)
-    for (name, _), driven in _displaced(problem, x, displaced, PART).items():
-        if name in TIMES:
-            variance += ((problem.under(driven) - here) / PART / Z95) ** 2
-    return variance
-
-
-def _moved(
-    problem: JointResiduals,
-    x: FloatArray,
-    displaced: Sequence[Displaced],
-    jacobian: FloatArray,
-    noise: Noise,
-) -> list[FloatArray]:
-    """How far each cause, at the end of its band, moves the estimate, shape (n,) each.
-
-    The fit is repeated there, what residuals weigh included.
-    """
-
-    def step(residual: FloatArray, noise: Noise) -> FloatArray:
-        asked = noise.whitened(jacobian), noise.whitened(residual)
-        return np.asarray(np.linalg.lstsq(*asked, rcond=1e-7)[0], dtype=np.float64)
-
-    here, moves = step(problem.residual(x), noise), []
-    for cause in _displaced(problem, x, displaced, PART):
-        ways = []
-        # what is early moves it as what is late does, but may begin before the run
-        for end in (1.0,) if cause[0] in TIMES else (-1.0, 1.0):
-            there, seen = x, noise
-            for _ in range(ROUNDS):
-                driven = _displaced(problem, there, displaced, end)[cause]
-                residual = problem.under(driven)
-                there = there - step(residual, seen) + here
-                there = x + np.clip(there - x, -LONGEST, LONGEST)
-                seen = seen.found(problem, residual)
-            ways.append(np.abs(there - x))
-        moves.append(np.max(ways, axis=0))
-    return moves
-
-
 def _identified(
-    problem: JointResiduals, x: FloatArray, noise: Noise, displaced: Sequence[Displaced]
+    problem: JointResiduals, x: FloatArray, weights: FloatArray
 ) -> Identified:
-    plain = _jacobian(problem, x)
-    jacobian = noise.whitened(plain)
-    lengths = np.linalg.norm(jacobian, axis=0)
-    for name, length in zip(problem.names, lengths, strict=True):
-        if length < 1e-9 * max(lengths.max(), 1e-300):
+    slope = _slope(problem, x) * weights[:, np.newaxis]
+    fitted, open_ = np.split(slope, [len(problem.names)], axis=1)
+    reach = np.linalg.norm(fitted, axis=0)
+    for name, length in zip(problem.names, reach, strict=True):
+        if length < 1e-9 * max(reach.max(), 1e-300):
             raise NotIdentifiableError(f"{name} does not act on the data at all")
+    # what no cause can take for its own
+    jacobian = fitted - open_ @ np.linalg.lstsq(open_, fitted, rcond=None)[0]
+    lengths = np.linalg.norm(jacobian, axis=0)
     freedom = problem.size - len(problem.names)
     unit = jacobian / lengths
     strength, direction = np.linalg.eigh(unit.T @ unit)
@@ -313,18 +193,15 @@ def _identified(
     covariance = inverse / np.outer(lengths, lengths) * problem.size / freedom
     errors = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(errors, errors)
-    moved = _moved(problem, x, displaced, plain, noise)
     values = problem.values(x)
     estimates = {
-        name: _estimate(
-            name, values[name], float(errors[i]), freedom, [m[i] for m in moved]
-        )
-        for i, name in enumerate(problem.names)
+        name: _estimate(name, values[name], float(error), freedom)
+        for name, error in zip(problem.names, errors, strict=True)
     }
-    residual = noise.freed(problem.residual(x))
+    residual = problem.residual(x)[: problem.size]
     traced, fired = residual[problem.traced], residual[~problem.traced]
     return Identified(
-        circuit=problem.driven(x)[0].circuit,
+        circuit=problem.circuit(x),
         estimates=estimates,
         correlation=correlation,
         scatter_V_C1=scatter(traced) if traced.size else None,
@@ -333,28 +210,40 @@ def _identified(
     )
 
 
-def _jacobian(problem: JointResiduals, x: FloatArray) -> FloatArray:
-    """Central differences in the scaled parameters, shape (points, parameters)."""
-    columns = []
-    for i in range(x.size):
-        step = np.zeros(x.size)
-        step[i] = 1e-3
-        change = problem.residual(x + step) - problem.residual(x - step)
-        columns.append(change / 2e-3)
-    return np.column_stack(columns)
+def _nearby(problem: JointResiduals) -> FloatArray:
+    """Where a fit that trusts all data alike ends."""
+    weights = problem.first
+
+    def weighed(x: FloatArray) -> FloatArray:
+        return problem.residual(x) * weights
+
+    def slope(x: FloatArray) -> FloatArray:
+        return _slope(problem, x) * weights[:, np.newaxis]
+
+    x = np.zeros(len(problem.names) + len(problem.causes))
+    found = least_squares(weighed, x, slope, x_scale="jac", method="lm", ftol=CLOSE)
+    return np.asarray(found.x, dtype=np.float64)
 
 
-def _estimate(
-    name: str,
-    value: float,
-    error: float,
-    freedom: int,
-    halves: Sequence[float],
-) -> Estimate:
+def _slope(problem: JointResiduals, x: FloatArray) -> FloatArray:
+    """Change of the residuals with each parameter and part, by differences."""
+    here = problem.residual(x)
+    steps = STEP * np.eye(x.size)
+    return np.column_stack([problem.residual(x + step) - here for step in steps]) / STEP
+
+
+def _fit(slope: FloatArray, residual: FloatArray) -> FloatArray:
+    """The step that the slopes, shape (points, n), make of a residual, shape (n,)."""
+    lengths = np.linalg.norm(slope, axis=0)
+    lengths[lengths == 0] = 1.0
+    found = np.linalg.lstsq(slope / lengths, residual, rcond=ALIKE_SLOPES)[0]
+    return np.asarray(found / lengths, dtype=np.float64)
+
+
+def _estimate(name: str, value: float, error: float, freedom: int) -> Estimate:
     if name in SCALES:
-        found = Estimate.of(value, error * SCALES[name], freedom)
-        return found.widened(*(half * SCALES[name] for half in halves))
-    logarithm = Estimate.of(float(np.log(value)), error, freedom).widened(*halves)
+        return Estimate.of(value, error * SCALES[name], freedom)
+    logarithm = Estimate.of(float(np.log(value)), error, freedom)
     low, high = np.exp(np.clip((logarithm.low, logarithm.high), -700, 700))
     return Estimate(value, value * logarithm.error, float(low), float(high))
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from tactile_lab.analysis.belief import PART, Belief
 from tactile_lab.analysis.estimate import Estimate
-from tactile_lab.analysis.evidence import LEAST, Residuals
+from tactile_lab.analysis.evidence import Residuals
 from tactile_lab.analysis.spike_pairs import irregularity
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
@@ -50,6 +50,8 @@ SYSTEMATIC = 0.03
 """Of one code: what the mean of dithered codes is off by, alike at each level."""
 DITHERED = 0.1
 """Of one code: noise smooths a converter's steps where they leave less than this."""
+LEAST = 0.15e-3
+"""What V_C2 at firing is known to at best, V."""
 FEWEST = 3
 """Fewer data than this tell nothing."""
 BAND = 1.25

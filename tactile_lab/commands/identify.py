@@ -92,7 +92,7 @@ def _print(found: FittedRuns) -> None:
         say(
             f"V_C1 is left with {together.scatter_V_C1 * 1e3:.2g} mV of scatter. The "
             "intervals hold noise, one code of offset of its channel, the clocks, and "
-            "what the bench states of followers, lag and force"
+            "what the bench states of followers, lag, force and temperature"
             + (", each the same in all runs." if many else ".")
         )
     for text in found.warnings:

@@ -112,6 +112,7 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
         followers=scene.bench.followers,
         temperature=scene.sensor.temperature_uncertainty,
         clock=clock or 0.0,
+        dated=applied.uncertainty is not None,
     )
 
 

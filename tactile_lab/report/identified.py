@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +15,15 @@ from tactile_lab.errors import NotIdentifiableError, ParameterError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.twin import measured
+from tactile_lab.scope import CLOCK_ERROR
 from tactile_lab.waveform import Waveform
 
 LAG = 0.03
 """Time after a step of the current until the field has followed, s, where the bench
 file does not say how it lags: L/R and eddy currents last some milliseconds."""
+
+RATE = "rate"
+"""The cause by which the scope's clock is fast or slow."""
 
 
 def identify_run(run: RunData, names: Sequence[str]) -> Identified:
@@ -78,7 +82,10 @@ def identify_runs(
             f"{twice[0]} is named twice; its evidence would count twice. Name it once."
         )
     seen = [_evidence(run, names) for run in runs]
-    together = identify_together(seen, names, force_scales=force_scales)
+    # a factor that is fitted is not held by what was believed of the force
+    open_ = {"force"} if force_scales else set()
+    joint = [replace(s, causes=[c for c in s.causes if c not in open_]) for s in seen]
+    together = identify_together(joint, names, force_scales=force_scales)
     alone: dict[str, Identified | None] = {}
     for run, one in zip(runs, seen, strict=True):
         try:
@@ -112,19 +119,34 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
         inside = settled(run.force, seen.time, believed.clock, lag)
         seen = replace(seen, time=seen.time[inside], value=seen.value[inside])
 
-    def displaced(circuit: Circuit, part: float) -> Iterator[tuple[str, DrivenCircuit]]:
-        for name, driven in replace(believed, circuit=circuit).displaced(part):
-            if not (name == "follower" and "I_bias" in names):
-                yield name, driven
+    def moved(circuit: Circuit, parts: Mapping[str, float]) -> DrivenCircuit:
+        bands = np.array([parts.get(what, 0.0) for _, what, _ in believed.bands])
+        driven = replace(believed, circuit=circuit).moved(bands)
+        return _by_scope(
+            driven, CLOCK_ERROR * parts[RATE], stretched=not believed.dated
+        )
 
+    # what is fitted is not held by what was believed of it
+    fitted = {"input_bias"} if "I_bias" in names else set()
+    causes = [what for _, what, _ in believed.bands if what not in fitted] + [RATE]
     return Evidence(
         believed.circuit,
         believed.force,
         run.duration,
         V_C1=seen,
         spike_times=spikes[spikes <= run.duration] if run.searched else None,
-        displaced=displaced,
+        causes=causes,
+        moved=moved,
     )
+
+
+def _by_scope(driven: DrivenCircuit, fast: float, *, stretched: bool) -> DrivenCircuit:
+    """What a scope sees whose clock is fast by a part of itself: all takes longer."""
+    circuit, force = driven
+    longer = {name: getattr(circuit, name) * (1 + fast) for name in ("tau", "C1", "C2")}
+    if stretched:
+        force = Waveform(force.time * (1 + fast), force.value)
+    return DrivenCircuit(replace(circuit, **longer), force)
 
 
 def settled(

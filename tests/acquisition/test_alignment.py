@@ -6,7 +6,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tactile_lab.acquisition.alignment import (
-    CLOCK_ERROR,
     Edge,
     align,
     find_edges,
@@ -14,6 +13,7 @@ from tactile_lab.acquisition.alignment import (
 )
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.current_list import CurrentList
+from tactile_lab.scope import CLOCK_ERROR
 from tactile_lab.trace import Trace
 
 

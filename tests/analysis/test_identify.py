@@ -83,13 +83,12 @@ def test_an_uncertain_force_widens_the_intervals():
     trace, _ = run_of(Circuit())
 
     def found(force, band=0.0):
-        def displaced(circuit, part):
-            if band:
-                yield "force", DrivenCircuit(circuit, force.scaled(1 + band * part))
+        def moved(circuit, parts):
+            return DrivenCircuit(circuit, force.scaled(1 + band * parts["force"]))
 
         return identify(
             Circuit(), ("V_GS", "tau"), force, FORCE.end, V_C1=trace,
-            displaced=displaced,
+            **({"causes": ["force"], "moved": moved} if band else {}),
         ).estimates  # fmt: skip
 
     noise, known = found(FORCE), found(FORCE, 0.05)
@@ -134,12 +133,13 @@ def test_what_is_not_known_of_times_blurs_the_edges_alone():
     trace, _ = run_of(Circuit())
 
     def found(clock, force=FORCE):
-        def displaced(circuit, part):
-            yield "clocks", DrivenCircuit(circuit, force.shifted(part * clock))
+        def moved(circuit, parts):
+            late = force.shifted(parts["clock"] * clock)
+            return DrivenCircuit(circuit, late.since(0.0))
 
         return identify(
             Circuit(), ("V_GS", "tau"), force, FORCE.end, V_C1=trace,
-            displaced=displaced,
+            causes=["clock"], moved=moved,
         ).estimates  # fmt: skip
 
     sure, late = found(0.0), found(5e-3)
@@ -194,13 +194,15 @@ def test_the_force_of_each_run_has_a_factor_of_its_own_where_asked():
 
 
 def test_what_one_bench_does_not_know_is_not_averaged_away():
-    def offset(circuit, part):
-        moved = Waveform(FORCE.time, FORCE.value + part * 5e-3 * (FORCE.value > 0))
-        yield "force", DrivenCircuit(circuit, moved)
+    def moved(circuit, parts):
+        gate = circuit.V_GS + 2e-3 * parts["gate"]
+        return DrivenCircuit(replace(circuit, V_GS=gate), FORCE)
 
     runs = [
-        replace(pushed({}, 1.0, seed, Circuit()), displaced=offset) for seed in range(3)
+        replace(pushed({}, 1.0, seed, Circuit()), causes=["gate"], moved=moved)
+        for seed in range(3)
     ]
     several = (runs[:1], runs)
     one, many = (identify_together(r, ("V_GS",)).estimates["V_GS"] for r in several)
-    assert many.high - many.low > 0.8 * (one.high - one.low)
+    assert one.half == pytest.approx(2e-3, rel=0.02)
+    assert many.half == pytest.approx(2e-3, rel=0.02)

@@ -45,6 +45,29 @@ def test_runs_that_do_not_share_a_value_are_named():
     assert any("S2 alone gives V_GS" in text for text in found.warnings)
 
 
+def test_tau_is_known_no_better_than_the_clock_it_is_measured_by(rate_force):
+    for part in (-8e-5, 8e-5):
+        slow = {n: getattr(Circuit(), n) * (1 + part) for n in ("tau", "C1", "C2")}
+        run = modelled("pulses", [pulse(0.15), pulse(0.18)], circuit=Circuit(**slow))
+        tau = identify_run(run, ("tau",)).estimates["tau"]
+        assert tau.low < 8.69 < tau.high
+        assert tau.half < 1.1e-4 * 8.69
+
+
+def test_a_factor_of_the_force_is_not_held_by_what_was_believed_of_it():
+    def known(run):
+        magnet = replace(run.belief.magnet, geometry_uncertainty=0.04)
+        return replace(run, belief=replace(run.belief, magnet=magnet))
+
+    runs = [
+        known(replace(modelled("pulses", [pulse(0.15), pulse(level)]), run=name))
+        for name, level in (("S1", 0.18), ("S2", 0.13))
+    ]
+    found = identify_runs(runs, ("V_GS",), force_scales=True).together
+    assert found.estimates["force_1"].value == pytest.approx(1.0, abs=1e-4)
+    assert found.estimates["force_1"].half < 1e-3
+
+
 def test_identification_leaves_out_the_field_s_lag(rate_force):
     steps = np.array([1.0, 1.0, 2.0, 2.0])
     force = Waveform(np.r_[0.0, steps, 3.0], np.array([0, 0, 0.1, 0.1, 0, 0]))
