@@ -183,7 +183,7 @@ def _steps(run: Measurement) -> list[FieldStep]:
         branch = BRANCHES.get(trial.label.partition(" ")[0])
         if branch is None or trial.held is None:
             continue
-        readings = run.field_between(*trial.held)
+        readings = run.field_held(trial)
         applied = run.current_at(trial.held[1])
         if not readings.size or applied is None:
             continue

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 CUT_OFF = "spikes could not be told all of the time: their channel left its range"
 """Why a trial has no latency, rate or fit."""
 
+SETTLING = 0.3
+"""Time after a late set-point until the field read is that of its current, s."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedSignal:
@@ -335,6 +338,20 @@ class Measurement:
             return np.empty(0)
         found: FloatArray = value[(time >= start) & (time <= end)]
         return found
+
+    def field_held(self, trial: MeasuredTrial) -> FloatArray:
+        """Field read in a trial's hold, T; empty where it has none, or none was read.
+
+        Where the current came after the hold's nominal start, an answer of the source
+        having been lost, what was read until it had settled is none of that hold.
+        """
+        if trial.held is None:
+            return np.empty(0)
+        start, end = trial.held
+        steps = np.empty(0) if self.current is None else self.current[:, 0]
+        for late in steps[(steps > start) & (steps <= end)]:
+            start = late + SETTLING
+        return self.field_between(start, end)
 
     def source_read(self, name: str, trial: MeasuredTrial) -> float | None:
         """Mean of what the source of a voltage read in a trial, V; None if nothing."""

@@ -60,7 +60,9 @@ def _field_table(run: Measurement) -> Table:
     rows = []
     for trial in run.results:
         start, end = trial.held or (trial.start, trial.start + trial.duration)
-        current, field = run.current_at(end), run.field_between(start, end)
+        current = run.current_at(end)
+        held = trial.held is not None
+        field = run.field_held(trial) if held else run.field_between(start, end)
         shown = NONE
         if field.size > 1:
             error = float(field.std(ddof=1)) / field.size**0.5
@@ -74,7 +76,7 @@ def _field_table(run: Measurement) -> Table:
         headings=("Trial", "Start", "Current", "Field", "Readings"),
         rows=tuple(rows),
         note="Current at the end of the hold as read back; field: mean of the readings "
-        "in it, ± what their scatter leaves open of it (95 %).",
+        "in it once the current stood, ± what their scatter leaves open of it (95 %).",
     )
 
 

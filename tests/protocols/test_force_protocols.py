@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from protocols.bipolar import Bipolar
-from protocols.calibrate_field import CalibrateField
+from protocols.calibrate_field import CalibrateField, _steps
 from protocols.force_check import ForceCheck
 from protocols.hold import Hold
 from protocols.monitor import NoForce
@@ -24,6 +24,7 @@ from tactile_lab.model.simulate import simulate
 from tactile_lab.stimulus.demagnetise import demagnetising_current
 from tactile_lab.stimulus.recovery import MOST_EXTENSIONS
 from tactile_lab.trial import Outcome
+from tactile_lab.waveform import Waveform
 
 
 def outcome_of(trial, index=0, *, spikes=(), rest=None):
@@ -310,6 +311,29 @@ def test_calibrate_field_never_overshoots_a_step():
         if after.label != "demagnetise":
             assert before.current.value[-1] == pytest.approx(after.current.value[0])
     assert all(t.label.startswith("falling") for t in steps[:11])
+
+
+def test_a_field_read_before_a_late_set_point_is_not_that_of_the_hold():
+    time = np.arange(0.0, 3.0, 0.1)
+    step = Waveform(time=[0.0, 3.0], value=[0.5, 0.5])
+    held = MeasuredTrial(
+        label="rising 500 mA", level=None, start=0.0, duration=3.0,
+        spike_times=np.empty(0), hold=(0.5, 3.0),
+    )  # fmt: skip
+
+    def measured(came):
+        return Measurement(
+            simulated=False, bench="made up", duration=3.0, trials=(held,), force=step,
+            current=np.array([[0.0, 0.4], [came, 0.5]]),
+            field=np.column_stack([time, np.where(time < came, 4.4e-3, 5.5e-3)]),
+        )  # fmt: skip
+
+    assert measured(0.3).field_held(held).size == 25
+    late = measured(1.25)
+    assert np.all(late.field_held(held) == 5.5e-3)
+    assert late.field_held(held).size == 14
+    (told,) = _steps(late)
+    assert (told.current, told.field) == (0.5, 5.5e-3)
 
 
 def test_wiring_check_pushes_little():
