@@ -21,6 +21,7 @@ PILLS = {
     "running": ("Running", "pill"),
     "aborted": ("Aborted", "pill-warn"),
     "cut short": ("Cut short", "pill-bad"),
+    "data gone": ("Data gone", "pill-bad"),
     "recovered": ("Recovered", "pill-warn"),
     "faulted": ("Fault", "pill-bad"),
     "unreadable": ("Unreadable", "pill-bad"),

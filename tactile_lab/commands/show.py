@@ -39,15 +39,16 @@ def describe(path: Path) -> dict[str, Any]:
         RunFolderError: not a run folder, or its data cannot be read.
     """
     from tactile_lab.errors import RunFolderError
-    from tactile_lab.store.folder import DATA, is_live, read_info
+    from tactile_lab.store.folder import DATA, has_lost_data, is_live, read_info
     from tactile_lab.store.remarks import read_remarks
     from tactile_lab.store.run import Run
 
     info = read_info(path)
     cut = info["status"] == "running" and not is_live(path)
+    status = "cut short" if cut else info["status"]
     summary: dict[str, Any] = {
         "run": str(path),
-        "status": "cut short" if cut else info["status"],
+        "status": "data gone" if has_lost_data(path, info) else status,
         "reason": info.get("reason"),
         "started": info.get("started"),
         "protocol": info.get("protocol"),

@@ -12,7 +12,6 @@ from tactile_lab.deviation import Deviation
 from tactile_lab.errors import choices
 from tactile_lab.quantity import (
     Duration,
-    Pause,
     SampleRate,
     Unit,
     parse,
@@ -23,6 +22,7 @@ from tactile_lab.table import SceneTable
 Noise = Annotated[float, Unit("V", least=0.0)]
 HalfWidth = Annotated[float, Unit("A", least=0.0)]
 Pull = Annotated[float, Unit("N", least=0.0)]
+Refractory = Annotated[float, Unit("s", least=0.0, most=10.0)]
 FieldNoise = Annotated[float, Unit("T", least=0.0)]
 
 CELSIUS, ZERO_CELSIUS = "°C", 273.15
@@ -87,7 +87,7 @@ class Detect(SceneTable):
 
     threshold: Level = 0.5
     hysteresis: Hysteresis = 0.1
-    refractory: Pause = 50e-6
+    refractory: Refractory = 50e-6
 
     def __post_init__(self) -> None:
         if isinstance(self.threshold, str) or isinstance(self.hysteresis, str):

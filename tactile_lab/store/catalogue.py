@@ -12,7 +12,7 @@ from typing import Any, Self
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.facts import Fact, facts, grouped
-from tactile_lab.store.folder import is_live, read_info
+from tactile_lab.store.folder import has_lost_data, is_live, read_info
 from tactile_lab.store.index import Index
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.summary import RunSummary
@@ -159,7 +159,7 @@ def summary(path: Path) -> RunSummary:
         folder=path,
         name=path.name,
         started=str(info.get("started") or ""),
-        status=str(info["status"]),
+        status="data gone" if has_lost_data(path, info) else str(info["status"]),
         title=remarks.title or str(info.get("title") or info.get("protocol") or ""),
         protocol=str(info.get("protocol") or ""),
         scene=str(info.get("scene") or ""),

@@ -192,6 +192,11 @@ def read_info(path: Path) -> dict[str, Any]:
     return info
 
 
+def has_lost_data(path: Path, info: Mapping[str, Any]) -> bool:
+    """Whether a run's samples were written, and their file is there no more."""
+    return bool(info.get("samples")) and not (path / DATA).exists()
+
+
 def check_space(path: Path, needed: int) -> None:
     """Refuse when the disk under `path` has fewer than `needed` bytes free.
 

@@ -336,6 +336,11 @@ class Recorder:
                 self._write_rows(self._file)
         finally:
             self._file.close(failed=self._failed)
+        if not (self.folder.path / DATA).exists():
+            raise RecordingError(
+                f"{self.folder.path / DATA} is gone: it was moved or deleted while the "
+                "run was recorded. Put it back if you have it."
+            )
 
     def _guard(self, write: Callable[..., None], *what: Any) -> None:
         """Turn what a disk can do to us into a message that says what is kept."""

@@ -25,7 +25,13 @@ from tactile_lab.store.applied import (
     applied_current,
 )
 from tactile_lab.store.data_file import check_inside, open_data
-from tactile_lab.store.folder import DATA, SCENE, is_live, read_info
+from tactile_lab.store.folder import (
+    DATA,
+    SCENE,
+    has_lost_data,
+    is_live,
+    read_info,
+)
 from tactile_lab.store.layout import NEWER, RECORDS
 from tactile_lab.store.signal import StoredSignal, TimeAxis
 from tactile_lab.waveform import Waveform
@@ -62,7 +68,7 @@ class StoredRun:
         path = Path(path)
         info = read_info(path)
         file = path / DATA
-        if not file.exists() and info.get("samples"):
+        if has_lost_data(path, info):
             raise RunFolderError(
                 f"{path} has no {DATA}, which was written: it was moved or deleted. "
                 f"Put it back; `tactile-lab run --again {path}` repeats the run."

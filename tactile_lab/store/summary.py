@@ -19,7 +19,8 @@ class RunSummary:
         folder: of the run.
         name: of the folder.
         started: ISO time with zone.
-        status: as in `run.json`; "cut short" where a running run has no writer.
+        status: as in `run.json`; "cut short" where a running run has no writer, "data
+            gone" where the file of its samples was moved or deleted.
         title: that somebody gave it, else that of its protocol.
         protocol, scene, sensor, operator, bench: names; empty where not known.
         tags, notes: what people said of it.

@@ -27,6 +27,7 @@ from tactile_lab.store.folder import (
     DATA,
     as_written,
     digest,
+    has_lost_data,
     is_live,
     read_info,
 )
@@ -93,9 +94,10 @@ def verify(path: Path, progress: Progress = nothing) -> Verification:
         notes.append(f"samples were lost while the run was recorded: {lost}")
     findings += _files(path, info)
     if not (path / DATA).exists():
-        if info.get("samples"):
+        if has_lost_data(path, info):
             findings.append(Damage(DATA, "the file is missing"))
-        notes.append("the run stored no samples")
+        else:
+            notes.append("the run stored no samples")
         return Verification(tuple(findings), None, tuple(notes))
     try:
         run = Run.load(path)

@@ -333,6 +333,11 @@ def test_another_row_brings_its_own_baud_rate():
     assert told.bench.coil.baud == 300
 
 
+def test_a_refractory_time_that_no_spike_outlives_is_refused():
+    with pytest.raises(SceneError, match="at most 10 s"):
+        load("demo", {"detect.refractory": "1e18 s"})
+
+
 @pytest.mark.parametrize("key", ["coil_lag", "eddy_lag", "lag_uncertainty"])
 def test_a_lag_of_the_field_that_no_core_has_is_refused(key):
     with pytest.raises(SceneError, match="at most 10 s"):

@@ -183,6 +183,17 @@ def test_running_and_cut_short_are_told_apart(tmp_path):
     assert catalogue(tmp_path)[0].status == "cut short"
 
 
+def test_a_run_whose_data_was_deleted_is_not_called_complete(tmp_path):
+    folder = RunFolder.create(tmp_path, "pulses", {})
+    (folder.path / "data.h5").touch()
+    folder.finish("complete", samples={"V_K": {"produced": 9, "written": 9}})
+    assert catalogue(tmp_path)[0].status == "complete"
+    (folder.path / "data.h5").unlink()
+    assert catalogue(tmp_path)[0].status == "data gone"
+    shown = CliRunner().invoke(cli, ["show", str(folder.path)])
+    assert f"{folder.path}: data gone, measured" in shown.output
+
+
 def test_a_folder_without_runs_gets_no_index(tmp_path):
     assert catalogue(tmp_path) == []
     assert list(tmp_path.iterdir()) == []

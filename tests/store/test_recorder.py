@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.scope import Block
 from tactile_lab.store.applied import BY_HOST, BY_SAMPLES
-from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.folder import RunFolder, read_info
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.overrange import told, unsearched
 from tactile_lab.store.recorder import Recorder
@@ -362,3 +362,11 @@ def test_xarray_has_units_and_time(bench, recorder, folder):
     assert data["V_C1"].attrs["units"] == "V"
     assert data["time"].size == 1000
     assert float(data["time"][0]) == pytest.approx(1.0)
+
+
+def test_a_run_whose_data_was_deleted_meanwhile_is_faulted(bench, recorder, folder):
+    bench.play(recorder, bench.codes(5000), 500)
+    (folder.path / "data.h5").unlink()
+    with pytest.raises(RecordingError, match="deleted while the run was recorded"):
+        recorder.close("complete", 5000)
+    assert read_info(folder.path)["status"] == "faulted"
