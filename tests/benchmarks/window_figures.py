@@ -29,6 +29,7 @@ PARTS = (
     ("STOP, by parts", "window_stop.py", (), ()),
     (SCALED, "window_scales.py", ("--rounds", "3"), ("--rounds", "1")),
     ("A run of 1e9 samples", "window_record.py", ("1000",), ("100",)),
+    ("A long session through X", "window_session.py", ("2311",), ("2311", "60")),
     (
         "A simulated hour, and instruments that misbehave", "window_endurance.py",
         ("3600",), ("900",),

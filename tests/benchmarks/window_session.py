@@ -1,6 +1,6 @@
 """A long session through X: what a person does, and seeded clicks and keys between.
 
-    python tests/benchmarks/window_session.py [SEED] [SECONDS] [--out FILE]
+    python tests/benchmarks/window_session.py [SEED] [SECONDS]
 
 The window stands on a virtual screen. In turn it is made to run, queue, edit, stop,
 meet a fault (a source that falls silent, one that answers late, a pulled plug), find
@@ -54,6 +54,11 @@ LEFT_ALONE = (
 """Buttons that are pressed on purpose, lead out of the window, or move what is kept."""
 
 
+HEAD = (
+    "| seed | s | rounds | keys, clicks, drags | memory in its second quarter, MB "
+    "| in its last | longest pause of the window, s | problems |\n"
+    "|---|---|---|---|---|---|---|---|"
+)
 NOTHING = {"state": "", "buttons": {}, "open": [], "dialogs": [], "keyboard": ""}
 """What is known before the program has told anything."""
 
@@ -359,7 +364,7 @@ def main() -> None:
     parser.add_argument("seconds", type=float, nargs="?", default=600.0)
     options = parser.parse_args()
     row, well = drive(options.seed, options.seconds)
-    print(row)
+    print(HEAD, row, sep="\n")
     sys.exit(not well)
 
 
