@@ -197,6 +197,7 @@ class Session:
         """Stop what is in progress, close what is open, and be ready."""
         self.tool("keyup", "shift", "keyup", "ctrl", "mouseup", 1)
         self.tell("mend")
+        self.restore()
 
         def ready() -> bool:
             left = self.now["open"] or self.now["dialogs"]
@@ -209,6 +210,7 @@ class Session:
             if self.press("Acknowledge and reset"):
                 time.sleep(1)
             elif self.now["dialogs"]:
+                self.restore()
                 # not in the window, where Esc is STOP
                 pid = str(self.program.pid)
                 for one in self.tool("search", "--onlyvisible", "--pid", pid).split():
@@ -216,11 +218,19 @@ class Session:
                         self.tool("windowfocus", one, "key", "Escape")
                 time.sleep(1)
             elif self.now["open"] or self.now["state"] == "running":
+                self.restore()
                 self.key("Escape")
                 time.sleep(1)
             return False
 
         self.wait(ready, 120, "ready again")
+
+    def restore(self) -> None:
+        """Bring back what a click into a title bar has minimised."""
+        self.tool("windowmap", self.main)
+        for dialog in self.now["dialogs"]:
+            title = dialog.partition(" ")[2]
+            self.tool("search", "--name", f"^{title}$", "windowmap", "%@")
 
     def begin(self) -> None:
         """Have the form's run begin; its scene is opened anew where it is unusable.
