@@ -13,6 +13,7 @@ import sys
 import tempfile
 import textwrap
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -120,14 +121,10 @@ def _filled(block: str) -> str:
 
 def ideal_spikes(level: float) -> int:
     """Spikes of the model under an ideal pulse from rest, as in the demo's sequence."""
-    force = None
-    for each in (0.08, 0.12, 0.16, 0.2):
-        wave = Waveform.pulse(each, ramp=0.25, hold=2.0, rest=2.0)
-        force = wave if force is None else force.then(wave)
-    assert force is not None
-    times = simulate(Circuit(), force).spike_times
-    assert times is not None
-    start = 4.5 * (0.08, 0.12, 0.16, 0.2).index(level)
+    levels = (0.08, 0.12, 0.16, 0.2)
+    pulses = (Waveform.pulse(one, ramp=0.25, hold=2.0, rest=2.0) for one in levels)
+    times = simulate(Circuit(), reduce(Waveform.then, pulses)).solution.spike_times
+    start = 4.5 * levels.index(level)
     return int(np.count_nonzero((times >= start) & (times < start + 4.5)))
 
 
@@ -135,8 +132,7 @@ def trimmed(off: float) -> Trimmed:
     """The model under Fig. 5b's force with V_GS off its tuned value by `off` V."""
     force = Waveform.pulse(0.05, ramp=0.25, hold=60.0, rest=2.0)
     found = simulate(Circuit(V_GS=1.54141 + off), force, keep=("spikes",))
-    times = found.spike_times
-    assert times is not None
+    times = found.solution.spike_times
     silent = times.size and times[-1] < 59.0
     return Trimmed(
         off, int(times.size), float(times[-1] - times[0]) if silent else None,

@@ -120,9 +120,8 @@ def model(point: Point, saturation: bool = True) -> Found:
         tau=point.tau, C2=_capacitance(point),
     )  # fmt: skip
     force = Waveform.through([(0, 0), (0.1, 0), (0.11, point.force)])
-    spikes = simulate(circuit, force, until=point.until).spike_times
-    assert spikes is not None
-    return _found(spikes)
+    found = simulate(circuit, force, until=point.until)
+    return _found(found.solution.spike_times)
 
 
 def silent_from(netlist: str, tau: float, hold: float) -> float:

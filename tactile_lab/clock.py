@@ -211,12 +211,11 @@ class SimulatedClock:
         waiting = [p for p in self._participants if p.waiting]
         chosen = next((p for p in waiting if p.ready is not None and p.ready()), None)
         if chosen is None:
-            timed = [p for p in waiting if p.wake is not None]
+            timed = [(p.wake, p) for p in waiting if p.wake is not None]
             if not timed:
                 return
-            chosen = min(timed, key=lambda p: p.wake if p.wake is not None else 0.0)
-            assert chosen.wake is not None
-            self._now = max(self._now, chosen.wake)
+            wake, chosen = min(timed, key=lambda one: one[0])
+            self._now = max(self._now, wake)
         chosen.waiting, chosen.wake, chosen.ready = False, None, None
         chosen.runs = True
         self._running = chosen

@@ -66,7 +66,6 @@ class Film:
         self.stretch = events.duration / STRETCHES
         self.dots, self.most = Dots(), 1
         self._size = events.places.shape[0]
-        self._starts: list[float] = []
         total, free = events.time.shape[0], events.role != STUCK
         open_, count = 0, np.zeros(self._size, np.int64)
         for first in range(0, total, STEP):

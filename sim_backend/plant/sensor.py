@@ -282,8 +282,7 @@ class SimulatedSensor:
         time = np.linspace(low, high, count + 1)
         if signal != "V_C2":
             return Pieces.through(time, outputs.sample(signal, time))
-        assert outputs.spike_times is not None
-        spikes = outputs.spike_times
+        spikes = outputs.solution.spike_times
         resets = spikes + self.circuit.reset_time
         if chunk.state.resume is not None:
             resets = np.concatenate([[chunk.state.resume], resets])

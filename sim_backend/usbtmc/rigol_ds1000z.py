@@ -302,11 +302,15 @@ class SimulatedDs1000z:
     def _data(self) -> bytes | None:
         record, count = self._record, self._last - self._first + 1
         name = self._reading["source"]
-        wrong = self._reading["mode"] != "RAW" or self._running or record is None
-        if wrong or not 1 <= count <= _MOST_POINTS or not self.channels[name].shown:
+        if (
+            record is None
+            or self._running
+            or self._reading["mode"] != "RAW"
+            or not 1 <= count <= _MOST_POINTS
+            or not self.channels[name].shown
+        ):
             self.parser.push(-221, "Settings conflict")
             return b"#9000000000"
-        assert record is not None
         codes = record.read(self._source)
         row = [setting.name for setting in record.acquisition.inputs].index(name)
         part = codes[row, self._first - 1 : self._last]

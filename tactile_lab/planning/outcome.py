@@ -124,8 +124,7 @@ class ModelOutcome(Outcome):
                 f"protocol {scene.protocol.name} looks at spikes, but neither "
                 'records them nor declares needs = ("spikes",).'
             )
-        spikes = self._found("spikes").spike_times
-        assert spikes is not None
+        spikes = self._found("spikes").solution.spike_times
         end = self.start + self.trial.length
         return spikes[(spikes >= self.start) & (spikes < end)] - self.start
 

@@ -88,9 +88,8 @@ def ours(problem: Problem, cap: float, tolerance: float = 1e-9) -> Answer:
         problem.circuit, problem.force, until=problem.until, start=problem.start,
         tolerance=tolerance,
     )  # fmt: skip
-    assert found.spike_times is not None
     return Answer(
-        found.spike_times, found.end.V_C1, found.solution.evaluations,
+        found.solution.spike_times, found.end.V_C1, found.solution.evaluations,
         found.error.spike_time,
     )  # fmt: skip
 

@@ -160,9 +160,8 @@ def _row(
     case: Case, found: Result, spikes_reference: int, spike_time: float, V_C1: float
 ) -> HonestyRow:
     """True errors, s and V, beside what `found` estimates them at."""
-    error, spikes = found.error, found.spike_times
-    assert spikes is not None and error.spike_time is not None
-    assert error.V_C1 is not None
+    error, spikes = found.error, found.solution.spike_times
+    assert error.spike_time is not None and error.V_C1 is not None
     return HonestyRow(
         case, spikes.size, spikes_reference, spike_time, error.spike_time, V_C1,
         error.V_C1,

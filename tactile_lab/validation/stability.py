@@ -169,5 +169,4 @@ def _own_truth(case: Extreme) -> Truth:
     if case.truth == "formula":  # too many to list: only the count can be judged
         return Truth(np.zeros(formula(p)[0]), 0.0)
     found = simulate(p.circuit, p.force, until=p.until, tolerance=1e-12)
-    assert found.spike_times is not None
-    return Truth(found.spike_times, found.end.V_C1)
+    return Truth(found.solution.spike_times, found.end.V_C1)

@@ -90,15 +90,10 @@ def sweep(cap: float, repeats: int, say: Callable[[str], None]) -> list[Point]:
     for kind, at, problem, truth in problems():
         say(f"{kind} {at:g}")
         for method in entrants:
-            best: Row | None = None
-            for _ in range(repeats):
-                row = _judged(kind, at, problem, method, truth, cap)
-                if best is None or row.run_time < best.run_time:
-                    best = row
-                if row.run_time > 0.1:
-                    break
-            assert best is not None
-            found.append(Point(kind, at, best))
+            rows: list[Row] = []
+            while len(rows) < repeats and all(row.run_time <= 0.1 for row in rows):
+                rows.append(_judged(kind, at, problem, method, truth, cap))
+            found.append(Point(kind, at, min(rows, key=lambda row: row.run_time)))
     return found
 
 
