@@ -80,10 +80,10 @@ def test_watching_stops_when_asked_and_stores_nothing_of_itself(tmp_path, monkey
 
 def test_a_scope_whose_clock_is_slow_is_watched_on(monkeypatch):
     """At 50 ppm its samples were 2 s late after 11 hours, and that ended the run."""
-    monkeypatch.setattr(runner, "GRACE", 0.005)
+    monkeypatch.setattr(runner, "GRACE", 0.002)
     overrides = (
-        "protocol.duration=180 s",
-        "protocol.part=60 s",
+        "protocol.duration=60 s",
+        "protocol.part=20 s",
         "record.sample_rate=1 kS/s",
         "simulated.clock_error=8e-5",
     )
@@ -97,7 +97,7 @@ def test_a_scope_whose_clock_is_slow_is_watched_on(monkeypatch):
     ending = monitor.run()
     assert ending.state is RunState.COMPLETE, ending.reason
     spans = [one.traces["V_C1"][[0, -1], 0] for one in trials]
-    assert np.ravel(spans) == pytest.approx([0.0, 60.0] * 3, abs=0.03)
+    assert np.ravel(spans) == pytest.approx([0.0, 20.0] * 3, abs=0.03)
 
 
 def test_an_endless_monitor_goes_on_until_it_is_stopped():
