@@ -97,7 +97,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.nodeid.partition("::")[0] not in WAITING)
 
 
+def pytest_collection() -> None:
+    """Look for no circles among modules and tests: all of them stay."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Look for circles among what tests make, not among all modules and tests, too."""
     gc.collect()
     gc.freeze()
+    gc.enable()
