@@ -9,7 +9,7 @@ from html import escape
 def facts(title: str, rows: Iterable[tuple[str, object]]) -> str:
     """A title, if any, over a table of names and values; empty values are left out."""
     cells = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th>'
+        f'<tr><th style="text-align:left;padding-right:12px">{escape(name)}</th>'
         f'<td style="text-align:left">{escape(str(value))}</td></tr>'
         for name, value in rows
         if value not in (None, "")

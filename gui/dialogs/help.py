@@ -6,10 +6,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QLabel, QStackedWidget, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QLayout, QStackedWidget, QWidget
 
 from gui.dialogs.overlay import Overlay
-from gui.parts import STRETCH, Segments, column, label, push, row, scrolling
+from gui.parts import (
+    STRETCH,
+    Segments,
+    column,
+    label,
+    push,
+    row,
+    scrolling,
+    with_gutter,
+)
 from tactile_lab.engine.provenance import environment
 from tactile_lab.notebook import facts
 
@@ -115,7 +124,7 @@ class Help(Overlay):
     """Two pages: panels and shortcuts, given as (keys, words)."""
 
     def __init__(self, window: QWidget, keys: Sequence[tuple[str, str]]) -> None:
-        super().__init__(window, 640)
+        super().__init__(window, 760)
         self.topic = ""
         self._titles: dict[str, QLabel] = {}
         choice = Segments(["Panels", "Shortcuts", "About"], "Help page")
@@ -125,10 +134,13 @@ class Help(Overlay):
         self.close_button.clicked.connect(self.hide)
         self._pages = QStackedWidget()
         self.give_room(self._pages, 430)
-        self._area = scrolling(self._panels())
-        shortcuts, about = scrolling(self._shortcuts(keys)), scrolling(self._about())
-        for page in (self._area, shortcuts, about):
-            self._pages.addWidget(page)
+        areas = [
+            with_gutter(scrolling(page), inside)
+            for page, inside in (self._panels(), self._shortcuts(keys), self._about())
+        ]
+        self._area = areas[0]
+        for area in areas:
+            self._pages.addWidget(area)
         head = row(label("Help", "big"), STRETCH, choice)
         foot = row(STRETCH, self.close_button)
         column(self.card, head, self._pages, foot, margin=22, spacing=14)
@@ -146,7 +158,7 @@ class Help(Overlay):
         self._choice.choose(number)
         self._pages.setCurrentIndex(number)
 
-    def _panels(self) -> QWidget:
+    def _panels(self) -> tuple[QWidget, QLayout]:
         page = QWidget()
         rows = column(page, spacing=4)
         for title, text in PANELS:
@@ -157,18 +169,17 @@ class Help(Overlay):
             rows.addWidget(words)
             rows.addSpacing(8)
         rows.addStretch(1)
-        return page
+        return page, rows
 
-    def _about(self) -> QWidget:
+    def _about(self) -> tuple[QWidget, QLayout]:
         """Which versions of what this is."""
         page = QWidget()
         found = environment()
         said = label(facts("Tactile Lab", _flat(found)), "", wrap=True)
         said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        column(page, said, STRETCH)
-        return page
+        return page, column(page, said, STRETCH)
 
-    def _shortcuts(self, own: Sequence[tuple[str, str]]) -> QWidget:
+    def _shortcuts(self, own: Sequence[tuple[str, str]]) -> tuple[QWidget, QLayout]:
         page = QWidget()
         grid = QGridLayout(page)
         grid.setHorizontalSpacing(24)
@@ -179,9 +190,10 @@ class Help(Overlay):
         for number, (keys, words) in enumerate(listed):
             at, side = number % half, 2 * (number // half)
             grid.addWidget(label(keys, "strong"), at, side)
-            grid.addWidget(label(words), at, side + 1)
+            grid.addWidget(label(words, wrap=True), at, side + 1)
+            grid.setColumnStretch(side + 1, 1)
         grid.setRowStretch(half, 1)
-        return page
+        return page, grid
 
 
 def _flat(found: Mapping[str, Any]) -> list[tuple[str, object]]:

@@ -64,9 +64,14 @@ def heights_of(
     if len(values) > 2 and lines[0] - lines[1] < LINE:
         # told beside each other, they would overlap: both ends
         values, lines = [values[0], values[-1]], [lines[0], lines[-1]]
+    words = [min(max(y, HALF), height - HALF) for y in lines]
+    apart = min(LINE, height - 2 * HALF)
+    if len(words) == 2 and words[0] - words[1] < apart:  # not quite beside their lines
+        top = max(HALF, min((sum(words) - apart) / 2, height - HALF - apart))
+        words = [top + apart, top]
     return [
-        (number(value, decimals(step)), y, min(max(y, HALF), height - HALF))
-        for value, y in zip(values, lines, strict=True)
+        (number(value, decimals(step)), y, at)
+        for value, y, at in zip(values, lines, words, strict=True)
     ]
 
 
@@ -335,6 +340,8 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
                 own = replace(frame, top=top, bottom=bottom)
             shown = run if self.lane.key == "V_K" else run.means()
             paint.trace(painter, own, shown, line)
+            if self.lane.key == "rate":  # one alone makes no line
+                self._dots(on, run, tokens.runs[number_])
 
     def _traces(self, on: Drawing, measured: Trace, twin: Trace) -> None:
         painter, frame, tokens = on.painter, on.frame, on.tokens

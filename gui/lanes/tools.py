@@ -17,6 +17,9 @@ from tactile_lab.quantity import show
 
 WIDTHS = (1.0, 5.0, 10.0)
 
+SPACING, AROUND = 5, 33
+"""Between two buttons, and beside all of them with the gap among them, px."""
+
 WIDE = 1150
 """Width from which on there is room for words and the read-out of the cursors, px.
 
@@ -67,15 +70,21 @@ class Tools(QWidget):
         for button in self.findChildren(IconButton):
             button.set_wide(wide)
 
-    def show_less(self, less: bool) -> None:
-        """Leave out the buttons whose keys are told in the help and the menu."""
-        for button in (self.fit, self.zoom, self.export, self.help):
-            button.setVisible(not less)
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Say as much of the cursors as there is room for."""
         super().resizeEvent(event)
         self.show_cursors()
+        self._leave_out()
+
+    def _leave_out(self) -> None:
+        """Leave out, one by one, buttons whose keys the help and the menu tell."""
+        buttons = self.findChildren(IconButton)
+        needed = self.widths.sizeHint().width() + AROUND
+        needed += sum(one.sizeHint().width() + SPACING for one in buttons)
+        for one in (self.help, self.export, self.zoom, self.fit):
+            one.setVisible(needed <= self.width())
+            if one.isHidden():
+                needed -= one.sizeHint().width() + SPACING
 
     def toggle_cursors(self, on: bool) -> None:
         """Put the cursors into view, or take them away."""
@@ -208,6 +217,6 @@ class Tools(QWidget):
         views = (self.follow, self.freeze, self.widths, self.fit, self.zoom)
         shown = (self.cursors, self.twin, self.residual)
         rest = (self.monitor, self.lanes, self.export, self.help)
-        bar(self, (10, 7, 10, 7), 5, *views, *shown, 8, (self.readout, 1), *rest)
+        bar(self, (10, 7, 10, 7), SPACING, *views, *shown, 8, (self.readout, 1), *rest)
         self.readout.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.readout.setAccessibleName("Cursors")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 
 from PySide6.QtCore import Qt, Signal
@@ -13,6 +14,7 @@ from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import Elided, bar, label, lines, row, set_role
 from gui.review.thumbnails import ThumbnailView
+from gui.setup.parameter import listed
 from gui.state import minutes
 from tactile_lab.store.summary import RunSummary
 
@@ -29,7 +31,13 @@ PILLS = {
 
 
 class RunCard(QFrame):
-    """What is known of a run without opening it."""
+    """What is known of a run without opening it.
+
+    Args:
+        entry: the run.
+        theme: colours.
+        apart: in what it differs from other runs of its protocol; "" where in nothing.
+    """
 
     opened = Signal(object)
     chosen = Signal(object)
@@ -38,16 +46,16 @@ class RunCard(QFrame):
     stepped = Signal(int)
     """The keyboard goes to the run below (1) or above (-1)."""
 
-    def __init__(self, entry: RunSummary, theme: Theme) -> None:
+    def __init__(self, entry: RunSummary, theme: Theme, apart: str = "") -> None:
         super().__init__()
-        self.entry = entry
+        self.entry, self._apart = entry, apart
         self.thumbnail = ThumbnailView(theme)
         self.setProperty("role", "run")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setToolTip(
             "\n".join(
                 (
-                    *(entry.title, entry.name, *told(entry)),
+                    *filter(None, (entry.title, apart, entry.name, *told(entry))),
                     "Enter or double click opens it, Space ticks it, a right click "
                     "offers more",
                 )
@@ -76,6 +84,8 @@ class RunCard(QFrame):
         self._tint()
         second = row((Elided(when, "muted"), 1), *self._signs, spacing=6)
         words = lines(first, second, spacing=2)
+        if apart:
+            words.insertWidget(1, Elided(apart, "small"))
         if entry.tags:
             words.addWidget(
                 Elided(" · ".join(f"#{tag}" for tag in entry.tags), "small")
@@ -87,8 +97,9 @@ class RunCard(QFrame):
         """Show whether it is the chosen one, and whether it is on screen."""
         set_role(self, "run-chosen" if chosen else "run")
         self._signs[0].setVisible(shown)
-        said = f"{self.entry.title}, {self.entry.status}, {day(self.entry.started)}"
-        self.setAccessibleName(f"{said}, on screen" if shown else said)
+        entry, seen = self.entry, "on screen" if shown else ""
+        said = (entry.title, self._apart, entry.status, day(entry.started), seen)
+        self.setAccessibleName(", ".join(filter(None, said)))
 
     def stop_tab(self, stops: bool) -> None:
         """Whether `Tab` comes here: to one card of the list; arrows go on from it."""
@@ -160,3 +171,27 @@ def day(started: str) -> str:
     days = (datetime.now(at.tzinfo).date() - at.date()).days
     date = {0: "today", 1: "yesterday"}.get(days, f"{at:%d %b %Y}")
     return f"{date} {at:%H:%M}"
+
+
+def differing(runs: Sequence[RunSummary]) -> list[str]:
+    """In which parameters runs differ: "levels 80, 120 mN", a text for each."""
+    keys = dict.fromkeys(key for run in runs for key in run.parameters)
+    own = [{key: _said(run.parameters.get(key)) for key in keys} for run in runs]
+    apart = [key for key in keys if len({one[key] for one in own}) > 1]
+    return [
+        "; ".join(f"{key.replace('_', ' ')} {one[key]}" for key in apart) for one in own
+    ]
+
+
+def _said(value: object) -> str:
+    """A parameter's value, which a file holds in SI, as the form shows it."""
+    texts = [
+        str(one) for one in (value if isinstance(value, list | tuple) else [value])
+    ]
+    try:
+        numbers, _, units = zip(*(text.partition(" ") for text in texts), strict=True)
+        if units[0] and len(set(units)) == 1:
+            return listed([float(number) for number in numbers], units[0])
+    except ValueError:
+        pass  # none, or a name of several words
+    return "—" if value is None or not texts else ", ".join(texts)

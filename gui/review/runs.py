@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from gui.parts import (
     stack,
     with_gutter,
 )
-from gui.review.run_card import RunCard
+from gui.review.run_card import RunCard, differing
 from gui.review.thumbnails import Thumbnails
 from gui.tab_order import reach
 from tactile_lab.quantity import count
@@ -183,8 +183,9 @@ class RunsView(QWidget):
         fitting = [one for one in self._entries if chosen(one) and one.says(words)]
         fitting.sort(key=key, reverse=largest_first)
         listed = fitting[: self._listed]
+        apart = _told_apart(listed)
         for entry in listed:
-            card = RunCard(entry, self._theme)
+            card = RunCard(entry, self._theme, apart[entry.folder])
             card.thumbnail.show_thumbnail(self.thumbnails.of(entry.folder))
             card.tick.setChecked(entry.folder in ticked)
             card.opened.connect(self.opened)
@@ -278,3 +279,13 @@ class RunsView(QWidget):
         for card in self.cards:
             card.show_place(place if card.tick.isChecked() else None)
             place += card.tick.isChecked()
+
+
+def _told_apart(listed: Sequence[RunSummary]) -> dict[Path, str]:
+    """In what each run differs from the others of its protocol in the list."""
+    told: dict[Path, str] = {}
+    for protocol in {entry.protocol for entry in listed}:
+        alike = [entry for entry in listed if entry.protocol == protocol]
+        folders = (entry.folder for entry in alike)
+        told |= zip(folders, differing(alike), strict=True)
+    return told

@@ -185,7 +185,6 @@ class Centre(QWidget):
         """Leave out of a small window what has a key; its width and height, px."""
         narrow, low = width < NARROW, height < LOW
         self.stack.navigator.setVisible(height >= LOWEST)
-        self.tools.show_less(narrow)
         self.log.title.setVisible(not narrow)
         self.lanes.setMinimumHeight(200 if low else 320)
         self.record.setMinimumHeight(STRIP if low else LOGGED)

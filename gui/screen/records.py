@@ -11,8 +11,8 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.lanes.compare import Comparison
 from gui.lanes.source import Member, Source
+from gui.review.run_card import differing
 from gui.session.session import Session
-from gui.setup.parameter import listed
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.jobs import model_of_run
@@ -155,27 +155,3 @@ class Records(QObject):
 
         shown = self.shown
         return shown if isinstance(shown, RunSource) and shown.path == folder else None
-
-
-def differing(runs: Sequence[RunSummary]) -> list[str]:
-    """In which parameters runs differ: "levels 80, 120 mN", a text for each."""
-    keys = dict.fromkeys(key for run in runs for key in run.parameters)
-    own = [{key: _said(run.parameters.get(key)) for key in keys} for run in runs]
-    apart = [key for key in keys if len({one[key] for one in own}) > 1]
-    return [
-        "; ".join(f"{key.replace('_', ' ')} {one[key]}" for key in apart) for one in own
-    ]
-
-
-def _said(value: object) -> str:
-    """A parameter's value, which a file holds in SI, as the form shows it."""
-    texts = [
-        str(one) for one in (value if isinstance(value, list | tuple) else [value])
-    ]
-    try:
-        numbers, _, units = zip(*(text.partition(" ") for text in texts), strict=True)
-        if units[0] and len(set(units)) == 1:
-            return listed([float(number) for number in numbers], units[0])
-    except ValueError:
-        pass  # none, or a name of several words
-    return "—" if value is None or not texts else ", ".join(texts)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from gui.ask_file import ask_file
-from gui.lanes.compare import Comparison
+from gui.lanes.compare import MARKS, Comparison
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.live import LiveSource
 from gui.lanes.source import PlanSource, Source
@@ -50,7 +50,7 @@ class Screen(QObject):
     """Opens scenes and runs, and decides which source the lanes show.
 
     Attributes:
-        ending: how the run on screen ended, in words.
+        ending: how the session's last run ended, in words.
     """
 
     changed = Signal()
@@ -223,6 +223,7 @@ class Screen(QObject):
         if session.source is None:
             source = PlanSource(expectation.preview)
             self._panels.centre.show_source(source, self._lanes())
+            self._show_steps(source, "")
 
     def follow_run(self, source: LiveSource) -> None:
         """Show the run that begins."""
@@ -325,9 +326,8 @@ class Screen(QObject):
         panels.centre.show_source(source, self._lanes())
         status = str(source.info.get("status")).capitalize()
         spikes = count(source.spikes.size, "spike")
-        self.ending = f"{status} · {source.path.name} · {spikes}"
         self.results.stored(source)
-        self._show_stored(source)
+        self._show_stored(source, f"{status} · {source.path.name} · {spikes}")
         self.changed.emit()
 
     def _exchange(self, source: RunSource) -> None:
@@ -338,17 +338,17 @@ class Screen(QObject):
         self._records.shown = source
         self._panels.centre.exchange_source(source, self._lanes())
         self.results.recorded(source)
-        self._show_stored(source)
+        self._show_stored(source, self.ending)
 
-    def _show_stored(self, source: RunSource) -> None:
+    def _show_stored(self, source: RunSource, ending: str) -> None:
         self._panels.review.runs.show_current(source.path)
+        self._show_steps(source, ending)
+
+    def _show_steps(self, source: Source, said: str) -> None:
+        """The steps of what is in the lanes, below them."""
+        snapshot, reach = self._panels.session.snapshot(), source.reach
         self._panels.centre.progress.show_run(
-            self._panels.session.snapshot(),
-            source.holds,
-            source.length,
-            source.reach,
-            None,
-            self.ending,
+            snapshot, source.holds, source.length, reach, None, said
         )
 
     def _show_comparison(self, comparison: Comparison) -> None:
@@ -357,6 +357,8 @@ class Screen(QObject):
         self._panels.session.opened = f"Comparing {len(comparison.members)} runs"
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
+        first = comparison.members[0].name
+        self._show_steps(comparison, f"Steps of {MARKS[0]} {first}")
         self.changed.emit()
 
     def _count_from(self, level: float) -> None:

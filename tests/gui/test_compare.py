@@ -4,14 +4,17 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from lane_stack import box, settle
 
 from gui.dialogs.saving import table
 from gui.lanes.compare import Comparison, ComparisonRows
 from gui.lanes.expected import Stretch
+from gui.lanes.floor import AXIS
 from gui.lanes.lane import lanes_for
 from gui.lanes.readings import Painted, values_at
 from gui.lanes.source import Member, Source
 from gui.lanes.view import TimeView
+from gui.look.theme import Theme
 from gui.review.run_card import RunCard
 from tactile_lab.trace import Trace
 
@@ -122,10 +125,30 @@ def test_values_are_read_on_the_common_time(comparison: Comparison) -> None:
     assert values_at(lane, comparison, 9.8, painted)[1] is None, "that run has ended"
 
 
+def test_a_rate_without_another_is_seen(app, stack) -> None:
+    """A run that fired twice has one rate, which makes no line."""
+    runs = [Member("", Falling(late, 2.0, 2.5)) for late in (0.0, 0.1)]
+    stack.show_lanes(lanes_for(("force", "spikes"), twin=False))
+    stack.show_source(Comparison(runs))
+    stack.view.show_span(0.0, 10.0)
+    settle(app)
+    lane = box(stack, "rate").geometry().toAlignedRect()
+    image = stack.scene.grab(lane).toImage()
+    seen = {
+        image.pixelColor(x, y).name().upper()
+        for x in range(AXIS + 2, image.width())
+        for y in range(image.height())
+    }
+    assert Theme("light").tokens.runs[1] in seen
+
+
 def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
-    two = {lab.runs(1)[0], lab.complete_run()}
+    older, newer = lab.runs(1)[0], lab.complete_run()
+    two, progress = {older, newer}, window.centre.progress
     window.screen_.list_runs()
+    window.screen_.open_run(older)
+    lab.until(lambda: older.name in progress.text)
 
     def of_two() -> list[RunCard]:
         cards = window.review.runs.cards
@@ -140,6 +163,7 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window.review.runs.compare.click()
     lab.until(lambda: window.centre.compare_bar.isVisible())
     comparison = window.screen_.run
+    assert progress.text.startswith(f"Steps of ● {comparison.members[0].name}")
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert "residual" not in keys, "the model is not compared"
     window.centre.compare_bar.align.group.button(1).click()
@@ -176,4 +200,5 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert stack.source is session.source, "back to the last run"
     lab.until(lambda: stack.source is window.screen_.run, 30.0)
     assert window.screen_.run.path == session.run.folder, "and then to its record"
+    assert newer.name in progress.text, "not how the run ended that was opened"
     lab.until(lambda: "●" not in stack.row("V_C1").card.text)

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 import tactile_lab
 from gui.lanes.compare import MARKS
 from gui.look.theme import Theme
+from gui.review.run_card import differing
 from gui.review.runs import PAGE, RunsView
-from gui.screen.records import differing
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.summary import RunSummary
 
@@ -173,6 +173,28 @@ def test_arrows_go_from_run_to_run_and_tab_comes_to_one(runs: RunsView, qtbot) -
     qtbot.waitUntil(runs.cards[0].hasFocus)
     QTest.keyClick(runs.cards[0], Qt.Key.Key_Up)
     assert runs.cards[0].hasFocus()
+
+
+def test_runs_of_a_protocol_say_in_what_they_differ(runs: RunsView) -> None:
+    """Their names and pictures are alike."""
+    said = {"a": "80 mN", "b": "120 mN"}
+    runs.show_entries(
+        [
+            summary(
+                name, "Hold", "complete", parameters={"level": level, "ramp": "0 s"}
+            )
+            for name, level in said.items()
+        ]
+        + [summary("c", "Staircase", "complete", protocol="staircase")]
+    )
+    for card in runs.cards:
+        level = said.get(card.entry.name)
+        told = [one.text() for one in card.findChildren(QLabel)]
+        assert [one for one in told if "level" in one] == [f"level {level}"] * bool(
+            level
+        )
+        assert (f"level {level}" in card.accessibleName()) is bool(level)
+        assert "ramp" not in card.toolTip(), "which is the same"
 
 
 def test_compared_runs_say_in_what_they_differ() -> None:

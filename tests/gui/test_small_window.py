@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QAbstractButton, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLabel, QLineEdit, QScrollArea, QWidget
 
 from gui.app import FRAME
 from gui.dialogs.connect import Connect
@@ -28,6 +28,10 @@ def cut(root: QWidget) -> list[str]:
     """What cannot be read, or pressed, in whole."""
     found = []
     for one in root.findChildren(QWidget):
+        if isinstance(one, QScrollArea) and one.isVisible():
+            if one.widget().width() > one.viewport().width():
+                found.append(f"{one.widget().width()} px in {one.viewport().width()}")
+            continue
         if not one.isVisible() or not isinstance(
             one, QAbstractButton | QLabel | QLineEdit
         ):
@@ -55,7 +59,7 @@ def test_every_card_fits(lab, small) -> None:
     acts, folder = small.actions_, lab.runs(1)[0]
     for kind, show in (
         (PreferencesCard, acts.show_preferences),
-        (Help, acts.show_help),
+        *((Help, lambda page=page: acts.show_help(page=page)) for page in range(3)),
         (StudiesCard, acts.show_studies),
         (Connect, acts.connect_dialog),
         (type(small.runs.card), lambda: small.runs.card.show_run(folder)),
@@ -68,6 +72,17 @@ def test_every_card_fits(lab, small) -> None:
         assert least <= card.card.height(), kind
         assert cut(card.card) == [], kind
         card.hide()
+
+
+def test_the_tools_fit_between_both_panels(lab, small) -> None:
+    small.resize(QSize(1280, 800) - FRAME)
+    small.fold(small.review, False)
+    lab.app.processEvents()
+    tools = small.centre.tools
+    words = tools.widths.group.buttons()
+    assert all(one.width() >= one.minimumSizeHint().width() for one in words)
+    assert tools.fit.isVisible(), "no more is left out than needs to be"
+    small._folds = dict.fromkeys(small._folds)  # nobody has folded one by hand
 
 
 @pytest.fixture
