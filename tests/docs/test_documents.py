@@ -1,9 +1,12 @@
 """What the documents tell a reader to do is done here, as it stands."""
 
+import contextlib
+import io
 import json
 import re
 import runpy
 import shlex
+import shutil
 import sys
 import tomllib
 from pathlib import Path
@@ -110,25 +113,36 @@ def test_each_example_of_the_scripting_how_to_stands_alone(
         assert tau == pytest.approx(8.69, rel=0.1)
 
 
-def test_the_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    matplotlib.use("Agg")
+@pytest.fixture(scope="module")
+def readme_s(tmp_path_factory):
+    """Folder in which the README's Python has run, and what it printed."""
+    folder, said = tmp_path_factory.mktemp("readme"), io.StringIO()
     (source,) = blocks("../README.md", "python")
-    exec(source, {"__name__": "__main__"})
+    matplotlib.use("Agg")
+    with contextlib.chdir(folder), contextlib.redirect_stdout(said):
+        exec(source, {"__name__": "__main__"})
+    return folder, said.getvalue()
+
+
+def test_the_python_of_the_readme_runs(readme_s):
     assert len(pyplot.gcf().axes) == 3
     pyplot.close("all")
-    assert "<Run of hold_10s: complete" in capsys.readouterr().out
+    assert "<Run of hold_10s: complete" in readme_s[1]
 
 
-def test_the_how_to_analyse_a_run_is_true(tmp_path, monkeypatch, capsys):
+def test_the_how_to_analyse_a_run_is_true(readme_s, tmp_path, monkeypatch, capsys):
+    page = "how-to/analyse-a-run.md"
+    run, *further = "".join(blocks(page, "sh")).splitlines()
+    # which is the run that the README has made
+    assert run == 'tactile-lab run hold_10s --out runs --set protocol.level="180 mN"'
+    shutil.copytree(readme_s[0] / "runs", tmp_path / "runs")
     monkeypatch.chdir(tmp_path)
     volts = np.linspace(0, 2.75, 56)
     amperes = 1.216e-12 * np.exp(volts / (5.646 * 0.025))
     rows = "\n".join(f"{v},{i}" for v, i in zip(volts, amperes, strict=True))
     (tmp_path / "curve.csv").write_text(f"VG,ID\n{rows}\n", encoding="utf-8")
-    page = "how-to/analyse-a-run.md"
     said = ""
-    for command in "".join(blocks(page, "sh")).splitlines():
+    for command in further:
         verb, *rest = shlex.split(command)[1:]
         found = [
             str(path) for part in rest
