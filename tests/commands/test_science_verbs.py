@@ -73,8 +73,10 @@ def test_identify_fits_several_runs_together(run_folder):
     other = run_folder.with_name("other")
     shutil.copytree(run_folder, other)
     told = json.loads(call("identify", run_folder, other, "V_GS", "--json").stdout)
-    alone = told["runs"]["other"]["parameters"]["V_GS"]["value"]
-    assert told["parameters"]["V_GS"]["value"] == pytest.approx(alone, abs=1e-6)
+    alone = told["runs"]["other"]["parameters"]["V_GS"]
+    together = told["parameters"]["V_GS"]["value"]
+    # what the bench's bands hold weighs half as much beside twice the data
+    assert alone["low_95"] < together < alone["high_95"]
     said = call("identify", run_folder, other, "V_GS")
     assert "other alone 1." in said.stdout, said.output
     refused = call("identify", run_folder, other)
