@@ -54,7 +54,7 @@ def bench(tmp_path):
         ("voltage_source", "keithley-2400-voltage", "patient-source"),
     ):
         said = rows.joinpath(folder, f"{row}.toml").read_text()
-        patient = said.replace("[serial]", '[serial]\ntimeout = "2 s"')
+        patient = said.replace("[serial]", '[serial]\ntimeout = "800 ms"')
         (tmp_path / f"{name}.toml").write_text(patient.replace(f'"{row}"', f'"{name}"'))
     yield served
     served.close()

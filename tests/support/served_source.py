@@ -21,7 +21,7 @@ class Source:
             "rows", "coil", "kepco-bop.toml"
         )
         (folder / "patient.toml").write_text(
-            row.read_text().replace("[serial]", '[serial]\ntimeout = "2 s"')
+            row.read_text().replace("[serial]", '[serial]\ntimeout = "800 ms"')
         )
         self.bench = folder / "bench.toml"
         self.bench.write_text(SERVED.format(port=self.served.addresses["coil"]))
