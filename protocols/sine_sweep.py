@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from tactile_lab.analysis.response import Gain, gain
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_STATED, Conclusion, Table
-from tactile_lab.errors import NotIdentifiableError, QuantityError
+from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import (
@@ -21,12 +21,16 @@ from tactile_lab.quantity import (
     Force,
     Pause,
     Unit,
-    parse,
     plus_minus,
     printed,
 )
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
+from tactile_lab.stimulus.frequencies import (
+    Frequency,
+    by_label,
+    check_rising,
+    spaced,
+)
 from tactile_lab.stimulus.recovery import TABLE_1_TAU
 from tactile_lab.trial import Trial, Trials
 from tactile_lab.waveform import Waveform
@@ -85,13 +89,14 @@ class SineSweep(ForceProtocol):
     def presentations(self) -> Trials:
         """One trial per frequency."""
         last, lead = _Settled(0.0, 0.0), self._settling
+        labels = {frequency: label for label, frequency in self._by_label.items()}
         for frequency in self.frequencies():
             ramp = min(RAMP, 1 / (4 * math.pi * frequency))
             first, after = last.onto(frequency, ramp, self._leak)
             force = self._sine(frequency, first, last.force, lead, ramp)
             yield Trial(
                 force=force,
-                label=f"{frequency:.3g} Hz",
+                label=labels[frequency],
                 hold=(lead + ramp, force.end),
             )
             last, lead = after, 0.0
@@ -100,6 +105,10 @@ class SineSweep(ForceProtocol):
             force=Waveform.through([(0.0, end), (0.25, 0.0), (0.5, 0.0)]),
             label="back to rest",
         )
+
+    @property
+    def _by_label(self) -> dict[str, float]:
+        return by_label(self.frequencies(), 3)
 
     @property
     def _settling(self) -> float:
@@ -135,7 +144,8 @@ class SineSweep(ForceProtocol):
             for t in run.results
             if t.held is not None and run.left_range("V_C1", *t.held)
         )
-        found, expected = _gains(run), _gains(run, model=True)
+        found = _gains(run, self._by_label)
+        expected = _gains(run, self._by_label, model=True)
         if not found:
             return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
         told = "; ".join(
@@ -170,7 +180,8 @@ class SineSweep(ForceProtocol):
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Gain and phase against frequency."""
-        found, expected = _gains(run), _gains(run, model=True)
+        found = _gains(run, self._by_label)
+        expected = _gains(run, self._by_label, model=True)
         if len(found) < 2:
             return
         at = tuple(g.frequency for g in found)
@@ -248,23 +259,27 @@ class _Settled:
         return first, _Settled(math.sin(first), film)
 
 
-def _gains(run: Measurement, *, model: bool = False) -> list[Gain]:
-    """Gain of V_C1 over the force, V/N, for each trial named by a frequency."""
+def _gains(
+    run: Measurement, labels: Mapping[str, float], *, model: bool = False
+) -> list[Gain]:
+    """Gain of V_C1 over the force, V/N, for each trial of a frequency, by its label."""
     trace, found = run.trace("V_C1", model=model), []
     steps = 0.0 if model else run.step_bias("V_C1")
     code = None if trace is None or model else trace.code
     leak = None if run.circuit is None else run.circuit.tau
     for trial in run.results:
-        if trace is None or trial.held is None or run.left_range("V_C1", *trial.held):
+        frequency = labels.get(trial.label)
+        if trace is None or frequency is None or trial.held is None:
+            continue
+        if run.left_range("V_C1", *trial.held):
             continue
         inside = (trace.time >= trial.held[0]) & (trace.time <= trial.held[1])
         time = trace.time[inside]
         force = _averaged(run.force, time)
         try:
-            frequency = parse(trial.label, "Hz")
             answer = gain(time, force, trace.mean[inside], frequency, steps, code, leak)
-        except (QuantityError, NotIdentifiableError):
-            continue  # another trial, or one that was cut short
+        except NotIdentifiableError:
+            continue  # it was cut short
         found.append(answer if model else _known(run, trial, answer))
     return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Annotated, ClassVar
 
@@ -18,12 +18,17 @@ from tactile_lab.analysis.phase_locking import (
 from tactile_lab.analysis.spike_train import within
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
-from tactile_lab.errors import NotIdentifiableError, QuantityError
+from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import Measurement
 from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, Unit, parse, printed, show
+from tactile_lab.quantity import Duration, Force, Pause, Unit, printed, show
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.stimulus.frequencies import Frequency, check_rising, spaced
+from tactile_lab.stimulus.frequencies import (
+    Frequency,
+    by_label,
+    check_rising,
+    spaced,
+)
 from tactile_lab.stimulus.indentation import on_indentation
 from tactile_lab.trial import Trial, Trials
 
@@ -68,6 +73,7 @@ class Vibration(ForceProtocol):
 
     def presentations(self) -> Trials:
         """All presentations of one frequency, then those of the next."""
+        labels = {frequency: label for label, frequency in self._by_label.items()}
         for frequency in self.frequencies():
             force, hold = on_indentation(
                 self.base,
@@ -78,7 +84,11 @@ class Vibration(ForceProtocol):
                 highest=frequency,
             )
             for _ in range(self.presentations_each):
-                yield Trial(force=force, label=f"{frequency:.4g} Hz", hold=hold)
+                yield Trial(force=force, label=labels[frequency], hold=hold)
+
+    @property
+    def _by_label(self) -> dict[str, float]:
+        return by_label(self.frequencies(), 4)
 
     def _sine(self, frequency: float, time: FloatArray) -> FloatArray:
         return np.asarray(self.amplitude * np.sin(2 * np.pi * frequency * time))
@@ -87,7 +97,7 @@ class Vibration(ForceProtocol):
         """Vector strength and phase at each frequency."""
         if not run.searched:
             return Conclusion(missing=(NOT_SEARCHED,))
-        found, missing = locking_by_label(run)
+        found, missing = locking(run, self._by_label)
         if not found:
             return Conclusion(missing=tuple(missing))
         locked = [f for f, one in found.items() if one.locked]
@@ -120,7 +130,7 @@ class Vibration(ForceProtocol):
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Vector strength and phase against frequency."""
-        found, _ = locking_by_label(run)
+        found, _ = locking(run, self._by_label)
         if len(found) < 2:
             return
         at = tuple(found)
@@ -173,17 +183,21 @@ class Vibration(ForceProtocol):
         )  # fmt: skip
 
 
-def locking_by_label(run: Measurement) -> tuple[dict[float, PhaseLocking], list[str]]:
-    """Phase locking at each frequency that a trial is named by; and what is missing."""
+def locking(
+    run: Measurement, labels: Mapping[str, float]
+) -> tuple[dict[float, PhaseLocking], list[str]]:
+    """Phase locking at each frequency, found by its label; and what is missing."""
     phases: dict[float, list[FloatArray]] = {}
     for trial in run.results:
+        frequency = labels.get(trial.label)
         if trial.held is None or trial.hold is None or not trial.complete:
             continue
+        if frequency is None:
+            continue
         try:
-            frequency = parse(trial.label, "Hz")
             spikes = within(trial.spike_times, trial.hold) + trial.start
             turns = phases_of(spikes, run.force.at, frequency, trial.held)
-        except (QuantityError, NotIdentifiableError):
+        except NotIdentifiableError:
             continue
         phases.setdefault(frequency, []).append(turns)
     found, missing = {}, []

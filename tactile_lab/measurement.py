@@ -321,10 +321,13 @@ class Measurement:
         """When the force came within 1 % of that of the hold, s of run time, or None.
 
         A coil that is set over a serial line gets there after the hold's nominal start.
+        Where the trial has no level its hold is not constant, and begins as planned.
         """
         if trial.held is None:
             return None
         start, end = trial.held
+        if trial.level is None:
+            return start
         return max(start, self.force.arrival((start + end) / 2, trial.start))
 
     def field_between(self, start: float, end: float) -> FloatArray:

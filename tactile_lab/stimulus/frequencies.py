@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import numpy as np
@@ -19,6 +20,20 @@ def check_rising(lowest: float, highest: float) -> None:
         )
 
 
+def by_label(frequencies: Iterable[float], digits: int) -> dict[str, float]:
+    """Each frequency by the label of its trials, "21.5 Hz": rounded, Hz is not.
+
+    Args:
+        frequencies: Hz.
+        digits: of a label; more where these do not tell the frequencies apart.
+    """
+    one_each = set(frequencies)
+    found = {f"{f:.{digits}g} Hz": f for f in sorted(one_each)}
+    return found if len(found) == len(one_each) else by_label(one_each, digits + 1)
+
+
 def spaced(lowest: float, highest: float, count: int) -> list[float]:
     """So many frequencies, evenly spaced on a logarithmic scale, Hz."""
+    if lowest == highest:
+        return [lowest] * count
     return [float(f) for f in np.geomspace(lowest, highest, count)]

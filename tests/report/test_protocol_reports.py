@@ -1,5 +1,6 @@
 """What a report concludes from runs of the other protocols, on plain values."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -136,7 +137,10 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
     frequency, cycles = 0.5, 4
     phase = np.arange(0, 24 * cycles + 1) / 24
     wave = Waveform(phase / frequency, 0.005 * np.sin(2 * np.pi * phase))
-    run = modelled("sine_sweep", [("0.5 Hz", None, wave, False)], searched=False)
+    run = modelled(
+        "sine_sweep", [("0.5 Hz", None, wave, False)], searched=False,
+        parameters={"lowest": 0.5, "highest": 0.5, "count": 1},
+    )  # fmt: skip
     held = (replace(run.trials[0], hold=(0.0, cycles / frequency)),)
     told = find(replace(run, trials=held)).conclusion
     (found,) = told.plain["V_C1_over_force"]
@@ -157,6 +161,26 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
         circuit.k_F * steep * resistance, rel=0.02
     )
     assert abs(found["phase_rad"]["value"]) == pytest.approx(np.pi, abs=0.2)
+
+
+def test_a_sine_is_looked_at_with_its_frequency_and_not_with_its_label():
+    frequency, cycles = math.sqrt(0.03 * 0.5), 2
+    phase = np.arange(0, 24 * cycles + 1) / 24
+    wave = Waveform(phase / frequency, 0.01 * np.sin(2 * np.pi * phase))
+    run = modelled(
+        "sine_sweep", [("0.122 Hz", None, wave, False)], searched=False,
+        parameters={"lowest": 0.03, "highest": 0.5, "count": 3},
+    )  # fmt: skip
+    trial = replace(run.trials[0], hold=(0.0, cycles / frequency))
+    (found,) = find(replace(run, trials=(trial,))).conclusion.plain["V_C1_over_force"]
+    # Eqs. (7), (8) and (16), small signal; by 0.122 Hz it was 0.07 rad off
+    circuit, turn = Circuit(), 2 * np.pi * frequency
+    resistance = 1 / (1 / circuit.R1 + 1 / circuit.R2)
+    leak = math.atan(1 / (turn * circuit.tau))
+    late = math.atan(turn * resistance * circuit.C1)
+    assert found["frequency_Hz"] == pytest.approx(frequency)
+    assert found["phase_rad"]["value"] == pytest.approx(leak - late - np.pi, abs=5e-3)
+    assert run.applied_edge(trial) == 0.0, "a sine is at no level that it comes to"
 
 
 def test_what_a_report_says_of_adaptation_finds_its_run(tmp_path):
