@@ -20,16 +20,16 @@ FIGURES = (".png", ".svg", ".pdf", ".html")
 @json_option
 def command(run: Path, as_json: bool) -> None:
     """Show what RUN is, what it holds and where its figures are."""
-    with reading(run):
+    with reading(run):  # what is damaged may be found as late as it is put into words
         summary = describe(run)
+        told = [(name, value) for name, value in rows(summary) if value]
     if as_json:
         print_json(summary)
     else:
         kind = "simulated" if summary["simulated"] else "measured"
         say(f"{summary['run']}: {summary['status']}, {kind}")
-        for name, value in rows(summary):
-            if value:
-                say(f"{name:<13}{value}" if name else str(value))
+        for name, value in told:
+            say(f"{name:<13}{value}" if name else str(value))
 
 
 def describe(path: Path) -> dict[str, Any]:

@@ -60,6 +60,15 @@ def test_show_tells_what_a_run_holds(run):
     assert summary["loss"]["spikes"] == 0
 
 
+def test_show_calls_a_changed_run_json_damaged(run):
+    info = json.loads((run / "run.json").read_text())
+    info["detection"] = {"sigoal": "V_K", "from": "scene", "threshold_V": 0.5}
+    (run / "run.json").write_text(json.dumps(info))  # its hash stays
+    shown = tell("show", run)
+    assert shown.exit_code == 2, shown.exception
+    assert "is damaged (run.json: was changed" in shown.output
+
+
 def test_verify_tells_sound_from_damaged(run):
     sound = tell("verify", run)
     assert (sound.exit_code, "sound" in sound.output) == (0, True)
