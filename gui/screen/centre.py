@@ -126,6 +126,8 @@ class EmptyCard(QFrame):
             )
             self._recent.addWidget(button)
         if self.isVisible():
+            for one in self._listed.findChildren(QWidget):
+                one.show()  # or they would not count yet in the height that is wanted
             self.place()
 
     def _tint(self) -> None:

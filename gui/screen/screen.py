@@ -357,8 +357,8 @@ class Screen(QObject):
         self._panels.session.opened = f"Comparing {len(comparison.members)} runs"
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
-        first = comparison.members[0].name
-        self._show_steps(comparison, f"Steps of {MARKS[0]} {first}")
+        name = comparison.members[0].name
+        self._show_steps(comparison.first, f"Steps of {MARKS[0]} {name}")
         self.changed.emit()
 
     def _count_from(self, level: float) -> None:

@@ -5,7 +5,14 @@ from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QAbstractButton, QLabel, QLineEdit, QScrollArea, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QScrollArea,
+    QWidget,
+)
 
 from gui.app import FRAME
 from gui.dialogs.connect import Connect
@@ -136,4 +143,19 @@ def test_the_card_of_the_empty_state_fits(app, room: tuple[int, int]) -> None:
     app.processEvents()
     assert below.rect().contains(card.geometry())
     assert cut(card) == [] and card.simulated.isVisible()
+    below.close()
+
+
+def test_the_card_of_the_empty_state_grows_with_what_it_offers(app) -> None:
+    """Runs are listed after the window has appeared."""
+    below = QWidget()
+    below.resize(930, 440)
+    card = EmptyCard(below, Theme("light"))
+    below.show()
+    card.place()
+    app.processEvents()
+    card.show_recent([("Pulses · today 14:03 · complete", Path())])
+    app.processEvents()
+    (recent,) = (one for one in card.findChildren(QPushButton) if "14:03" in one.text())
+    assert recent.isVisible() and cut(card) == []
     below.close()
