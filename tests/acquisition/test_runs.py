@@ -2,6 +2,7 @@
 
 import shutil
 from importlib import resources
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -318,18 +319,20 @@ def test_a_protocol_that_fails_in_the_middle_leaves_the_coil_off(run_scene, tmp_
 def test_a_full_disk_ends_the_run_with_the_coil_off_and_the_data_kept(
     run_scene, short, monkeypatch
 ):
-    def fill(execution, event):
-        if isinstance(event, events.Progress) and event.elapsed > 0.7:
-            usage = SimpleNamespace(free=1_000_000)
-            monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
+    def usage(path):
+        """The writer's own look: it may come late behind the run's clock."""
+        stored = sum(file.stat().st_size for file in Path(path).rglob("data.h5"))
+        full = stored > 100_000
+        return SimpleNamespace(free=1_000_000 if full else 10**12)
 
-    ran = run_scene(*short, watch=fill)
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    ran = run_scene(*short)
     assert ran.done.exit_code == 3
     assert ran.done.off.verified
     assert "Free some space" in ran.done.reason
     with ran.stored() as run:
         assert run.status == "faulted"
-        assert len(run.signal("V_K")) >= 0.5e6
+        assert len(run.signal("V_K")) > 0
     # the last spikes may have waited for the disk when it gave up: that is told
     found = {finding.where for finding in verify(ran.folder).findings}
     assert found <= {"data.h5 /spikes"}
