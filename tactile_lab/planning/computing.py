@@ -164,9 +164,14 @@ def savings(
     """
     storing = cost.time.get("storing", 0.0)
     number = len(needed.stored)
+    wired = {channel.signal for channel in needed.channels}
     for signal in needed.stored if samples and number > 1 else ():
-        how = f'without "{signal}" in record.signals'
-        yield Saving(signal, how, disk / number, storing / number)
+        names = [signal] if signal in scene.record.signals else []
+        if signal == "V_C1" and "I_DS" in scene.record.signals and "I_DS" not in wired:
+            names.append("I_DS")
+        what = " and ".join(names)
+        how = "without {} in record.signals".format(" and ".join(f'"{n}"' for n in names))
+        yield Saving(what, how, disk / number, storing / number)
     beside = cost.time.get("model beside the run")
     if beside is not None and scene.compared:
         yield Saving("model beside the run", "record.compare = false", 0.0, beside)

@@ -314,14 +314,14 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
     if plan.preview is not None:
-        error = plan.preview.error
+        error, spikes = plan.preview.error, plan.preview.spike_times
         known = [
             f"{what} within {show(value, unit, 2)}"
             for what, value, unit in (
                 ("spike times", error.spike_time, "s"),
                 ("V_C1", error.V_C1, "V"),
             )
-            if value is not None
+            if value is not None and (unit != "s" or (spikes is not None and spikes.size))
         ]
         if known:
             yield "numerics", f"{', '.join(known)}, by the solver's own estimate"

@@ -15,6 +15,7 @@ from tactile_lab.voltage_source import VoltageLimits
 NOT_RECORDED = "field is not recorded, so it is not compared with the current"
 
 NOTHING_ALIKE = "nothing recorded is predicted by it"
+PROBES_MOVED = "the probes are moved, so the protocol asks it for rest and push alone"
 
 Reasons = tuple[tuple[str, str], ...]
 
@@ -22,6 +23,7 @@ Reasons = tuple[tuple[str, str], ...]
 def uses(scene: Scene, needed: Needs) -> Reasons:
     """(what, why) of everything a run opens, enables, computes or reads."""
     bench, stored = scene.bench, needed.stored
+    enabled = {channel.signal for channel in needed.channels}
     found: list[tuple[str, str]] = []
     if needed.coil and bench.coil is not None:
         found.append(("coil source", f"{bench.coil.dialect} plays the force"))
@@ -35,8 +37,6 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
             why = f"kept as means of {show(FIELD_AVERAGING, 's')}"
         if name == needed.detect_on:
             why += f"; spikes are detected on it{_threshold(scene, name)}"
-        if name == "V_C1" and name not in scene.record.signals:
-            why += "; I_DS is derived from it, Eq. (16)"
         found.append((f"channel {channel.input}: {name}", why))
     if needed.field_meter and bench.field_meter is not None:
         found.append(("teslameter", f"{bench.field_meter.dialect} reads the field"))
@@ -68,6 +68,8 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
             found.append((name, f"detected on {needed.detect_on} as it streams"))
         elif name == "rate":
             found.append((name, "derived from the spikes"))
+        elif name == "I_DS" and name not in enabled:
+            found.append((name, "derived from V_C1 by Eq. (16)"))
     if scene.compared:
         found.append(("model beside the run", "from the applied current; compared"))
     if bench.simulated:
@@ -115,8 +117,7 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
     if any(step.trial.pause for step in drive.steps):
         found.append(("samples of pauses", "recovery is neither streamed nor stored"))
     if not scene.compared:
-        why = "record.compare = false" if not scene.record.compare else NOTHING_ALIKE
-        found.append(("model beside the run", why))
+        found.append(("model beside the run", _not_compared(scene)))
     if bench.simulated:
         off = "off in [simulated]: not computed"
         world = scene.simulated
@@ -125,6 +126,18 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
         found.append(("simulated instruments", "the bench is real"))
     found.append(("window", "Qt is loaded by `tactile-lab gui` alone"))
     return tuple(found)
+
+
+def _not_compared(scene: Scene) -> str:
+    """Why no model is computed beside the run."""
+    protocol = scene.protocol
+    if not scene.record.compare:
+        return "record.compare = false"
+    if protocol.moves_probes:
+        return PROBES_MOVED
+    if protocol.sets:
+        return f"{', '.join(protocol.sets)} is another from trial to trial"
+    return NOTHING_ALIKE
 
 
 def _rest(limits: VoltageLimits) -> str:

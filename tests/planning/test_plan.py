@@ -291,6 +291,40 @@ def test_what_a_run_computes_is_the_sum_of_its_parts_and_each_can_be_left_out():
     assert without.computing.memory < cost.memory
 
 
+def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
+    """To leave V_C1 out of the scene alone saves nothing: its samples stay stored."""
+    for signals in (["V_C1", "I_DS", "V_C2"], ["I_DS", "V_C2"]):
+        planned = plan(load(None, [f"record.signals={json.dumps(signals)}"]))
+        assert dict(planned.uses)["I_DS"] == "derived from V_C1 by Eq. (16)"
+        assert not {"I_DS", "channel I_DS"} & left_out(planned)
+        told = {saving.how for saving in planned.savings}
+        names = [name for name in ("V_C1", "I_DS") if name in signals]
+        kept = " and ".join(f'"{name}"' for name in names)
+        assert f"without {kept} in record.signals" in told
+        without = sorted(set(signals) - set(names))
+        less = plan(load(None, [f"record.signals={json.dumps(without)}"]))
+        assert less.needs.stored == ("V_C2",)
+
+
+@pytest.mark.parametrize(
+    ("scene", "why"),
+    [
+        ("threshold_trim", "V_GS is another from trial to trial"),
+        ("wiring_check", "the probes are moved"),
+        ("calibrate_field", "nothing recorded is predicted by it"),
+    ],
+)
+def test_why_no_model_is_compared_is_told(scene, why):
+    told = dict(plan(load(scene)).leaves_out)["model beside the run"]
+    assert told.startswith(why)
+
+
+def test_no_error_of_spike_times_is_told_where_no_spike_is_expected():
+    told = text(plan(load("monitor")))
+    assert "spikes     0 by the model" in told
+    assert "spike times within" not in told and "V_C1 within" in told
+
+
 def test_a_rate_that_node_a_does_not_need_is_told():
     """The same V_C1 at a hundredth of the disk; nothing is said where that is so."""
     (told,) = plan(load("v_c1_only", ["record.sample_rate=1 MS/s"])).suggestions
