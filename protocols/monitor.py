@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 from pydantic import Field
@@ -9,7 +10,7 @@ from pydantic import Field
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import LimitError
 from tactile_lab.measurement import Measurement
-from tactile_lab.quantity import Duration, show
+from tactile_lab.quantity import Duration, plus_minus, show
 from tactile_lab.trial import Protocol, Trial, Trials
 from tactile_lab.waveform import Waveform
 
@@ -53,10 +54,21 @@ class NoForce(Protocol):
             return Conclusion()
         end, critical = float(trace.time[-1]), run.circuit.critical_V_C1
         distance = run.mean("V_C1", end - 1.0, end) - critical
+        # an offset of its channel, its steps, and where the threshold may lie
+        moved = (other.critical_V_C1 - critical for other in run.displaced)
+        half = math.hypot(trace.code or 0.0, run.step_bias("V_C1"), *moved)
         where = "above" if distance > 0 else "below"
+        tells = f"the sensor {'is silent' if distance > 0 else 'fires'} at rest"
+        if abs(distance) <= half:
+            tells = "whether the sensor fires at rest cannot be told"
         said = (
-            f"V_C1 ended {show(abs(distance), 'V', 3)} {where} the critical "
-            f"{show(critical, 'V')}: the sensor "
-            f"{'is silent' if distance > 0 else 'fires'} at rest."
+            f"V_C1 ended {plus_minus(abs(distance), half, 'V')} {where} the critical "
+            f"{show(critical, 'V')} (95 %: one code of offset of V_C1, its converter's "
+            "steps, and what the bench states of the follower's input bias and the "
+            f"temperature; the circuit as believed): {tells}."
         )
-        return Conclusion((said,), {"distance_to_threshold_V": distance})
+        values = {
+            "distance_to_threshold_V": distance,
+            "distance_to_threshold_uncertainty_V_95": half,
+        }
+        return Conclusion((said,), values)

@@ -170,7 +170,9 @@ def savings(
         if signal == "V_C1" and "I_DS" in scene.record.signals and "I_DS" not in wired:
             names.append("I_DS")
         what = " and ".join(names)
-        how = "without {} in record.signals".format(" and ".join(f'"{n}"' for n in names))
+        how = "without {} in record.signals".format(
+            " and ".join(f'"{n}"' for n in names)
+        )
         yield Saving(what, how, disk / number, storing / number)
     beside = cost.time.get("model beside the run")
     if beside is not None and scene.compared:

@@ -321,7 +321,8 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
                 ("spike times", error.spike_time, "s"),
                 ("V_C1", error.V_C1, "V"),
             )
-            if value is not None and (unit != "s" or (spikes is not None and spikes.size))
+            if value is not None
+            and (unit != "s" or (spikes is not None and spikes.size))
         ]
         if known:
             yield "numerics", f"{', '.join(known)}, by the solver's own estimate"

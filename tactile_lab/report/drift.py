@@ -60,9 +60,10 @@ def drift_sentence(run: Measurement) -> str:
     if len(judged) < 2:
         return ""
     most = max((d for _, d in judged), key=abs)
+    low, high = (show(volts, "V") for volts in (min(rest), max(rest)))
+    rested = f"at {low}" if low == high else f"between {low} and {high}"
     return (
-        f"V_C1 rested between {show(min(rest), 'V')} and {show(max(rest), 'V')}. Less "
-        "what the film remembers of earlier forces it drifted by "
+        f"V_C1 rested {rested}. Less what the film remembers of earlier forces it drifted by "
         f"{show(most, 'V', 2)} at most."
     )
 

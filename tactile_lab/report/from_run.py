@@ -17,6 +17,7 @@ from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
+from tactile_lab.model.temperature import temperature
 from tactile_lab.quantity import count, exact, show
 from tactile_lab.report.driven import told
 from tactile_lab.report.mains import told as mains_told
@@ -91,7 +92,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             ),
             assumptions=(*(info.get("assumptions") or ()), *told(run)),
             parameters=_texts(scene, "protocol"),
-            sensor=_texts(scene, "sensor"),
+            sensor=sensor_texts(scene),
             settings=settings,
             calibration=_calibration(scene),
             conditions=_conditions(info) | _said(run.path),
@@ -328,6 +329,17 @@ def _texts(scene: Scene, table: str) -> dict[str, str]:
         else _readable(value)
         for name, value in entries.items()
     }
+
+
+def sensor_texts(scene: Scene) -> dict[str, str]:
+    """The sensor's keys; what its temperature changes as it is there."""
+    found, given, used = _texts(scene, "sensor"), scene.sensor, scene.sensor.circuit
+    for name, unit in (("V_T", "V"), ("I_S", "A"), ("I_T1s", "A")):
+        there = getattr(used, name)
+        if there != getattr(given, name):
+            told = f"{found[name]} at {show(temperature(given), 'K')}"
+            found[name] = f"{show(there, unit)} ({told})"
+    return found
 
 
 def _readable(value: Any) -> str:

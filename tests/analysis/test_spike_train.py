@@ -48,6 +48,12 @@ def test_response_says_when_firing_stopped():
     assert respond([1.0, 1.2, 1.4], hold=(0.5, 1.7)).silent is None
 
 
+def test_one_interval_tells_a_rate_and_no_fall():
+    found = respond([1.0, 1.5], hold=(0.0, 2.0))
+    assert found.peak_rate == found.final_rate == pytest.approx(2.0)
+    assert found.fall is None, "it stood as 0 %"
+
+
 @pytest.mark.parametrize("times", [[], [1.0]])
 def test_too_few_spikes_give_none_not_an_error(times):
     found = respond(times, hold=(0.0, 2.0))

@@ -131,6 +131,21 @@ def test_monitor_tells_the_distance_to_threshold():
     assert distance == pytest.approx(4.347 - 3.974, abs=2e-3)
     drawn = overview(replace(run, searched=True))
     assert "Rate" not in [panel.label for panel in drawn.panels], "there is none"
+    coded = tuple(replace(trace, code=16e-3) for trace in run.traces)
+    biased = (replace(Circuit(), I_bias=20e-12),)
+    told = find(replace(run, traces=coded, displaced=biased)).conclusion
+    half = told.values["distance_to_threshold_uncertainty_V_95"]
+    assert 16e-3 < half < 24e-3
+    assert "mV above the critical" in told.sentences[0]
+    assert told.sentences[0].endswith("the sensor is silent at rest.")
+    # the very V_GS at which it fires, but for 10 mV of V_C1
+    near = replace(Circuit(), V_GS=1.5378)
+    close = modelled("monitor", [("part 1", 0.0, quiet, False)], circuit=near)
+    told = find(replace(close, traces=tuple(
+        replace(trace, code=16e-3) for trace in close.traces
+    ))).conclusion  # fmt: skip
+    assert 0 < told.values["distance_to_threshold_V"] < 16e-3
+    assert told.sentences[0].endswith("fires at rest cannot be told.")
 
 
 def test_sine_sweep_gives_the_gain_of_small_forces():

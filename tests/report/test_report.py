@@ -10,7 +10,7 @@ import pytest
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.report.findings import find
-from tactile_lab.report.from_run import stimulus_onset
+from tactile_lab.report.from_run import sensor_texts, stimulus_onset
 from tactile_lab.report.html import rendered
 from tactile_lab.report.overview import overview
 from tactile_lab.report.splice import stretches
@@ -256,6 +256,15 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
 )
 def test_latency_counts_from_where_the_force_begins(scene, overrides, onset):
     assert stimulus_onset(load(scene, overrides)) == pytest.approx(onset)
+
+
+def test_the_sensor_is_told_as_it_is_at_its_temperature():
+    """V_T stood as Table 1's 25 mV in reports of runs at 299 K."""
+    assert sensor_texts(load("demo"))["V_T"] == "25 mV"
+    warm = sensor_texts(load("demo", ["sensor.temperature=299 K"]))
+    assert warm["V_T"] == "25.77 mV (25 mV at 290.1 K)"
+    assert warm["I_S"].endswith("(1.216 pA at 290.1 K)")
+    assert warm["V_GS"] == "1.4 V"
 
 
 def test_what_left_its_range_is_shaded_in_its_panels(demo):
