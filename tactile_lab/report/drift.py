@@ -63,8 +63,8 @@ def drift_sentence(run: Measurement) -> str:
     low, high = (show(volts, "V") for volts in (min(rest), max(rest)))
     rested = f"at {low}" if low == high else f"between {low} and {high}"
     return (
-        f"V_C1 rested {rested}. Less what the film remembers of earlier forces it drifted by "
-        f"{show(most, 'V', 2)} at most."
+        f"V_C1 rested {rested}. Less what the film remembers of earlier forces it "
+        f"drifted by {show(most, 'V', 2)} at most."
     )
 
 

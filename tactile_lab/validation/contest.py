@@ -25,6 +25,12 @@ EXACT = "exact integrate-and-fire"
 
 TIMED_OUT = "timed out"
 """Verdict on a call that was stopped at the cap."""
+CAPPED = (
+    f" (compiled methods: {rivals.EVALUATIONS_PER_SECOND:.0e} evaluations for each "
+    "second of it, about half of what they do in one; fixed steps that need more are "
+    "not begun)"
+)
+"""What the cap means for each kind of method, for a report."""
 COMPILED, CALLED, PROCESS = "compiled", "called from Python", "own process"
 """Where a method's inner loop runs."""
 

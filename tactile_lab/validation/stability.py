@@ -11,7 +11,16 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.solver import MOST_COUPLED, MOST_SPIKES
 from tactile_lab.quantity import show
-from tactile_lab.validation.contest import Method, Row, Truth, judge, methods, truth
+from tactile_lab.validation.contest import (
+    CAPPED,
+    TIMED_OUT,
+    Method,
+    Row,
+    Truth,
+    judge,
+    methods,
+    truth,
+)
 from tactile_lab.validation.extremes import Extreme, extremes, formula
 from tactile_lab.validation.problem import Problem, spent
 from tactile_lab.validation.table import markdown, provenance
@@ -71,8 +80,8 @@ def report(
             "Ours at the default tolerance 1e-9 s, the others at 1e-9 with events, "
             "Dormand-Prince, Rodas5P and Euler compiled whole, the rest called from "
             "Python "
-            f"(Euler: 10 µs steps), each stopped after {cap:g} s; times are CPU time. "
-            "Error: largest error "
+            f"(Euler: 10 µs steps), each stopped after {cap:g} s{CAPPED}; times are "
+            "CPU time. Error: largest error "
             'of a spike time. Truth: "reference" is 40-digit arithmetic, "formula" '
             'Eq. (15) at constant current, "refuse" a case that has no answer and must '
             'be refused with a clear error, "limit" a case that has one, but with more '
@@ -160,7 +169,7 @@ def _rival(row: Row) -> str:
         return f"right{error}, {took}"
     if row.verdict == "wrong count":
         return f"wrong: {row.spikes}, {took}"
-    return f"{row.verdict}, {took}"
+    return row.verdict if row.verdict == TIMED_OUT else f"{row.verdict}, {took}"
 
 
 def _own_truth(case: Extreme) -> Truth:

@@ -16,6 +16,7 @@ import numpy as np
 
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.validation.contest import (
+    CAPPED,
     COMPILED,
     EXACT,
     OURS,
@@ -135,11 +136,11 @@ def write(points: Sequence[Point], cap: float, out: Path) -> None:
         f"{provenance()} Written by `tactile-lab validate sweeps --cap {cap:g} --out "
         "docs`.\n",
         "Every compiled method at one setting (tolerance 1e-9; fixed steps of 10 µs) "
-        f"along three axes, each stopped after {cap:g} s. CPU time of one call, the "
-        "least of several. Truth is our own answer at 1e-13 s for stiffness and "
-        "grazing, Eq. (15) at constant current for the number of spikes. A wrong "
-        "count, NaN or time-out is a cross at the top of the error panel. The table "
-        "says in which share of its places a method was right.\n",
+        f"along three axes, each stopped after {cap:g} s{CAPPED}. CPU time of "
+        "one call, the least of several. Truth is our own answer at 1e-13 s for "
+        "stiffness and grazing, Eq. (15) at constant current for the number of "
+        "spikes. A wrong count, NaN or time-out is a cross at the top of the error "
+        "panel. The table says in which share of its places a method was right.\n",
         "![sweeps](sweeps.svg)\n",
         markdown(("method", "setting", *AXES), list(_shares(points))),
     ]

@@ -1,5 +1,7 @@
 """The comparison judges: right, wrong count, time-out, failure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.solver import MOST_SPIKES
 from tactile_lab.model.state import Start
 from tactile_lab.validation import general, rivals, spice, sweeps
-from tactile_lab.validation.accuracy import fastest, order, table, write_csv
+from tactile_lab.validation.accuracy import cell, fastest, order, table, write_csv
 from tactile_lab.validation.contest import COMPILED, Method, Row, Truth, judge, ours
 from tactile_lab.validation.exact_firing import exact_firing
 from tactile_lab.validation.extremes import _case, extremes, formula, grazing
@@ -125,8 +127,16 @@ def test_the_order_is_the_slope_over_the_evaluations():
         Row("s", "m", "dt", COMPILED, "right", 1, 1e-5 * n**-4.0, evaluations=n)
         for n in (1, 2, 4, 8)
     ]
+    rows.insert(0, replace(rows[0], spike_error=1e-4))  # as many, and ten times off
     assert order(rows) == pytest.approx(4.0)
-    assert order(rows[:2]) is None
+    assert order(rows[:3]) is None, "of two settings"
+
+
+def test_a_call_that_was_stopped_or_not_begun_has_no_time():
+    """Steps that were never begun stood as timed out after 13 µs."""
+    row = Row("s", "Euler", "dt", COMPILED, "timed out", run_time=13e-6)
+    assert cell(row)[-1] == ""
+    assert cell(replace(row, verdict="failed"))[-1] == "13 µs"
 
 
 def test_a_charge_that_leaks_away_below_the_threshold_is_no_spike():
