@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.model import elementary
 from tactile_lab.model.compiled import inner
-from tactile_lab.model.node_a import V_T, matrix_times
+from tactile_lab.model.matrix import product_of
+from tactile_lab.model.node_a import V_T
 from tactile_lab.model.tableau import ORDER, TO_SERIES_TURNED
 
 DIRECT, V_S, T1_LOG, T1_DROP, T1_SCALE, T1_SHIFT = range(6, 12)
@@ -21,6 +23,11 @@ PARAMETERS = 18
 SHORT = 24.0
 """Pieces of up to so many tau_L can resolve exp(-t/tau_L)."""
 MOST_TERMS = 40
+NEAR = 2e-4
+"""What w + ln w may miss z by for the next iterate of omega to be right to rounding."""
+MOST_ROUNDS = 4
+
+times = product_of(ORDER + 1)
 
 
 @inner
@@ -59,6 +66,47 @@ def Q_at(y: float, par: FloatArray) -> float:
 
 
 @inner
+def Q_along(points: FloatArray, par: FloatArray) -> None:
+    """Fill the second row of `points` with `Q_at` the first one's V_C1.
+
+    The third holds ln w. Omega is found as in `omega`, but at all points side by side,
+    and by ln w, whose exponential is w: from Taylor's series about the first point.
+    """
+    row = ORDER + 1
+    points[row] = Q_at(points[0], par)
+    rounds = 0 if par[DIRECT] != 0.0 else MOST_ROUNDS
+    scale, shift, per_t = par[T1_SCALE], par[T1_SHIFT], 1.0 / par[V_T]
+    top = (par[V_S] + par[T1_DROP]) * per_t + par[T1_LOG]
+    z_0 = top - points[0] * per_t
+    w_0 = (points[row] - shift) / scale
+    rise = 1.0 / (1.0 + w_0)
+    bend = w_0 * rise * rise * rise
+    turn = bend * rise * rise * (2.0 * w_0 - 1.0) / 6.0
+    for i in range(1, row):
+        z = top - points[i] * per_t
+        d = z - z_0
+        log_w = z_0 - w_0 + d * (rise + d * (d * turn - 0.5 * bend))
+        points[2 * row + i] = min(log_w, z, 700.0)
+    for _ in range(rounds):
+        far = 0
+        for i in range(1, row):
+            log_w = points[2 * row + i]
+            w = elementary.exp(log_w)
+            r = top - points[i] * per_t - w - log_w
+            far += 0 if abs(r) < NEAR else 1
+            one = 1.0 + w
+            c = one * (one + 2.0 / 3.0 * r)
+            change = r * (c - 0.5 * r) / (one * (c - r))
+            points[row + i] = scale * (w * (1.0 + change)) + shift
+            d = min(max(change, -0.5), 0.5)
+            points[2 * row + i] = log_w + d * (1.0 - d * (0.5 - d * (1.0 / 3.0)))
+        if far == 0:
+            return
+    for i in range(1, row):
+        points[row + i] = Q_at(points[i], par)
+
+
+@inner
 def Q_gain(Q: float, par: FloatArray) -> float:
     """-dQ/dV_C1 where Q has this value."""
     w = (Q - par[T1_SHIFT]) / par[T1_SCALE]
@@ -73,11 +121,7 @@ def Q_gain(Q: float, par: FloatArray) -> float:
 @inner
 def to_series(values: FloatArray, series: FloatArray) -> None:
     """Chebyshev coefficients of the polynomial through values at POINTS."""
-    matrix_times(TO_SERIES_TURNED, values, series)
-    total = 0.0
-    for i in range(ORDER + 1):
-        total += TO_SERIES_TURNED[i, ORDER] * values[i]
-    series[ORDER] = total
+    times(TO_SERIES_TURNED, values, series)
 
 
 @inner

@@ -17,7 +17,7 @@ from tactile_lab.model.integrator import (
     TAU_L,
     V_FIRE,
     V_RESET,
-    Q_at,
+    Q_along,
     Q_gain,
     needed,
     particular,
@@ -27,6 +27,8 @@ from tactile_lab.model.integrator import (
 from tactile_lab.model.node_a import (
     DIVIDER,
     LAMBDA,
+    OF_B,
+    ROWS,
     TAU,
     V_T,
     B_at,
@@ -188,12 +190,11 @@ def _build(stamp: int) -> Callable[..., Any]:
         step_rows = np.empty((16, STEP_ROW))
         piece_rows = np.empty((16, PIECE_ROW))
         spikes = np.empty(64)
-        W = np.empty(ORDER)
-        B = np.empty(ORDER)
+        nodes = np.empty(ROWS)
         matrix = np.empty((ORDER, ORDER))
-        right = np.empty(ORDER)
         values = np.empty(ORDER + 1)
-        part = np.empty(ORDER + 1)
+        part = np.empty(3 * (ORDER + 1))
+        Q = part[ORDER + 1 :]
         a = np.empty(ORDER + 1)
         q = np.zeros(ORDER + 2)
         P = np.empty(2 * MOST_TERMS + 2)
@@ -232,7 +233,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             y_b = equilibrium(B1, par)
             low = min(y, y_a, y_b) - 1e-3 * par[V_T]
             high = max(y, y_a, y_b) + 1e-3 * par[V_T]
-            s = 0.0
+            s, B_s = 0.0, B0
             rate = par[LAMBDA] + B0 * math.exp(-y / par[V_T]) / par[V_T]
             slope = slope_at(B0, y, par)
             h = T
@@ -244,7 +245,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             while s < T:
                 if falls:
                     # V_C1 bends where exp(-V_C1/V_T) appears: not beyond it at once
-                    slope = slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y, par)
+                    slope = slope_at(B_s, y, par)
                     fall = max(0.5 * y, y - KNEE * par[V_T])
                     if y > par[V_T] and slope * h < -fall:
                         h = -fall / slope
@@ -259,8 +260,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                 biggest = max(abs(y), abs(high))
                 wanted = max(SHARE * tolerance, 6e-16 * biggest)
                 done, unsolved = collocate(
-                    s, h, y, V0, p, low, high, wanted, par, W, B, matrix, right
-                )
+                    s, h, y, B_s, V0, p, low, high, wanted, par, nodes, matrix,
+                )  # fmt: skip
                 if done < 0:
                     h *= 0.2
                     S[REJECTED] += 1.0
@@ -268,23 +269,22 @@ def _build(stamp: int) -> Callable[..., Any]:
                 S[ITERATIONS] += done
                 values[0] = y
                 for i in range(ORDER):
-                    values[i + 1] = y + W[i]
+                    values[i + 1] = y + nodes[i]
                 # the series of the change, for the sake of its last digits
                 part[0] = 0.0
                 for i in range(ORDER):
-                    part[i + 1] = W[i]
+                    part[i + 1] = nodes[i]
                 to_series(part, a)
                 a[0] += y
                 biggest = max(abs(y), abs(values[ORDER]))
                 left = missing(a, biggest)
                 stays = carried(a, left)
-                B_s = B0 if s == 0.0 else B_at(V_P_at(s, V0, p, par[TAU]), par)
                 rate = par[LAMBDA] + B_s * math.exp(-y / par[V_T]) / par[V_T]
                 rise = slope_at(B_s, y, par)
                 layer = unseen(rise, rate, h, left, a)
                 # exp(-V_C1/V_T) on the way up, gone before the first nodes; where a
                 # force holds V_C1 down, its slope alone is rounding times a huge rate
-                if min(W[0], NODES[0] * h * rise) > par[V_T] / 3.0:
+                if min(nodes[0], NODES[0] * h * rise) > par[V_T] / 3.0:
                     closing = (rate - par[LAMBDA]) * par[V_T]
                     layer = max(layer, closing * par[V_T] / rise)
                 if left + layer > 3.0 * wanted:
@@ -324,11 +324,11 @@ def _build(stamp: int) -> Callable[..., Any]:
                         else:
                             for i in range(ORDER + 1):
                                 part[i] = values[i]
+                        Q_along(part, par)
                         Q_low, Q_high = np.inf, -np.inf
                         for i in range(ORDER + 1):
-                            part[i] = Q_at(part[i], par)
-                            Q_low, Q_high = min(Q_low, part[i]), max(Q_high, part[i])
-                        to_series(part, q)
+                            Q_low, Q_high = min(Q_low, Q[i]), max(Q_high, Q[i])
+                        to_series(Q, q)
                         S[EXPANSIONS] += 1.0
                         span = par[V_FIRE] - par[V_RESET]
                         largest_Q = max(abs(Q_low), abs(Q_high))
@@ -419,7 +419,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if status != DONE:
                         break
                 s += h
-                y = values[ORDER]
+                y, B_s = values[ORDER], nodes[OF_B + ORDER - 1]
                 if not abs(y) < np.inf or not abs(S[VOLTAGE]) < np.inf:
                     status = NOT_FINITE
                     break

@@ -14,9 +14,12 @@ import math
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.model import elementary
 from tactile_lab.model.compiled import inner
+from tactile_lab.model.matrix import product_of
 from tactile_lab.model.tableau import (
     DIFFERENTIATE,
+    DIFFERENTIATE_TURNED,
     NODES,
     ORDER,
     SCHUR_Q,
@@ -24,10 +27,19 @@ from tactile_lab.model.tableau import (
     SCHUR_T,
 )
 
+times = product_of(ORDER)
+
 LOG_B_CAP = 230.0
 MOST_ITERATIONS = 14
 V_T, LAMBDA, DIVIDER, LOG_B0, PER_VOLT, TAU = range(6)
 """Where `par` holds V_T, lambda, D, ln(I_S/C1) + V_GS/(m V_T), 1/(m V_T) and tau."""
+CHANGE, OF_B, RATE, RIGHT, MOVED = range(0, 5 * ORDER, ORDER)
+"""Rows of a step's nodes: V_C1 less its start; B; h times -d/dV_C1 of Eq. (16); the
+right-hand side, then the correction; the derivative of the polynomial.
+
+One after the other in one array: nothing has to ask whether two rows overlap, so loops
+over the nodes run four at a time."""
+ROWS = 5 * ORDER
 
 
 @inner
@@ -66,24 +78,22 @@ def equilibrium(B: float, par: FloatArray) -> float:
 
 @inner
 def eliminate(matrix: FloatArray, right: FloatArray) -> None:
-    """Solve in place by Gaussian elimination.
+    """Solve in place by Gaussian elimination, in blocks of 2 x 2.
 
     Without pivoting: in `DIFFERENTIATE` plus any positive diagonal no entry grows by
     more than a few times, and each Newton iteration mends what the last one left.
     """
     for k in range(0, ORDER, 2):
-        # two columns at a time: half as many passes over the rest
         p, q = matrix[k, k], matrix[k, k + 1]
-        u = matrix[k + 1, k] / p
-        r = matrix[k + 1, k + 1] - u * q
-        matrix[k + 1, k + 1] = r
-        for j in range(k + 2, ORDER):
-            matrix[k + 1, j] -= u * matrix[k, j]
-        right[k + 1] -= u * right[k]
-        by_p, by_r = 1.0 / p, 1.0 / r
+        r, s = matrix[k + 1, k], matrix[k + 1, k + 1]
+        # the block's inverse takes its place
+        reciprocal = 1.0 / (p * s - q * r)
+        p, q, r, s = s * reciprocal, -q * reciprocal, -r * reciprocal, p * reciprocal
+        matrix[k, k], matrix[k, k + 1] = p, q
+        matrix[k + 1, k], matrix[k + 1, k + 1] = r, s
         for i in range(k + 2, ORDER):
-            one = matrix[i, k] * by_p
-            two = (matrix[i, k + 1] - one * q) * by_r
+            one = matrix[i, k] * p + matrix[i, k + 1] * r
+            two = matrix[i, k] * q + matrix[i, k + 1] * s
             for j in range(k + 2, ORDER):
                 matrix[i, j] -= one * matrix[k, j] + two * matrix[k + 1, j]
             right[i] -= one * right[k] + two * right[k + 1]
@@ -92,28 +102,14 @@ def eliminate(matrix: FloatArray, right: FloatArray) -> None:
         for j in range(k + 2, ORDER):
             one -= matrix[k, j] * right[j]
             two -= matrix[k + 1, j] * right[j]
-        right[k + 1] = two / matrix[k + 1, k + 1]
-        right[k] = (one - matrix[k, k + 1] * right[k + 1]) / matrix[k, k]
-
-
-@inner
-def matrix_times(columns: FloatArray, values: FloatArray, result: FloatArray) -> None:
-    """Fill ORDER of `result` with a matrix, given by its columns, times `values`."""
-    for n in range(0, ORDER, 4):  # four sums at once: none waits for another
-        a = b = c = d = 0.0
-        for i in range(columns.shape[0]):
-            value = values[i]
-            a += columns[i, n] * value
-            b += columns[i, n + 1] * value
-            c += columns[i, n + 2] * value
-            d += columns[i, n + 3] * value
-        result[n], result[n + 1], result[n + 2], result[n + 3] = a, b, c, d
+        right[k] = matrix[k, k] * one + matrix[k, k + 1] * two
+        right[k + 1] = matrix[k + 1, k] * one + matrix[k + 1, k + 1] * two
 
 
 @inner
 def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
     """Solve (DIFFERENTIATE + r) x = right in place, by its Schur form."""
-    matrix_times(SCHUR_Q, right, turned)
+    times(SCHUR_Q, right, turned)
     for k in range(ORDER - 2, -1, -2):
         one, two = turned[k], turned[k + 1]
         for j in range(k + 2, ORDER):
@@ -124,7 +120,33 @@ def solve_shifted(r: float, right: FloatArray, turned: FloatArray) -> None:
         reciprocal = 1.0 / (a * d - b * c)
         turned[k] = (d * one - b * two) * reciprocal
         turned[k + 1] = (a * two - c * one) * reciprocal
-    matrix_times(SCHUR_Q_TURNED, turned, right)
+    times(SCHUR_Q_TURNED, turned, right)
+
+
+@inner
+def B_along(
+    s: float, h: float, V0: float, p: float, par: FloatArray, nodes: FloatArray
+) -> None:
+    """Fill B at the nodes of a step from s to s + h."""
+    level = par[LOG_B0] + V0 * par[PER_VOLT]
+    swing = (V0 - p * par[TAU]) * par[PER_VOLT]
+    per_tau = 1.0 / par[TAU]
+    for i in range(ORDER):
+        e = elementary.expm1(-(s + h * NODES[i]) * per_tau)
+        nodes[OF_B + i] = elementary.exp(min(level + swing * e, LOG_B_CAP))
+
+
+@inner
+def residual(h: float, y0: float, par: FloatArray, nodes: FloatArray) -> None:
+    """Fill the right-hand side and its rate: Eq. (16) times h less what is moved."""
+    leak, divider, per_t = par[LAMBDA], par[DIVIDER], 1.0 / par[V_T]
+    for i in range(ORDER):
+        y = y0 + nodes[CHANGE + i]
+        power, part = elementary.parts(-y * per_t)
+        part *= power
+        slope = leak * (divider - y) + nodes[OF_B + i] * ((power - 1.0) + part)
+        nodes[RIGHT + i] = h * slope - nodes[MOVED + i]
+        nodes[RATE + i] = h * (leak + nodes[OF_B + i] * (power + part) * per_t)
 
 
 @inner
@@ -132,18 +154,17 @@ def collocate(
     s: float,
     h: float,
     y0: float,
+    B_s: float,
     V0: float,
     p: float,
     low: float,
     high: float,
     wanted: float,
     par: FloatArray,
-    W: FloatArray,
-    B: FloatArray,
+    nodes: FloatArray,
     matrix: FloatArray,
-    right: FloatArray,
 ) -> tuple[int, float]:
-    """One step from s to s + h: fill W with V_C1 - y0 at the nodes.
+    """One step from s, where B is `B_s`, to s + h: fill the rows of `nodes`.
 
     Where V_C1 stays so far above V_T that exp(-V_C1/V_T) is next to nothing, the
     equation is linear and solved by the Schur form of the rule, else by Newton's
@@ -151,10 +172,9 @@ def collocate(
     within [low, high], between which the exact solution lies. Returns the iterations,
     -1 where they do not converge, and what another one would still change, V.
     """
-    most = 0.0
-    for i in range(ORDER):
-        B[i] = B_at(V_P_at(s + h * NODES[i], V0, p, par[TAU]), par)
-        most = max(most, B[i])
+    right, moved = nodes[RIGHT:MOVED], nodes[MOVED:]
+    B_along(s, h, V0, p, par, nodes)
+    most = max(B_s, nodes[OF_B + ORDER - 1])  # V_P is monotone
     closing = most * math.exp(-low / par[V_T]) / (par[V_T] * par[LAMBDA])
     linear = closing < 1e-3
     # what the next iteration would change: by the part left out and by rounding, or
@@ -164,39 +184,30 @@ def collocate(
         enough = 1e-3 * wanted / max(closing, 2e-14)
     else:
         enough = math.sqrt(2e-3 * wanted * par[V_T])
-        slope = h * slope_at(B_at(V_P_at(s, V0, p, par[TAU]), par), y0, par)
+        slope = h * slope_at(B_s, y0, par)
     for i in range(ORDER):
-        W[i] = min(max(y0 + slope * NODES[i], low), high) - y0 if slope != 0.0 else 0.0
+        y = min(max(y0 + slope * NODES[i], low), high)
+        nodes[CHANGE + i] = y - y0 if slope != 0.0 else 0.0
     for iteration in range(MOST_ITERATIONS):
-        for i in range(ORDER):
-            y = y0 + W[i]
-            e, q = -1.0, 0.0
-            if closing > 1e-20:
-                q = math.exp(-y / par[V_T])
-                e = q - 1.0 if q < 0.5 else math.expm1(-y / par[V_T])
-            total = h * (par[LAMBDA] * (par[DIVIDER] - y) + B[i] * e)
-            if iteration or slope != 0.0:
+        times(DIFFERENTIATE_TURNED, nodes, moved)
+        residual(h, y0, par, nodes)
+        if not linear:
+            for i in range(ORDER):
                 for j in range(ORDER):
-                    total -= DIFFERENTIATE[i, j] * W[j]
-            right[i] = total
-            if not linear:
-                rate = h * (par[LAMBDA] + B[i] * q / par[V_T])
-                scale = 1.0 / (1.0 + rate)
-                for j in range(ORDER):
-                    matrix[i, j] = DIFFERENTIATE[i, j] * scale
-                matrix[i, i] += rate * scale
-                right[i] = total * scale
+                    matrix[i, j] = DIFFERENTIATE[i, j]
+                matrix[i, i] += nodes[RATE + i]
         if linear:
-            solve_shifted(h * par[LAMBDA], right, matrix[0])
+            solve_shifted(h * par[LAMBDA], right, moved)
         else:
             eliminate(matrix, right)
         largest = 0.0
         for i in range(ORDER):
             if not abs(right[i]) < np.inf:
                 return -1, 0.0
-            V = min(max(y0 + W[i] + right[i], low), high)
-            change = V - y0 - W[i]
-            W[i] += change if V in (low, high) else right[i]
+            before = nodes[CHANGE + i]
+            V = min(max(y0 + before + right[i], low), high)
+            kept = V in (low, high)
+            nodes[CHANGE + i] = V - y0 if kept else before + right[i]
             largest = max(largest, abs(right[i]))
         if largest < enough:
             share = max(closing, 2e-14) if linear else 0.5 * largest / par[V_T]

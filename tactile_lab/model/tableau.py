@@ -44,6 +44,7 @@ POINTS = np.concatenate([[0.0], NODES])
 """All 13 points of a step's polynomial, u in [0, 1]."""
 DIFFERENTIATE = np.ascontiguousarray(differentiation(POINTS)[1:, 1:])
 """d/du at the nodes of a polynomial that vanishes at u = 0."""
+DIFFERENTIATE_TURNED = np.ascontiguousarray(DIFFERENTIATE.T)
 TO_SERIES = np.ascontiguousarray(
     np.linalg.inv(chebyshev.chebvander(2 * POINTS - 1, ORDER))
 )
