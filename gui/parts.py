@@ -363,9 +363,14 @@ class Elided(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.set_whole(text)
 
-    def set_whole(self, text: str) -> None:
-        """Show `text`, as far as it fits."""
-        self.whole = text
+    def set_whole(self, text: str, end: str = "") -> None:
+        """Show `text`, as far as it fits.
+
+        Args:
+            text: on one line.
+            end: the end of it that tells most: what is left where not all of it fits.
+        """
+        self.whole, self._end = text, end
         self.setAccessibleName(text)
         self._shorten()
 
@@ -375,8 +380,12 @@ class Elided(QLabel):
         self._shorten()
 
     def _shorten(self) -> None:
-        room, way = self.contentsRect().width(), Qt.TextElideMode.ElideRight
-        self.setText(self.fontMetrics().elidedText(self.whole, way, room))
+        metrics, room = self.fontMetrics(), self.contentsRect().width()
+        left, right = Qt.TextElideMode.ElideLeft, Qt.TextElideMode.ElideRight
+        if self._end and metrics.horizontalAdvance(self.whole) > room:
+            self.setText(metrics.elidedText(self._end, left, room))
+        else:
+            self.setText(metrics.elidedText(self.whole, right, room))
 
 
 def empty(layout: QLayout) -> None:

@@ -164,8 +164,8 @@ class CalibrateField(Protocol):
             x_label="Coil current",
             x_unit="A",
             panels=(
-                Panel(label="B2", unit="T", series=tuple(fields)),
-                Panel(label="Less line", unit="T", series=tuple(left), height=1.35),
+                Panel(label="B_2", unit="T", series=tuple(fields)),
+                Panel(label="B_2 less line", unit="T", series=tuple(left), height=1.35),
             ),
         )
 

@@ -48,7 +48,8 @@ class QuestionCard(Overlay):
         if asked is None:
             self.hide()
             return
-        self._sign.setPixmap(pixmap("plug", self._theme.tokens.accent, 28))
+        sign = "plug" if asked.current is None else "edit"
+        self._sign.setPixmap(pixmap(sign, self._theme.tokens.accent, 28))
         self.text.setText(
             asked.text
             if asked.current is None

@@ -143,7 +143,8 @@ class Header(QFrame):
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Render identity, chips, clock and STOP."""
         self.badge.setVisible(snapshot.simulated)
-        self._title.set_whole(snapshot.title)
+        run = next((word for word in snapshot.title.split() if "_" in word), "")
+        self._title.set_whole(snapshot.title, end=run)
         bench = f"Bench: {snapshot.bench}" if snapshot.bench else "No bench"
         self._title.setToolTip(f"{snapshot.title}\n{bench}")
         while len(self._chips) < len(snapshot.instruments):

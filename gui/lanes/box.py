@@ -34,8 +34,8 @@ APART = 5
 NAMES = 14
 """Height at the top lane's top that is left free for the names of holds, px."""
 
-LINE, HALF = 13, 4
-"""Height that a number on the axis needs, and half of its figures', px."""
+LINE, CLOSE, HALF = 13, 11, 4
+"""Height that a number on the axis needs, at least, and half of its figures', px."""
 
 MOST = 12
 """Numbers on the axis of the highest lane."""
@@ -65,6 +65,11 @@ def heights_of(
         # told beside each other, they would overlap: both ends
         values, lines = [values[0], values[-1]], [lines[0], lines[-1]]
     words = [min(max(y, HALF), height - HALF) for y in lines]
+    for end, beside in ((0, 1), (-1, -2)):  # moved inwards, one may lie over the next
+        if len(words) > 2 and abs(words[end] - words[beside]) < CLOSE:
+            gone = beside if len(words) == 3 else end
+            for each in (values, lines, words):
+                del each[gone]
     apart = min(LINE, height - 2 * HALF)
     if len(words) == 2 and words[0] - words[1] < apart:  # not quite beside their lines
         top = max(HALF, min((sum(words) - apart) / 2, height - HALF - apart))

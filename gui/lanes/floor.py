@@ -148,8 +148,8 @@ def hold_names(painter: QPainter, stage: LaneContext) -> None:
     for hold, left, right in _visible(stage.source, stage.whole()):
         if right - left > 34:
             text = "recovery" if hold.pause else hold.label
-            with paint.clipped(painter, QRectF(left, 0, right - left - 3, 20)):
-                paint.write(painter, QPointF(left + 5, 10), text, stage.tokens.muted)
+            text = paint.shortened(text, right - left - 8)
+            paint.write(painter, QPointF(left + 5, 10), text, stage.tokens.muted)
 
 
 def _flags(
@@ -163,8 +163,8 @@ def _flags(
         painter.setPen(paint.pen(tokens.accent, Qt.PenStyle.DashLine))
         painter.drawLine(QLineF(x, frame.top, x, frame.bottom))
         painter.fillRect(QRectF(x, frame.top + 17, 4, 12), QColor(tokens.accent))
-        with paint.clipped(painter, QRectF(x, 0, min(following - x, FLAG) - 4, 40)):
-            paint.write(painter, QPointF(x + 8, frame.top + 23), text, tokens.accent)
+        text = paint.shortened(text, min(following - x, FLAG) - 12)
+        paint.write(painter, QPointF(x + 8, frame.top + 23), text, tokens.accent)
 
 
 def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:

@@ -22,6 +22,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import (
     QColor,
     QFont,
+    QFontMetricsF,
     QPainter,
     QPen,
     QPolygonF,
@@ -336,6 +337,17 @@ def write(
     painter.setPen(pen(colour))
     where = QPointF(round(at.x() - align * width), round(at.y() - height / 2))
     painter.drawStaticText(where, laid_out)
+
+
+def shortened(text: str, room: float) -> str:
+    """What of a text as `write` has it is shown in so many px; "" for nothing.
+
+    A name that just ended at a border would read as another: 160 mN as 160 m.
+    """
+    if _laid_out(text, 11)[1] <= room:
+        return text
+    cut = QFontMetricsF(sized(11)).elidedText(text, Qt.TextElideMode.ElideRight, room)
+    return cut if len(cut) > 1 else ""
 
 
 def write_on(

@@ -19,6 +19,8 @@ _PATHS = {
     "starred": '<path d="M12 3.5l2.6 5.4 5.9.8-4.3 4.1 1 5.9-5.2-2.8-5.2 2.8 1-5.9'
     '-4.3-4.1 5.9-.8z" fill="{c}"/>',
     "undo": '<path d="M4 12a8 8 0 1 0 2.6-5.9M4 4v5h5"/>',
+    "refresh": '<path d="M20 12a8 8 0 0 1-14 5.3M4 12a8 8 0 0 1 14-5.3M18 2.5v4.2h-4.2'
+    'M6 21.5v-4.2h4.2"/>',
     "follow": '<path d="M3 12h14M12 6.5l5.5 5.5-5.5 5.5M21 4v16"/>',
     "fit": '<path d="M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5"/>',
     "zoom": '<circle cx="10.5" cy="10.5" r="6.5"/><path d="M15.5 15.5L21 21'
@@ -35,14 +37,11 @@ _PATHS = {
     "help": '<circle cx="12" cy="12" r="9"/><path d="M9.3 9.3a2.8 2.8 0 1 1 4 2.6c-.9.4'
     '-1.3 1-1.3 2"/><path d="M12 17.2v.1"/>',
     "export": '<path d="M12 15V4M7.5 8L12 3.5 16.5 8M4 14v6h16v-6"/>',
-    "import": '<path d="M12 4v11M7.5 11l4.5 4.5 4.5-4.5M4 14v6h16v-6"/>',
     "close": '<path d="M6 6l12 12M18 6L6 18"/>',
     "up": '<path d="M12 19V5M6 11l6-6 6 6"/>',
     "down": '<path d="M12 5v14M6 13l6 6 6-6"/>',
     "eye": '<path d="M2.5 12S6 5.5 12 5.5 21.5 12 21.5 12 18 18.5 12 18.5 2.5 12 2.5 12z'
     '"/><circle cx="12" cy="12" r="3"/>',
-    "eye-off": '<path d="M2.5 12S6 5.5 12 5.5 21.5 12 21.5 12 18 18.5 12 18.5 2.5 12 2.5'
-    ' 12zM4 20L20 4"/>',
     "info": '<circle cx="12" cy="12" r="9"/><path d="M12 11v6M12 7.5v.1"/>',
     "warning": '<path d="M12 3.5L22 20.5H2zM12 10v5M12 17.6v.1"/>',
     "error": '<path d="M8 2.5h8L21.5 8v8L16 21.5H8L2.5 16V8zM8.5 8.5l7 7M15.5 8.5l-7 7"/>',
@@ -62,11 +61,7 @@ _PATHS = {
     "panel-left": '<rect x="3" y="4" width="18" height="16" rx="2"/><path d="M9.5 4v16"/>',
     "panel-right": '<rect x="3" y="4" width="18" height="16" rx="2"/>'
     '<path d="M14.5 4v16"/>',
-    "repeat": '<path d="M5 11V9a3 3 0 0 1 3-3h11M16 3l3 3-3 3M19 13v2a3 3 0 0 1-3 3H5'
-    'M8 21l-3-3 3-3"/>',
     "layers": '<path d="M12 3l9 5-9 5-9-5zM3 12.5l9 5 9-5"/>',
-    "theme": '<circle cx="12" cy="12" r="8.5"/>'
-    '<path d="M12 3.5a8.5 8.5 0 0 1 0 17z" fill="{c}"/>',
     "lamp-absent": '<g stroke-width="2.4"><circle cx="12" cy="12" r="8"/>'
     '<path d="M6.7 17.3L17.3 6.7"/></g>',
     "lamp-waiting": '<path d="M19.5 9.3A8 8 0 1 0 14.7 19.5" stroke-width="2.4"/>',
@@ -79,8 +74,6 @@ _PATHS = {
     'stroke-linejoin="bevel"/><path d="M12 9.3V14.7M12 17.9v.1"/></g>',
     "lamp-bad": '<g stroke-width="2.4"><path d="M12 3.3L21.3 20.7H2.7z" fill="{c}" '
     'stroke-linejoin="bevel"/><path d="M12 9.3V14.7M12 17.9v.1" stroke="#141414"/></g>',
-    "copy": '<rect x="8" y="8" width="12" height="12" rx="2"/>'
-    '<path d="M16 8V4H4v12h4"/>',
 }
 
 

@@ -85,7 +85,7 @@ class RunsView(QWidget):
         self.order.setAccessibleName("Order of runs")
         self.order.addItems(list(ORDERS))
         self._count = label("", "muted")
-        self.refresh = IconButton(theme, "undo", "Read the folder anew (F5)")
+        self.refresh = IconButton(theme, "refresh", "Read the folder anew (F5)")
         inner = QWidget()
         self._rows = column(inner, spacing=6)
         self.open = push("Open run", "primary")

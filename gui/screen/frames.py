@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from gui.lanes.live import LiveSource
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
+from gui.session.session import BY_HAND, MONITOR
 
 FAST, SLOW = 33, 100
 """Milliseconds between frames."""
@@ -18,6 +19,12 @@ NUMBERS = 0.1
 
 BUDGET = 0.6
 """Share of the interval a frame may cost before the interval is doubled."""
+
+UNKEPT = {
+    MONITOR: "Monitor: only Record keeps what is seen",
+    BY_HAND: "By hand: nothing of it is kept",
+}
+"""What stands below the lanes where no run is in them."""
 
 
 class FrameLoop(QObject):
@@ -82,13 +89,8 @@ class FrameLoop(QObject):
                 panels.centre.stack.show_values()
             planned = source.preview.holds if source.preview else []
             holds = planned if source.running and planned else source.holds
-            ending, kept = self._screen.ending, False
-            if session.monitor.alive:
-                ending = "Monitor: only Record keeps what is seen"
-            elif source is session.manual.source:
-                ending = "By hand: nothing of it is kept"
-            else:
-                kept = True
+            unkept = session.unkept
+            ending = UNKEPT[unkept] if unkept else self._screen.ending
             trial = session.run.trial
             panels.centre.progress.show_run(
                 snapshot,
@@ -97,7 +99,7 @@ class FrameLoop(QObject):
                 source.reach,
                 trial,
                 ending,
-                kept=kept,
+                kept=not unkept,
             )
             panels.setup.show_head(source.reach if session.state.in_run else None)
 

@@ -17,6 +17,7 @@ from gui.review.run_results import RunResults
 from gui.screen.panels import Panels
 from gui.screen.records import Records
 from gui.session.log import Severity
+from gui.session.session import BY_HAND
 from gui.state import WindowState
 from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
@@ -39,7 +40,7 @@ LATER = 1000
 COMPARED = 2000
 """Milliseconds after which a run in progress is compared with the model anew."""
 
-BY_HAND = ("force", "coil_current")
+DRIVEN = ("force", "coil_current")
 """What is seen while the coil is driven by hand."""
 
 WATCHED = ("V_C1", "V_C2", "V_K", "spikes")
@@ -291,8 +292,8 @@ class Screen(QObject):
         session = self._panels.session
         if session.monitor.alive:
             return lanes_for(WATCHED, twin=False)
-        if self.live is not None and self.live is session.manual.source:
-            return lanes_for(BY_HAND, twin=False)
+        if self.live is not None and session.unkept == BY_HAND:
+            return lanes_for(DRIVEN, twin=False)
         if self.run is not None:
             return lanes_for(self.run.signals, twin=self.run.has_model)
         expectation = session.plan_on_screen

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 REST = 30.0
 """Time after which a desk of which nothing is asked ends, s; it takes 60 MB."""
 
+MONITOR, BY_HAND = "Monitor", "By hand"
+"""What is seen live and is no run."""
+
 
 class Session(QObject):
     """The parts, and the rules between them.
@@ -54,6 +57,7 @@ class Session(QObject):
         run, monitor, manual: what uses the bench, one at a time.
         opened: what was opened from disk and is on screen, "" while nothing is.
         source: what is seen live: the run in progress or the last one, or the monitor.
+        unkept: what that is where it is no run, also after its end; "" for a run.
     """
 
     source_changed = Signal(object)
@@ -85,15 +89,16 @@ class Session(QObject):
         self._chips = Chips(self.status, self.bench, self.run, self.monitor)
         self.opened = ""
         self.source: LiveSource | None = None
+        self.unkept = ""
         self._after_monitor: tuple[Request, str, Expectation | None] | None = None
         self.status.faulted.connect(self.queue.hold)
         self.bench.ready.connect(self.queue.next)
         self.run.completed.connect(self.queue.next)
         self.plan.arrived.connect(self.status.changed)
-        self.run.begun.connect(self._show_live)
+        self.run.begun.connect(lambda source: self._show_live(source, ""))
         self.run.ended.connect(self.bench.confirm)
-        self.monitor.begun.connect(self._show_live)
-        self.manual.begun.connect(self._show_live)
+        self.monitor.begun.connect(lambda source: self._show_live(source, MONITOR))
+        self.manual.begun.connect(lambda source: self._show_live(source, BY_HAND))
         self.monitor.ended.connect(self._start_after_monitor)
 
     # --- what the window asks for
@@ -230,8 +235,8 @@ class Session(QObject):
 
     @property
     def name(self) -> str:
-        """Of what is on screen: opened from disk, else the last run; "" before any."""
-        return self.opened or self.run.name
+        """Of what is on screen: opened from disk, else seen live; "" before any."""
+        return self.opened or self.unkept or self.run.name
 
     @property
     def busy(self) -> bool:
@@ -294,8 +299,8 @@ class Session(QObject):
         """Who plans: the engine, which is then warm, or the desk beside a run."""
         return self.desk if self.busy else self.link
 
-    def _show_live(self, source: LiveSource) -> None:
-        self.source = source
+    def _show_live(self, source: LiveSource, unkept: str) -> None:
+        self.source, self.unkept = source, unkept
         self.source_changed.emit(source)
 
     def _start_after_monitor(self) -> None:

@@ -336,7 +336,7 @@ class SetupPanel(QFrame):
 
     def _lay_out(self) -> None:
         self.help = IconButton(self._theme, "help", "Help on this panel")
-        self._open = IconButton(self._theme, "folder", "Open a scene (Ctrl+O)")
+        self._open = IconButton(self._theme, "file", "Open a scene (Ctrl+O)")
         self._open.clicked.connect(self.scene_wanted)
         self._reset = IconButton(self._theme, "undo", "Reset to defaults")
         self._reset.clicked.connect(self.form.reset)

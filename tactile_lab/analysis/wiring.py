@@ -251,7 +251,7 @@ def _drive(signal: str, found: SignalLevels, expected: SignalLevels) -> ChannelV
     if signal == "coil_current" and shunt_agrees(change, wanted):
         return ChannelVerdict(signal, True, says)
     if 0.5 < ratio < 2:
-        says += f", {ratio:.2g} times"
+        says += f", {100 * ratio:.0f} % of it"
         if signal == "coil_current":
             return ChannelVerdict(
                 signal, False, f"{says}: check the shunt and its resistance in the "

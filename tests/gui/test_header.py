@@ -50,6 +50,18 @@ def test_no_chip_is_cut_at_any_width(
             assert chip.value.width() >= chip.value.sizeHint().width()
 
 
+def test_a_narrow_title_ends_with_what_tells_most(
+    app: QApplication, header: Header
+) -> None:
+    """It was cut to "Looking at 2026-11-2…"."""
+    run = "2026-11-23_115548_demo"
+    header.resize(1280, 68)
+    header.render_snapshot(replace(SHOWN, title=f"Looking at {run}", instruments=VIEWS))
+    app.processEvents()
+    said = header._title.text()
+    assert said.removeprefix("…") and run.endswith(said.removeprefix("…"))
+
+
 def test_wide_chips_say_more(app: QApplication, header: Header) -> None:
     widths = []
     four = (*VIEWS[:2], *VIEWS[3:])

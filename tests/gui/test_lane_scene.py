@@ -13,6 +13,7 @@ from gui.lanes.box import heights_of
 from gui.lanes.floor import AXIS
 from gui.lanes.lane import lanes_for
 from gui.lanes.live import LiveSource
+from gui.lanes.paint import shortened
 from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
 from gui.look.theme import Theme
@@ -40,7 +41,11 @@ def test_the_threshold_is_dragged_to_where_the_next_run_counts(
 
 @pytest.mark.parametrize(
     ("low", "high", "height"),
-    [(-25, 200, 39), (3.8, 4.45, 55), (-5, 55, 500), (-1, 15, 20)],
+    [
+        *((-25, 200, 39), (3.8, 4.45, 55), (-5, 55, 500), (-1, 15, 20)),
+        (0.47, 2.7, 60),  # the lowest, moved inwards, lay over the next
+        *((0.01 * low, 2.7, height) for low in range(0, 60, 7) for height in (28, 66)),
+    ],
 )
 def test_a_low_axis_tells_two_heights_and_a_high_one_not_too_many(low, high, height):
     found = heights_of(low, high, height)
@@ -49,6 +54,12 @@ def test_a_low_axis_tells_two_heights_and_a_high_one_not_too_many(low, high, hei
     assert all(abs(line - told) <= 7 for _, line, told in found)
     heights = [told for _, _, told in found]
     assert min(b - a for b, a in pairwise(heights)) >= 11, "none lies over another"
+
+
+def test_a_name_that_is_cut_off_shows_that_it_is(app) -> None:
+    assert shortened("160 mN", 60) == "160 mN"
+    assert shortened("160 mN", 36).endswith("…"), "not 160 m"
+    assert shortened("160 mN", 8) == ""
 
 
 def test_plots_lie_beside_their_cards(app, stack):

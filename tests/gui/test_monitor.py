@@ -43,3 +43,5 @@ def test_record_keeps_what_the_monitor_saw(lab) -> None:
     session.show_monitor(False)
     lab.until(lambda: not session.monitor.alive)
     lab.until(lambda: not window.centre.monitor_bar.isVisible())
+    lab.until(lambda: window.centre.progress.text.startswith("Monitor: only Record"))
+    assert session.name == "Monitor", "what is in the lanes is not the last run"

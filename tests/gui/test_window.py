@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from gui.app import FRAME, fit
+from gui.parts import IconButton
 
 
 def test_letters_are_shortcuts_only_outside_text_fields(lab) -> None:
@@ -58,6 +59,19 @@ def test_every_control_has_an_accessible_name(lab) -> None:
             if widget.isVisibleTo(lab.window) and widget.objectName() != "qt_edit":
                 named = widget.accessibleName() or widget.text() or widget.toolTip()
                 assert named, widget
+
+
+ALIKE = {"help": "about what it stands in", "star": "keeps a preset, or a run"}
+"""Icons whose act depends on their place."""
+
+
+def test_an_icon_stands_for_one_act(lab) -> None:
+    """Reading runs anew looked like the reset of the form, a scene like a folder."""
+    acts: dict[str, set[str]] = {}
+    for button in lab.window.findChildren(IconButton):
+        acts.setdefault(button._icon, set()).add(button.accessibleName())
+    several = {icon: acts[icon] for icon in acts.keys() - ALIKE if len(acts[icon]) > 1}
+    assert all(all(a.startswith("Zoom to") for a in s) for s in several.values())
 
 
 def too_small(window) -> list[str]:
