@@ -112,6 +112,8 @@ class Session:
     def enter(self) -> None:
         """Wait for the window and its bench."""
         self.wait(lambda: self.now["state"] == "ready", 180, "ready")
+        # the wheel on the bare desktop would go to another, where no window is
+        self.tool("set_num_desktops", 1)
         self.main = self.tool("search", "--onlyvisible", "--name", ".*Tactile Lab")
         self.main = self.main.split()[0]
 
