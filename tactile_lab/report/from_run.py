@@ -113,13 +113,21 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
         followers=scene.bench.followers,
         temperature=scene.sensor.temperature_uncertainty,
         clock=clock or 0.0,
-        dated=applied.uncertainty is not None,
+        dated=applied.uncertainty() is not None,
     )
 
 
-def _clock(run: Run, scene: Scene) -> float | None:
-    """How far measured times may lie from the current's, s; None: never told."""
-    told = run.applied.uncertainty
+def _clock(
+    run: Run, scene: Scene, start: float = -np.inf, end: float = np.inf
+) -> float | None:
+    """How far measured times may lie from the current's, s; None: never told.
+
+    Args:
+        run: of which.
+        scene: of it.
+        start, end: between which the current is meant, s.
+    """
+    told = run.applied.uncertainty(start, end)
     if told is not None:
         return told
     known = run.records("segments")["uncertainty"]
@@ -167,10 +175,18 @@ def stimulus_onset(scene: Scene) -> float:
 
 def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
     """The trials, and what came after the last in a run that ended before its time."""
-    spikes, clock = run.spikes["time"], _clock(run, run.scene)
+    spikes, scene = run.spikes["time"], run.scene
     blind = unsearched(run)
     trials = [
-        _trial(row, complete, spikes, onset, run.force, clock, blind)
+        _trial(
+            row,
+            complete,
+            spikes,
+            onset,
+            run.force,
+            _clock(run, scene, float(row["start"]), float(row["end"])),
+            blind,
+        )
         for row, complete in zip(run.trials, run.completed.tolist(), strict=True)
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
@@ -184,7 +200,7 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
                 duration=run.duration - end,
                 spike_times=late,
                 complete=False,
-                clock_uncertainty=clock,
+                clock_uncertainty=_clock(run, scene, end, run.duration),
             )
         )
     return tuple(trials)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.scope import CLOCK_ERROR
 
 Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
 """The coil current between two times, s: its bins' middles, s, and means, A."""
@@ -45,22 +46,31 @@ class AppliedCurrent:
         steps: shape (n, 2): from that time on, s, the source gives this current, A.
         ends: shape (n,): when the host heard of what came after each step, s.
         edges: number of steps whose time the shunt gave, points of lists among them.
-        lead: by how much those came before the host heard of them, s (median): all
-            others were moved by as much; 0 where there were too few.
+        lead: by how much those came before the host heard of them, s (median): the
+            others were moved as those next to them; 0 where there were too few.
+        away: shape (n,): how long before the first of those or after the last each
+            step came, s; 0 between them.
     """
 
     steps: FloatArray
     ends: FloatArray
     edges: int
     lead: float
+    away: FloatArray
 
-    @property
-    def uncertainty(self) -> float | None:
+    def uncertainty(self, start: float = -np.inf, end: float = np.inf) -> float | None:
         """Half of the 95 % band of the steps' times against the samples, s.
 
-        A bin of the shunt; None where it told too few, and the clocks alone do.
+        A bin of the shunt, and what the clocks may part where it showed nothing any
+        more; None where it told too few, and the clocks alone do.
+
+        Args:
+            start, end: between which steps are asked for, s.
         """
-        return BIN_TIME if self.edges >= ENOUGH else None
+        if self.edges < ENOUGH:
+            return None
+        inside = (self.steps[:, 0] >= start) & (self.steps[:, 0] <= end)
+        return BIN_TIME + CLOCK_ERROR * float(self.away[inside].max(initial=0.0))
 
 
 def applied_current(
@@ -86,7 +96,7 @@ def applied_current(
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
-        return AppliedCurrent(np.empty((0, 2)), np.empty(0), 0, 0.0)
+        return AppliedCurrent(np.empty((0, 2)), np.empty(0), 0, 0.0, np.empty(0))
     first = np.flatnonzero(np.abs(np.diff(sent, prepend=np.inf)) > SAME)
     last = np.append(first[1:], t.size)
     level = np.array(
@@ -95,21 +105,35 @@ def applied_current(
     dated = np.broadcast_to(np.asarray(listed), t.shape)[first]
     own_clock = dated > 0
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
-    edges, lead = 0, 0.0
+    edges, lead, away = 0, 0.0, np.zeros(begin.size)
     if shunt is not None:
         seen = np.full(begin.size, np.nan)
         for i in np.flatnonzero(~own_clock[1:]) + 1:
             at = _edge(shunt, begin[i - 1], begin[i], level[i - 1], level[i])
             seen[i] = np.nan if at is None else at - math.log(2) * coil_lag
-        edges = int(np.isfinite(seen).sum())
-        if edges >= ENOUGH:  # the small ones came as early as those the shunt shows
-            lead = float(np.nanmedian(begin - seen))
-        begin[1:] -= np.where(own_clock[1:], 0.0, lead)
-        begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
+        shown = np.isfinite(seen)
+        edges = int(shown.sum())
+        if edges >= ENOUGH:
+            early, at = begin[shown] - seen[shown], begin[shown]
+            lead = float(np.median(early))
+            moved = ~own_clock & (np.arange(begin.size) > 0)
+            # the small ones came as early as those next to them that the shunt shows:
+            # the clocks part in time
+            begin[moved] -= np.interp(begin[moved], at, _of_three(early))
+            away[moved] = np.maximum(at[0] - t[first], t[first] - at[-1])[moved]
+            away = np.maximum(away, 0.0)
+        begin = np.maximum.accumulate(np.where(shown, seen, begin))
     steps = np.column_stack([begin, level])
     by_host = bool(np.any(dated == BY_HOST))
     edges = 0 if by_host else edges + int(np.sum(dated == BY_SAMPLES))
-    return AppliedCurrent(steps, ends, edges, lead)
+    return AppliedCurrent(steps, ends, edges, lead, away)
+
+
+def _of_three(values: FloatArray) -> FloatArray:
+    """Each value, or where it lies outside those beside it the nearer of them."""
+    beside = np.pad(values, 1, mode="edge")
+    middle: FloatArray = np.median([beside[:-2], values, beside[2:]], axis=0)
+    return middle
 
 
 def _level(sent: float, read: FloatArray) -> float:

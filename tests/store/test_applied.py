@@ -23,7 +23,7 @@ def test_points_of_a_list_stand_where_they_are_told():
     listed = np.append(np.zeros(time.size), np.full(39, BY_SAMPLES))
     reads = np.append(read, np.full(39, np.nan))
     found = applied_current(times, levels, reads, shunt(), listed=listed)
-    assert found.uncertainty is not None
+    assert found.uncertainty() is not None
     assert np.array_equal(found.steps[-39:, 0], later)
     listed[listed > 0] = BY_HOST
     assert applied_current(times, levels, reads, shunt(), listed=listed).edges == 0
@@ -106,6 +106,27 @@ def test_steps_the_shunt_cannot_show_come_as_early_as_the_others():
     assert found.edges == 6
     assert found.lead == pytest.approx(0.03, abs=1.5e-3)
     assert found.steps[1:, 0] == pytest.approx(came[1:], abs=2e-3)
+
+
+def test_steps_the_shunt_cannot_show_follow_clocks_that_part():
+    """A slow sine before a fast one was dated by the fast: 0.8 ms off in 40 s."""
+    drift = 1e-4
+    came = np.array([0.0, 0.5, 1.0, 5.0, 38.0, 38.5, 39.0, 39.5, 60.0])
+    levels = np.array([0.0, 0.5, 1.0, 1.01, 0.5, 0.0, 0.5, 0.0, 0.01])
+    time = np.arange(0, 62, 1e-3) + 5e-4
+    value = levels[np.searchsorted(came, time, side="right") - 1]
+
+    def shunt(start, end):
+        inside = (time >= start) & (time < end)
+        return time[inside], value[inside]
+
+    heard = came * (1 + drift) + 0.03
+    heard[6] += 0.02  # an answer that was lost once tells nothing of the clocks
+    found = applied_current(heard, levels, levels * np.nan, shunt)
+    assert found.steps[3, 0] == pytest.approx(came[3], abs=5e-4)
+    # nothing tells of the clocks after the last edge that is seen
+    away = found.uncertainty(50.0) - found.uncertainty(0.0, 50.0)
+    assert away == pytest.approx(1e-4 * 20.5, rel=0.01)
 
 
 def test_a_long_level_is_read_from_the_pyramid(bench, folder):
