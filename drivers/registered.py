@@ -118,7 +118,7 @@ def _picoscope(table: ScopeSpec, clock: Clock) -> PicoScope:
 def _picoscope_capability(table: ScopeSpec) -> ScopeCapability:
     from drivers.picoscope.generator import CAPABILITY
     from drivers.picoscope.scope import GUARANTEED
-    from drivers.picoscope.sdk import INPUTS, RANGES
+    from drivers.picoscope.sdk import INPUTS, OFFSETS, RANGES
 
     return ScopeCapability(
         gapless=True,
@@ -126,6 +126,7 @@ def _picoscope_capability(table: ScopeSpec) -> ScopeCapability:
         ranges=tuple(RANGES),
         bits=8,
         fastest=GUARANTEED,
+        offsets=OFFSETS,
         generator=CAPABILITY,
     )
 

@@ -101,6 +101,8 @@ class ScopeCapability:
         ranges: full-scale ranges, V.
         bits: resolution of its converter.
         fastest: highest streaming rate for 1, 2, ... enabled channels, S/s.
+        offsets: largest analogue offset at each of `ranges`, V, either sign; empty
+            where only the open scope tells.
         generator: what its waveform generator can, or None.
     """
 
@@ -109,6 +111,7 @@ class ScopeCapability:
     ranges: tuple[float, ...]
     bits: int
     fastest: tuple[float, ...]
+    offsets: tuple[float, ...] = ()
     generator: GeneratorCapability | None = None
 
 

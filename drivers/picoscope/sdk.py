@@ -93,6 +93,9 @@ RANGES = {
 }  # fmt: skip
 """Full scale, V, to PS3000A_RANGE for 3000D models."""
 
+OFFSETS = (0.25,) * 4 + (2.5,) * 3 + (20.0,) * 3
+"""Largest analogue offset at each of `RANGES`, V, as ps3000aApi.h has it."""
+
 TIME_UNITS = {1e9: 2, 1e6: 3, 1e3: 4}
 """Number of a unit in one second (ns, us, ms) to PS3000A_TIME_UNITS."""
 

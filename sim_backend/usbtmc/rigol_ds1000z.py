@@ -164,7 +164,8 @@ class SimulatedDs1000z:
             channel.scale = number(argument, least, 10 * channel.probe)
 
         def offset(argument: str) -> None:
-            channel.offset = number(argument, -1000, 1000)
+            most = (100 if channel.scale >= 0.5 * channel.probe else 2) * channel.probe
+            channel.offset = number(argument, -most, most)
 
         def couple(argument: str) -> None:
             channel.coupling = _word(argument, {"AC": "AC", "DC": "DC"})

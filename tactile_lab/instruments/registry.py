@@ -246,7 +246,7 @@ def check_scope(
         rate: asked for, S/s.
 
     Raises:
-        LimitError: an input, range, coupling or rate the scope does not have.
+        LimitError: an input, range, offset, coupling or rate the scope does not have.
     """
     driver = find_driver(ScopeDriver, table)
     capability = driver.capability(table)

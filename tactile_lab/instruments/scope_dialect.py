@@ -74,6 +74,7 @@ class ScopeDialect(Dialect):
         divisions_high: from the middle of the screen to its edge: the full scale.
         codes_per_division: steps of the converter.
         scales: V a division.
+        offsets: largest offset at each of them, V, either sign; empty: not known.
         timebases: s a division.
         depth: samples of a record for 1, 2, ... enabled inputs.
         read_at_once: most samples of one answer.
@@ -91,6 +92,7 @@ class ScopeDialect(Dialect):
     divisions_high: int = Field(ge=1)
     codes_per_division: int = Field(ge=1)
     scales: Numbers
+    offsets: Numbers = ()
     timebases: Timebases
     depth: Annotated[dict[int, int], BeforeValidator(_numbered)]
     read_at_once: int = Field(ge=1)
@@ -110,6 +112,7 @@ class ScopeDialect(Dialect):
             ranges=self.ranges,
             bits=self.bits,
             fastest=self.fastest,
+            offsets=self.offsets,
         )
 
     def timebase(self, interval: float, inputs: int) -> float:

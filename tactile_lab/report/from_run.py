@@ -125,7 +125,8 @@ def _clock(
     Args:
         run: of which.
         scene: of it.
-        start, end: between which the current is meant, s.
+        start: from which time on the current is meant, s.
+        end: up to which, s.
     """
     told = run.applied.uncertainty(start, end)
     if told is not None:

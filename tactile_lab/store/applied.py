@@ -65,7 +65,8 @@ class AppliedCurrent:
         more; None where it told too few, and the clocks alone do.
 
         Args:
-            start, end: between which steps are asked for, s.
+            start: from which time on steps are asked for, s.
+            end: up to which, s.
         """
         if self.edges < ENOUGH:
             return None

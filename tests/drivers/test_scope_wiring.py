@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.picoscope.scope import PicoScope
-from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import LimitError
 from tactile_lab.instruments.channels import check_channels, described
+from tactile_lab.instruments.registry import scope_capability
+from tactile_lab.planning.plan import plan
+from tactile_lab.scene.load import load
 from tactile_lab.scope import Channel
 
+SCENE = "demo"
 # known before the scope is opened, so a bench can be refused before that
-CAPABILITY = PicoScope(clock=SimulatedClock()).capability
+CAPABILITY = scope_capability(load(SCENE).bench.scope)
 
 
 def channel(**change: object) -> Channel:
@@ -26,6 +28,11 @@ def channel(**change: object) -> Channel:
         ([channel(), channel(signal="V_C1")], "V_K and V_C1 are both wired to .* A"),
         ([channel(range=3.0)], r"range 3 V, none of the scope's: 0\.02, 0\.05"),
         ([channel(coupling="GND")], "Coupling 'GND' of V_K is none of AC, DC"),
+        (
+            [channel(range=0.2, offset=-2.5)],
+            "−2.5 V of V_K is beyond ±250 mV.* 200 mV.* a range of 500 mV or more",
+        ),
+        ([channel(range=20.0, offset=21.0)], "21 V of V_K is beyond ±20 V.* offset.$"),
     ],
 )
 def test_refused(channels: list[Channel], text: str) -> None:
@@ -36,6 +43,14 @@ def test_refused(channels: list[Channel], text: str) -> None:
 def test_all_ranges_and_inputs_are_taken() -> None:
     for volts in CAPABILITY.ranges:
         check_channels([channel(input=i, range=volts) for i in "ABCD"], CAPABILITY)
+
+
+def test_an_offset_beyond_its_range_is_refused_by_the_plan() -> None:
+    """The plan took it, and the run failed once the scope was open."""
+    wired = '{signal="V_C1",input="A",range="0.2 V",offset="-2.5 V"}'
+    changes = [f"bench.scope.channels=[{wired}]", 'record.signals=["V_C1"]']
+    with pytest.raises(LimitError, match="beyond ±250 mV"):
+        plan(load(SCENE, changes), preview=False)
 
 
 def test_in_words() -> None:
