@@ -112,13 +112,14 @@ class CalibrateField(Protocol):
             found = fit_field(_steps(run), run.warming)
         except NotIdentifiableError as reason:
             return Conclusion((f"No calibration: {reason}.",))
-        slope, loop = found.slope, show(found.half_width, "T", 3)
+        slope, loop, along = found.slope, found.half_width, found.half_width_current
         sentences = (
             f"B2 rises by {plus_minus(slope.value, slope.half, 'T')}/A, from "
             f"{plus_minus(found.offset.value, found.offset.half, 'T')} at 0 A (95 %).",
-            f"The loop is {loop} or {show(found.half_width_current, 'A', 3)} to either "
-            f"side; one field value is known to ±{show(found.uncertainty, 'T', 3)} "
-            "(95 %).",
+            f"The loop is {plus_minus(loop.value, loop.half, 'T')} or "
+            f"{plus_minus(along.value, along.half, 'A')} to either side (95 %); one "
+            f"field is known to ±{show(found.uncertainty, 'T', 3)} (of those that "
+            "come from saturation, at the loop's edge, 95 %; others lie within).",
             *_unlike_the_bench(found.slope.value, run.field_per_ampere),
             *_steady(found),
             *(f"{warning[0].upper()}{warning[1:]}." for warning in found.warnings),
@@ -128,10 +129,12 @@ class CalibrateField(Protocol):
             "slope_low_95": slope.low,
             "slope_high_95": slope.high,
             "offset_T": found.offset.value,
-            "half_width_T": found.half_width,
-            "half_width_A": found.half_width_current,
+            "half_width_T": loop.value,
+            "half_width_uncertainty_T_95": loop.half,
+            "half_width_A": along.value,
             "uncertainty_T": found.uncertainty,
-            "drift_T": found.drift,
+            "drift_T": found.drift and found.drift.value,
+            "drift_uncertainty_T_95": found.drift and found.drift.half,
             "warming_K": found.warming,
             "current_A": found.current.tolist(),
             "field_T": found.field.tolist(),
@@ -222,11 +225,15 @@ def _steady(found: FieldCalibration) -> Iterator[str]:
     """What the checks of drift and temperature gave."""
     if found.drift is not None:
         yield (
-            f"At the same current and history the field changed by "
-            f"{show(found.drift, 'T', 2)} from begin to end."
+            "At the same current and history the field changed by "
+            f"{plus_minus(found.drift.value, found.drift.half, 'T')} from begin to end "
+            "(95 %)."
         )
     if found.warming is not None:
-        yield f"The winding became {found.warming:.0f} K warmer (by its resistance)."
+        yield (
+            f"The winding became {found.warming:.0f} K warmer by its resistance (no "
+            "interval: sources state none for what they read)."
+        )
 
 
 def _file(run: Measurement, found: FieldCalibration) -> dict[str, str]:

@@ -78,6 +78,11 @@ class Estimate:
             self.value + math.sqrt((self.high - self.value) ** 2 + more),
         )
 
+    def scaled(self, factor: float) -> Estimate:
+        """In another unit: times a `factor` that is exact."""
+        low, high = sorted((self.low * factor, self.high * factor))
+        return Estimate(self.value * factor, abs(self.error * factor), low, high)
+
     def to_dict(self) -> dict[str, float]:
         """For JSON; units are in the key it is put under."""
         return {

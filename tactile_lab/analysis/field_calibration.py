@@ -22,6 +22,10 @@ DRIFT = 0.02
 """Drift over the largest field beyond which there is no calibration."""
 WARMING = 30.0
 """Warming of the winding beyond which a calibration is doubted, K."""
+MANY = 10_000
+"""Degrees of freedom of what all readings tell together: a normal distribution's."""
+Z90 = 1.6448536269514722
+"""Of a normal distribution, 5 % lie above: an edge is left to one side only."""
 READ_BACK_NOISE = 2e-4
 """Current by which an end may differ from the whole mA it was asked to be, A. The field
 is known no better than to what it makes of that."""
@@ -61,20 +65,22 @@ class FieldCalibration:
         residual: standard deviation of the mean curve about the line, T.
         drift: of the field at the same current and history from the begin to the end,
             T; None where no step was repeated.
-        warming: of the winding meanwhile, K; None where it is not known.
-        uncertainty: half of the 95 % band of one field value, hysteresis and drift
-            included, T.
+        warming: of the winding meanwhile, K; None where it is not known. It has no
+            interval: a source states none for the resistance that it reads.
+        uncertainty: half of the 95 % band of one field value, T: of those that came
+            from saturation, which lie at the loop's edge, it holds 95 %, readings and
+            drift included; all others lie further inside.
         warnings: what to look at before it is used.
     """
 
     current: FloatArray
     field: FloatArray
-    half_width: float
-    half_width_current: float
+    half_width: Estimate
+    half_width_current: Estimate
     slope: Estimate
     offset: Estimate
     residual: float
-    drift: float | None
+    drift: Estimate | None
     warming: float | None
     uncertainty: float
     warnings: tuple[str, ...]
@@ -112,14 +118,16 @@ def fit_field(
         raise NotIdentifiableError("the field does not follow the current")
     half_width = abs(float(np.interp(0.0, current, (upper - lower) / 2)))
     noise = float(np.sqrt(np.mean([step.error**2 for step in steps])))
+    # it is half of a difference of two, as the field is half of their sum
+    loop = Estimate.of(half_width, noise / math.sqrt(2), MANY)
     warnings = []
     full = float(np.max(np.abs(field)))
     drift = _drift(steps, slope)
-    if drift is not None and abs(drift) > DRIFT * full:
+    if drift is not None and abs(drift.value) > DRIFT * full:
         raise NotIdentifiableError(
-            f"the field at the same current drifted by {show(drift, 'T', 3)} from "
-            f"begin to end ({100 * abs(drift) / full:.1f} % of full scale, limit "
-            f"{100 * DRIFT:g} %): clamp the probe, let meter and coil warm up, zero "
+            f"the field at the same current drifted by {show(drift.value, 'T', 3)} from "
+            f"begin to end ({100 * abs(drift.value) / full:.1f} % of full scale, "
+            f"limit {100 * DRIFT:g} %): clamp the probe, let meter and coil warm up, zero "
             "the meter, and calibrate again"
         )
     if warming is not None and warming > WARMING:
@@ -138,29 +146,45 @@ def fit_field(
     return FieldCalibration(
         current=current,
         field=field,
-        half_width=half_width,
-        half_width_current=half_width / abs(slope),
+        half_width=loop,
+        half_width_current=loop.scaled(1 / abs(slope)),
         slope=line.slope,
         offset=line.offset,
         residual=line.scatter,
         drift=drift,
         warming=warming,
-        # a field that came from saturation lies at the loop's edge, not about its mean
-        uncertainty=half_width + math.hypot(2 * noise, drift or 0.0),
+        uncertainty=half_width + Z90 * _edge_error(noise, drift),
         warnings=tuple(warnings),
     )
 
 
-def _drift(steps: Sequence[FieldStep], slope: float) -> float | None:
+def _edge_error(noise: float, drift: Estimate | None) -> float:
+    """Standard uncertainty of either edge of the loop, T.
+
+    A third of the readings' variance is left in a field between two steps of both
+    branches, and half of it in the loop at 0 A. What drifted, beyond what the readings
+    make of nothing, lies evenly within that (GUM 4.3.7).
+    """
+    moved = 0.0
+    if drift is not None:
+        moved = max(0.0, drift.value**2 - drift.error**2) / 3
+    return math.sqrt(noise**2 * (1 / 3 + 1 / 2) + moved)
+
+
+def _drift(steps: Sequence[FieldStep], slope: float) -> Estimate | None:
     """Mean change of the field on the repeated steps, T."""
     first = [s for s in steps if s.branch == "falling"]
-    changes = []
+    changes, errors = [], []
     for again in (s for s in steps if s.branch == "again"):
         once = min(first, key=lambda s: abs(s.current - again.current))
         changes.append(
             again.field - once.field - slope * (again.current - once.current)
         )
-    return float(np.mean(changes)) if changes else None
+        errors += [again.error, once.error]
+    if not changes:
+        return None
+    error = math.sqrt(sum(error**2 for error in errors)) / len(changes)
+    return Estimate.of(float(np.mean(changes)), error, MANY)
 
 
 def _branch(steps: Sequence[FieldStep], name: str) -> tuple[FloatArray, FloatArray]:
@@ -204,6 +228,7 @@ def calibration_text(
         date: day of the measurement.
         temperature: of the room meanwhile, and who says so.
     """
+    moved = calibration.drift
     rows = "\n".join(
         f"{i:.6g},{b:.9g}"
         for i, b in zip(calibration.current, calibration.field, strict=True)
@@ -215,8 +240,8 @@ def calibration_text(
         VALID_UNTIL: (date + VALID).isoformat(),
         "slope T/A": f"{calibration.slope.value:.6g} ({calibration.slope.low:.6g} to "
         f"{calibration.slope.high:.6g})",
-        "loop half-width T": f"{calibration.half_width:.3g}",
-        "drift T": _known(calibration.drift),
+        "loop half-width T": f"{calibration.half_width.value:.3g}",
+        "drift T": _known(None if moved is None else moved.value),
         "temperature": temperature,
         "winding warmed by K": _known(calibration.warming),
         UNCERTAINTY["T"]: f"{calibration.uncertainty:.3g}",
