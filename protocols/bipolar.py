@@ -19,6 +19,7 @@ from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.drain_current import BOXCAR_3DB
+from tactile_lab.model.specimen import RESISTOR
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import step
@@ -83,7 +84,8 @@ class Bipolar(Levels):
         ]
         said = [
             "; ".join(_told(c) for c in found)
-            + " (95 %), from before each push to when its force was there.",
+            + f" (95 %, R1 and R2 known to {100 * RESISTOR:g} %), from before each "
+            "push to when its force was there.",
             f"Per force: {'; '.join(_sensitivity(c) for c in found)}.",
         ]
         if run.force_uncertainty is None:
@@ -193,6 +195,7 @@ def _changes(
         conductance = 1 / run.circuit.R1 + 1 / run.circuit.R2
     code = (0.0 if V_C1 is None else V_C1.code or 0.0) * conductance
     steps = run.step_bias("V_C1") * conductance
+    resistors = _resistors(run.circuit, conductance)
     moved = [fitted(*cause) for cause in ((code, 0.0), (0.0, steps)) if any(cause)]
     log_tau = math.log(decay.tau.value)
     logarithm = Estimate(
@@ -216,8 +219,16 @@ def _changes(
             float(changed[i]) + there * amplitude.half,
         )  # fmt: skip
         shifts = (abs(float(other[i] - changed[i])) for _, other in moved)
-        changes.append(known.widened(*shifts, 2 * noise, steps))
+        by_resistors = resistors * float(changed[i])
+        changes.append(known.widened(*shifts, 2 * noise, steps, by_resistors))
     return tau, changes
+
+
+def _resistors(circuit: Circuit | None, conductance: float) -> float:
+    """Half of the 95 % band of node A's conductance, 1/Ohm, as a part of it."""
+    if circuit is None:
+        return 0.0
+    return RESISTOR * math.hypot(1 / circuit.R1, 1 / circuit.R2) / conductance
 
 
 def _scatter(run: Measurement) -> float:

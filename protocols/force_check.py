@@ -77,8 +77,9 @@ class ForceCheck(ForceProtocol):
         field = Conclusion(values=values)
         if known:
             said = (
-                f"F(I) − F(0) by Eq. (2) from the field read: {', '.join(known)} (95 "
-                "%: scatter of the readings, and what the bench states of Eq. (2))."
+                f"F(I) − F(0) by Eq. (2) from the field read, F(0) in the second "
+                f"before each trial: {', '.join(known)} (95 %: scatter of the "
+                "readings, and what the bench states of Eq. (2))."
             )
             field = Conclusion((said,), values)
             if run.force_uncertainty is None:

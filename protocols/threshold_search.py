@@ -121,7 +121,11 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
     if known is not None:
         whole = math.hypot(found.half_width, known)
         values["critical_force_uncertainty_N_95"] = whole
-        said = f"With the calibration's uncertainty: ±{show(whole, 'N', 2)} (95 %)."
+        stated = run.force_uncertainty
+        said = (
+            "With half the bracket and what the bench states of forces, "
+            f"{stated and stated.text}: ±{show(whole, 'N', 2)} (95 %)."
+        )
     return Conclusion((sentence, said), values) + _gate(run, found, known or 0.0)
 
 

@@ -13,7 +13,7 @@ from tactile_lab.analysis.estimate import Estimate
 WIDTH = 100
 """Columns of a terminal that a table is fitted to."""
 NOT_STATED = (
-    "The calibration states no uncertainty of force: none is carried into this number."
+    "The bench states no uncertainty of force: none is carried into this number."
 )
 NOT_SEARCHED = (
     "No result: spikes were not looked for. Put spikes into record.signals; that needs "

@@ -125,9 +125,10 @@ def fit_field(
     drift = _drift(steps, slope)
     if drift is not None and abs(drift.value) > DRIFT * full:
         raise NotIdentifiableError(
-            f"the field at the same current drifted by {show(drift.value, 'T', 3)} from "
-            f"begin to end ({100 * abs(drift.value) / full:.1f} % of full scale, "
-            f"limit {100 * DRIFT:g} %): clamp the probe, let meter and coil warm up, zero "
+            "the field at the same current drifted by "
+            f"{show(drift.value, 'T', 3)} from begin to end "
+            f"({100 * abs(drift.value) / full:.1f} % of full scale, limit "
+            f"{100 * DRIFT:g} %): clamp the probe, let meter and coil warm up, zero "
             "the meter, and calibrate again"
         )
     if warming is not None and warming > WARMING:

@@ -49,7 +49,8 @@ class Response:
         peak_rate: highest instantaneous rate within the hold, Hz.
         final_rate: rate of the last two spikes at or before the hold's end, Hz.
         fall: from the highest rate within the hold to the final one, as a part of
-            the former: 0.4 for a fall by 40 %; None below two rates.
+            the former: 0.4 for a fall by 40 %; None below two rates, or without a
+            hold.
         adaptation_index: of the spikes within the hold.
         intervals: whole intervals within the hold.
         silent: when firing stopped before the hold ended: the time of the last spike,
@@ -96,7 +97,7 @@ def respond(
     held = within(times, hold)
     held_rates = 1.0 / np.diff(held)
     fall = None
-    if held_rates.size > 1:  # one rate is no fall by 0 %
+    if hold is not None and held_rates.size > 1:  # one rate is no fall by 0 %
         fall = float(1.0 - held_rates[-1] / held_rates.max())
     return Response(
         spikes=int(times.size),

@@ -54,6 +54,10 @@ def test_one_interval_tells_a_rate_and_no_fall():
     assert found.fall is None, "it stood as 0 %"
 
 
+def test_without_a_hold_there_is_no_fall_in_it():
+    assert respond([1.0, 1.2, 1.6, 2.4]).fall is None, 'it stood beside "no hold"'
+
+
 @pytest.mark.parametrize("times", [[], [1.0]])
 def test_too_few_spikes_give_none_not_an_error(times):
     found = respond(times, hold=(0.0, 2.0))

@@ -47,6 +47,9 @@ def test_bipolar_s_intervals_hold_though_the_converter_has_steps():
             off = change["change_A"] - truth[level]
             assert abs(off) < change["change_uncertainty_A_95"]
             assert abs(off) < 0.03 * abs(truth[level])
+            # R1 is known to 1 %, and it carries most of the current
+            least = 0.009 * abs(change["change_A"])
+            assert change["change_uncertainty_A_95"] > least
 
 
 def _changed_by_eq_8(run, level):

@@ -122,6 +122,7 @@ def test_a_teslameter_that_hangs_is_no_exact_one():
     (band,) = found.values["F_minus_F0_uncertainty_N_95"]
     assert found.values["F_minus_F0_by_field_N"] == [pytest.approx(0, abs=1e-9)]
     assert band is not None and 20e-6 < band < 1e-3
+    assert "F(0) in the second before each trial" in found.sentences[0]
 
 
 def test_monitor_tells_the_distance_to_threshold():

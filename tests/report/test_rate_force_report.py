@@ -64,6 +64,8 @@ def test_the_force_s_uncertainty_reaches_the_critical_force(rate_force):
     expected = np.sqrt(0.0125**2 + 5e-3**2 + (0.04 * 0.0975) ** 2)
     assert known.values["critical_force_uncertainty_N_95"] == pytest.approx(expected)
     assert "states no uncertainty" in " ".join(sure.sentences)
+    # with a geometry alone there is no calibration
+    assert "bench states of forces, ±5 mN and ±4 %" in " ".join(known.sentences)
     for wide, narrow in zip(known.values["slopes"], sure.values["slopes"], strict=True):
         assert wide["slope_Hz_per_N"].value == narrow["slope_Hz_per_N"].value
         assert wide["slope_Hz_per_N"].half > 1.2 * narrow["slope_Hz_per_N"].half
