@@ -21,6 +21,9 @@ Flags = NDArray[np.bool_]
 HOLDS = 0.01
 """How long the last value of a record is good for at least, s."""
 
+WIDER = 1.5
+"""How many times as wide as the own the cells of another trace are called wider."""
+
 
 @dataclass(frozen=True, eq=False)
 class Trace:
@@ -273,9 +276,13 @@ class Trace:
         A measured cell is a mean over its width; so is what is taken from it, or every
         ramp would leave a difference where the cells of the two do not fall together.
         The last cell before a gap is left out: nobody knows over what it is a mean.
+        Where the model's cells are the wider ones, both are averaged over these: of a
+        run with long gaps, as many cells are much narrower than those of the model.
         """
         if self.empty or model.time.size < 2:
             return Trace.nothing(self.signal, self.unit)
+        if model.step > WIDER * self.step:
+            return self._residual_of_wider(model)
         reach = float(model.time[-1]) + model.step
         inside = (self.time >= model.time[0]) & (self.time < reach)
         if self.time.size > 2:
@@ -291,6 +298,26 @@ class Trace:
         rest = self.mean[inside] - expected
         made = Trace.line(time, rest, self.gap[inside])
         return replace(made, width=self.width, signal=self.signal, unit=self.unit)
+
+    def _residual_of_wider(self, model: Trace) -> Trace:
+        """The residual over the model's cells, of those that lie within no gap."""
+        ends = np.append(model.time[1:], model.end)
+        last = np.append(self.gap[1:], True)
+        wide = np.minimum(np.diff(self.time, append=np.inf), self.step) * ~last
+        knots = np.column_stack([self.time, self.time + wide]).ravel()
+
+        def within(heights: FloatArray) -> FloatArray:
+            """The integral over each of the model's cells."""
+            after = np.cumsum(wide * heights)
+            whole = np.column_stack([after - wide * heights, after]).ravel()
+            return np.interp(ends, knots, whole) - np.interp(model.time, knots, whole)
+
+        covered = within(np.ones_like(wide))
+        inside = covered > 0.99 * (ends - model.time)
+        rest = (within(self.mean)[inside] / covered[inside]) - model.mean[inside]
+        gap = ~np.append(False, inside[:-1])[inside]
+        made = Trace.line(model.time[inside], rest, gap)
+        return replace(made, width=model.width, signal=self.signal, unit=self.unit)
 
     def minus(self, other: Trace, grid: FloatArray) -> Trace:
         """This less another at the times in `grid`, s, at which both have data."""
