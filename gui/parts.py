@@ -281,7 +281,7 @@ STRETCH = "stretch"
 """A part of a row or column that takes the room that is left."""
 
 Box = TypeVar("Box", bound=QBoxLayout)
-Part = QWidget | QLayout | tuple[QWidget | QLayout, int] | int | str
+Part = QWidget | QLayout | tuple[QWidget | QLayout | str, int] | int | str
 
 
 def filled(box: Box, parts: Sequence[Part]) -> Box:
@@ -301,7 +301,7 @@ def filled(box: Box, parts: Sequence[Part]) -> Box:
         elif isinstance(what, int):
             box.addSpacing(what)
         else:
-            box.addStretch(1)
+            box.addStretch(share if isinstance(part, tuple) else 1)
     return box
 
 
@@ -348,8 +348,11 @@ def line_edit(name: str, hint: str = "", text: str = "") -> QLineEdit:
 
 
 def say(where: QLabel, text: str) -> None:
-    """Show a text; hide the label where there is none."""
-    where.setText(text)
+    """Show a text; hide the label where there is none.
+
+    Messages mark commands by back-ticks, as a terminal is used to; a window is not.
+    """
+    where.setText(text.replace("`", ""))
     where.setVisible(bool(text))
 
 

@@ -93,7 +93,7 @@ class ForceCheck(ForceProtocol):
         if readings.size != levels.size:
             said = (
                 "No independent readings: enter F(I) − F(0) of each level with "
-                '--set protocol.readings=["...", ...] to check Eq. (2).'
+                "protocol.readings to check Eq. (2)."
             )
             return Conclusion((said,))
         strength = float(np.sum(levels**2))

@@ -59,6 +59,24 @@ def test_thinning_keeps_extremes_and_gaps(whole: Trace, count: int) -> None:
     assert set(thin.time[thin.gap]) <= set(whole.time[whole.gap])
 
 
+@given(st.integers(30, 90), st.integers(0, 20))
+def test_corners_keep_pauses_and_extremes_of_a_line(count: int, seed: int) -> None:
+    """The whole run of a vibration began with a force of which nothing was applied."""
+    rng = np.random.default_rng(seed)
+    burst = np.sort(rng.uniform(0, 1, 777))
+    time = np.concatenate([at + burst for at in (10.0, 20.0, 21.5, 90.0)])
+    value = np.sin(777 * time)
+    value[776::777] = 0.0
+    value[::777] = 0.0
+    whole = Trace.line(np.append(0.0, time), np.append(0.0, value))
+    few = whole.corners(count)
+    assert few.extent == whole.extent and len(few) <= 4 * count + 8
+    for at in (5.0, 15.0, 22.6, 50.0, 80.0):
+        told = few.at(at)
+        assert told is not None and abs(told) < 1e-12, f"nothing was applied at {at}"
+    assert few.time[0] == whole.time[0] and few.time[-1] == whole.time[-1]
+
+
 @given(st.integers(1, 20), st.integers(2, 9))
 def test_more_gaps_than_cells_do_not_make_more_cells(per: int, count: int) -> None:
     """As of a scope that polls: short records, far apart."""

@@ -230,4 +230,4 @@ class Readings:
         line = Trace.line(time, value)
         if hold is not None:
             line = Trace.steps(time, value, hold)
-        return line.around(start, end).thin(count)
+        return line.around(start, end).corners(count)

@@ -66,7 +66,7 @@ class RunSource(Source):
         self.trials = run.trials
         self.holds = [_hold(trial) for trial in self.trials]
         self.simulated = run.simulated
-        self.moves_probes = _moves_probes(run)
+        self.moves_probes, self.sets_voltages = _moves(run)
         self._threshold = threshold_of(run)
         self._beyond = {name: run.overrange(name) for name in run.signals}
         self._gain = float(run.attributes.get("newtons_per_ampere", 1.0)) or 1.0
@@ -150,7 +150,7 @@ class RunSource(Source):
         pyramid = self._pyramids.get(signal)
         if pyramid is None:
             line = self._lines.get(signal, Trace.nothing())
-            return line.around(start, end).thin(count)
+            return line.around(start, end).corners(count)
         if count >= PICTURE and pyramid.wants(start, end, count):
             self._fetch(signal, (start, end, count))
         return pyramid.between(start, end, count)
@@ -230,10 +230,10 @@ def _hold(trial: Any) -> Stretch:
     return Stretch(start, end, label, bool(trial["pause"]), held)
 
 
-def _moves_probes(run: Run) -> bool:
-    """What its protocol says; no where that cannot be read any more."""
+def _moves(run: Run) -> tuple[bool, bool]:
+    """Whether its protocol moves probes or voltages; no where it cannot be read."""
     try:
         protocol = run.scene.protocol
-        return protocol.moves_probes or bool(protocol.sets)
     except SceneError:
-        return False
+        return False, False
+    return protocol.moves_probes or bool(protocol.sets), bool(protocol.sets)

@@ -12,7 +12,7 @@ import numpy as np
 import pyqtgraph as pg
 import shiboken6
 from numpy.typing import ArrayLike
-from PySide6.QtCore import QPointF, QSizeF, Qt, Signal
+from PySide6.QtCore import QPointF, QSize, QSizeF, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QWheelEvent
 from PySide6.QtWidgets import QMenu
 
@@ -29,6 +29,8 @@ PANEL, SMALL = 200, 130
 """Height of a panel, and of one that is low in the report, px."""
 LEFT, FOOT, LOW, HEAD = 48, 36, 20, 22
 """Width of an axis; heights of one with its name, without it, and of a heading, px."""
+AIR = 6
+"""Height above a plot without a heading, for the number at the end of its axis, px."""
 NEAR = 0.04
 """Share of the width within which a text at an edge stands inside of it."""
 WIDEST = 1e4
@@ -139,7 +141,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.setCacheMode(pg.GraphicsView.CacheModeFlag.CacheNone)
         self.setAntialiasing(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.ci.setContentsMargins(0, 0, 8, 0)
+        self.ci.setContentsMargins(0, AIR if height else 0, 8, 0)
         self.ci.setSpacing(0)
         theme.changed.connect(self.draw)
         self.draw()
@@ -160,6 +162,10 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         for panel, part in zip(self.panels, looked, strict=False):
             if same and part is not None:
                 panel.box.setRange(xRange=part[0], yRange=part[1], padding=0)
+
+    def sizeHint(self) -> QSize:
+        """As high as its panels need; Qt would ask for room for a whole picture."""
+        return QSize(super().sizeHint().width(), self.minimumHeight())
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Zoom with Ctrl; else the page below scrolls."""

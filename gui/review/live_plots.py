@@ -89,7 +89,8 @@ def rate_plot(
     ]
     if model:
         at, rate = np.array(sorted(model)).T
-        series.append(Series(x=at, y=rate, name="model", colour="model"))
+        mark = "line" if np.unique(at).size == at.size else "crosses"
+        series.append(Series(x=at, y=rate, name="model", mark=mark, colour="model"))
     return Plot(
         name="rates",
         caption="Highest and final rate of each step against its force.",
@@ -112,6 +113,8 @@ def train_plot(
     series: list[Series] = []
     fitted = {one.step: one.law for one in laws}
     fired = [t for t in trials if t.hold and within(t.spike_times, t.hold).size > 1]
+    alike = len({t.label for t in fired}) < len(fired)
+    numbers = {t.start: f"no. {at}" for at, t in enumerate(trials, 1)}
     for colour, trial in zip(COLOURS, fired[: -len(COLOURS) - 1 : -1], strict=False):
         begin = trial.hold[0] if trial.hold else 0.0
         times = within(trial.spike_times, trial.hold or (0.0, np.inf))
@@ -119,7 +122,7 @@ def train_plot(
             Series(
                 x=times[1:] - begin,
                 y=1 / np.diff(times),
-                name=trial.label,
+                name=f"{trial.label}, {numbers[trial.start]}" if alike else trial.label,
                 mark="dots",
                 colour=colour,
             )

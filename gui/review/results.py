@@ -117,7 +117,7 @@ class ResultsView(QWidget):
         self._drawn = lines()
         rates = (self.plot, 2), self._axes, (self.trains, 2), (self.loop, 2)
         plots = (*rates, (self._drawn, 2), (self.table, 3))
-        said = (self.statements, self.tables, STRETCH)
+        said = (self.statements, self.tables, (STRETCH, 0))  # plots take room first
         parts = (self.cards, *plots, *said, self.bars, self._facts, self.report)
         page = with_gutter(scrolling(inner), column(inner, *parts, spacing=9))
         stack(self, (head, page), page, spacing=9)
@@ -182,6 +182,9 @@ class ResultsView(QWidget):
         self.plot.nothing = (
             "No step has fired."
             if self._levelled
+            else "These steps are no levels of force: what they give\n"
+            "is told by the report, at the end of the run."
+            if self._steps
             else "No steps yet. Rate, onset, slope and adaptation\n"
             "are told here, step by step, as a run goes on."
         )
@@ -245,6 +248,7 @@ class ResultsView(QWidget):
             for where, text in enumerate(cells(steps[at])):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(RIGHT if where else LEFT)
+                item.setToolTip("" if where else text)
                 table.setItem(at, where, item)
         table.setFixedHeight(HEAD + ROW * max(len(steps), 4))  # the page scrolls
 
@@ -284,7 +288,8 @@ class ResultsView(QWidget):
         table.addAction(copy)
         table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         header = table.horizontalHeader()
-        # a long name ends in "…": the heads of the numbers stay whole
+        # what is left out of a long name is in its middle: "90 m…0625 V"
+        table.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         header.setMinimumSectionSize(36)

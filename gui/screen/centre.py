@@ -160,7 +160,7 @@ class Centre(QWidget):
         self.progress = ProgressStrip(theme)
         self.log = LogView(theme)
         self.lanes = panel()
-        self.notice = label("", "muted")
+        self.notice = label("", "muted", wrap=True)
         self.notice.setContentsMargins(14, 6, 14, 6)
         self.notice.hide()
         self.compare_bar = CompareBar(self.stack, self.view, theme)

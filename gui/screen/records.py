@@ -120,6 +120,9 @@ class Records(QObject):
             source.close()
             return
         folder = source.path
+        if source.sets_voltages:  # the model alone has one for the whole run
+            self._modelled(folder, Reply(None))
+            return
         desk = self._session.desk
         desk.ask(lambda reply: self._modelled(folder, reply), model_of_run, folder)
 
@@ -133,10 +136,10 @@ class Records(QObject):
             self._add(shown, reply)
 
     def _add(self, source: RunSource, reply: Reply[ModelPart]) -> None:
-        if reply.value is None:
+        if reply.value is None and reply.problem:
             name = source.path.name
             self.failed.emit(f"No model beside {name}: {reply.problem}")
-        else:
+        elif reply.value is not None:
             source.add_twin(reply.value, partial(self._look, source.path))
 
     def _look(self, folder: Path, start: float, end: float, count: int) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tactile_lab.engine.engine import Engine
 
 COLUMNS = 2000
-"""Columns in which measured and modelled voltages are compared."""
+"""Columns in which voltages are compared with the model's, which has finer ones."""
 
 RATES = 12
 """Newest steps whose law is drawn."""
@@ -147,7 +147,7 @@ def fit_input(source: Source) -> FitInput:
         {
             name: (
                 source.trace(name, 0.0, reach, COLUMNS),
-                source.twin(name, 0.0, reach, COLUMNS),
+                source.twin(name, 0.0, reach, 4 * COLUMNS),
             )
             for name in ("V_C1", "V_C2")
         },

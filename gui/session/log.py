@@ -62,6 +62,7 @@ class Log(QObject):
         time: float | None = None,
     ) -> None:
         """Put a line into the log; `time`: of the run, s, where it has one."""
+        text = text.replace("`", "")  # which mark commands in a terminal
         line = LogLine(datetime.now(), level, source, text, safety, time)
         self.lines.append(line)
         del self.lines[:-KEPT]

@@ -18,8 +18,8 @@ WAIT = "computing the plan …"
 COLUMNS = 300
 """Columns of the plan that are drawn."""
 
-APART, LONGEST = 16, 6
-"""Most levels told beside each other, and characters of the longest told."""
+LETTER, LONGEST = 0.033, 6
+"""Width of a letter as a part of the plan's, and letters of the longest name told."""
 
 
 class WaveformPreview(SmallPlot):
@@ -62,8 +62,9 @@ class WaveformPreview(SmallPlot):
 def _plan(preview: Preview) -> Plot:
     """The force, and the level beyond each hold where there is room."""
     time, force = preview.force.time, preview.force.value
-    drawn = zigzag(Trace.line(time, force).thin(COLUMNS))
+    drawn = zigzag(Trace.line(time, force).corners(COLUMNS))
     names: list[tuple[float, float, str]] = []
+    taken = 0.0
     for hold in preview.holds:
         start, end = hold.held or (hold.start, hold.end)
         inside = (time >= start) & (time <= end)
@@ -71,9 +72,11 @@ def _plan(preview: Preview) -> Plot:
             continue
         far = np.argmax(np.abs(force[inside]))
         at, text = (start + end) / 2, hold.label.replace(" mN", "")
-        room = not names or at - names[-1][0] > preview.length / APART
+        half = LETTER * len(text) / 2 * preview.length
+        room = taken <= at - half and at + half <= preview.length
         if room and force[inside][far] and len(text) <= LONGEST:
             names.append((at, float(force[inside][far]), text))
+            taken = at + half + LETTER * preview.length
     at_, level, texts = zip(*names, strict=True) if names else ((), (), ())
     low, high = min(0.0, float(force.min())), max(float(force.max()), 1e-12)
     told = Series(x=at_, y=level, mark="text", colour="ink", texts=texts)

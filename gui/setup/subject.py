@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -187,7 +188,7 @@ class Subject(QObject):
     def _fill(self, path: str | None, scene: Scene, lost: str = "") -> None:
         self.path = path
         kind = type(scene.protocol)
-        values = {key: getattr(scene.protocol, key) for key in kind.model_fields}
+        values = stated(scene)
         self._form.show_protocol(kind, values)
         self._usual = self._on_bench(path)
         own = self._usual if self.edited is None else scene
@@ -208,3 +209,16 @@ class Subject(QObject):
         else:
             self.leave()
         self.lost = words
+
+
+def stated(scene: Scene) -> dict[str, Any]:
+    """Values of a scene's protocol; None for what it takes from the sensor."""
+    asked, sensor = scene.protocol, scene.sensor
+    values = {key: getattr(asked, key) for key in type(asked).model_fields}
+    for key, info in type(asked).model_fields.items():
+        if values[key] is None or info.default is not None:
+            continue
+        bare = asked.model_copy(update={key: None})
+        if getattr(bare.on_sensor(sensor.tau, abs(sensor.k_F)), key) == values[key]:
+            values[key] = None
+    return values

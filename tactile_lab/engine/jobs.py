@@ -237,7 +237,12 @@ def write_report(engine: Engine, folder: Path) -> None:
         if hasattr(os, "setpriority"):
             os.setpriority(os.PRIO_PROCESS, writing.pid, 10)
         _, said = writing.communicate(timeout=LONGEST)
-    except (OSError, subprocess.TimeoutExpired) as error:
+    except subprocess.TimeoutExpired as error:
+        raise RecordingError(
+            f"The report is not there after {LONGEST:g} s, and is written on; open the "
+            "run again once it is."
+        ) from error
+    except OSError as error:
         raise RecordingError(f"The report was not written: {error}") from error
     if writing.returncode:
         last = (said.strip().splitlines() or ["no message"])[-1]

@@ -4,6 +4,7 @@ import weakref
 from functools import reduce
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,15 +12,19 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
+from gui.lanes.expected import Preview, Stretch
 from gui.parts import column, push, scrolling, with_gutter
 from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
 from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter
 from gui.setup.picker import Picker
+from gui.setup.preview import _plan
+from gui.setup.subject import stated
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
 from tactile_lab.table import fields_of
+from tactile_lab.waveform import Waveform
 
 NAMES = [name for name in protocol_names() if name != "waveform"]
 
@@ -30,8 +35,9 @@ def test_every_ready_scene_survives_the_form(app: QApplication, name: str) -> No
     scene = load(name)
     kind = type(scene.protocol)
     form = Form()
-    form.show_protocol(kind, {k: getattr(scene.protocol, k) for k in kind.model_fields})
+    form.show_protocol(kind, stated(scene))
     assert form.problem == ""
+    assert not {"tau", "volts_per_newton"} & form.changed_texts().keys(), "the sensor's"
     assert load(name, form.overrides()).protocol == scene.protocol
 
 
@@ -161,6 +167,20 @@ def test_long_list_is_shortened_where_it_is_not_edited(app: QApplication) -> Non
     assert edit.shown.startswith("10, 20, 30") and edit.shown.endswith("…")
     assert edit.toolTip().startswith(long)
     form.hide()
+
+
+def test_the_preview_draws_pauses_as_such_and_no_name_over_another() -> None:
+    """A pause between two bursts of corners was a slope, "10 Hz" lay over itself."""
+    burst = np.linspace(0.0, 10.0, 3007)
+    time = np.concatenate([burst, 50.0 + burst])
+    force = np.concatenate([0.1 + 0.1 * np.sin(burst * 300)] * 2)
+    force[[0, 3006, 3007, -1]] = 0.0
+    holds = [Stretch(a, a + 1.0, "10 Hz") for a in (5.0, 10.0, 51.0)]
+    plan = _plan(Preview(force=Waveform(time, force), holds=holds, length=60.0))
+    drawn, told = plan.panels[0].series
+    assert np.interp(30.0, drawn.x, drawn.y) == 0.0
+    assert np.max(drawn.y) == pytest.approx(0.2, rel=0.01)
+    assert np.size(told.x) == 2, "one beside each burst"
 
 
 def test_the_list_of_protocols_has_all_titles_when_it_is_opened(app) -> None:

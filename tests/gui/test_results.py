@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QApplication
 
 from gui.look.theme import Theme
-from gui.review.live_plots import COLUMNS, column_plot
+from gui.review.live_plots import COLUMNS, column_plot, rate_plot
 from gui.review.results import ResultsView
 from gui.session.fit import FitInput, fit
 from tactile_lab.measurement import MeasuredTrial
@@ -30,6 +31,33 @@ def results(app) -> ResultsView:
 def drawn(view: ResultsView) -> tuple[list[float], list[float], str]:
     (series,) = view.plot.plot.panels[0].series
     return list(series.x), list(series.y), series.name
+
+
+def test_steps_without_a_level_are_said_to_be_none(app) -> None:
+    """24 vibrations were "No steps yet", and five of them all named 100 Hz."""
+    steps = [replace(s, level=None, label="100 Hz") for s in (SLOW, FAST)]
+    view = ResultsView(Theme("light"))
+    view.show_steps(steps, total=2, running=False, whole=True)
+    assert "No steps yet" not in view.plot.nothing
+    names = [one.name for one in view.trains.plot.panels[0].series]
+    assert names == ["100 Hz, no. 2", "100 Hz, no. 1"]
+
+
+def test_a_force_that_comes_again_is_joined_by_no_line_of_the_model() -> None:
+    rates = [(0.08, 2.0), (0.16, 5.0), (0.08, 0.0)]
+    for model, mark in ((rates[:2], "line"), (rates, "crosses")):
+        assert rate_plot([SLOW, FAST], model).panels[0].series[-1].mark == mark
+
+
+def test_a_page_of_results_asks_for_no_more_height_than_it_needs(results) -> None:
+    """Plots asked for a picture's, and the room became a gap above the last lines."""
+    results.show_statements(["The rate rises."])
+    assert results.plot.sizeHint().height() == results.plot.minimumHeight()
+    results.resize(360, 2000)
+    results.show()
+    QApplication.processEvents()
+    below = results.bars.y() - results.statements.geometry().bottom()
+    assert below < 40, "plots take the room that is left"
 
 
 def test_a_column_is_drawn_against_another(results: ResultsView) -> None:

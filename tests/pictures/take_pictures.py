@@ -107,9 +107,9 @@ def _after(stage: Stage) -> None:
 
 def _old_run(stage: Stage, folder: Path) -> None:
     """A run from disk where its strongest step begins to fire."""
-    window = stage.window
+    window, before = stage.window, stage.window.screen_.run
     window.screen_.open_run(folder)
-    stage.until(lambda: window.screen_.run is not None and window.screen_.run.has_model)
+    stage.until(lambda: (run := window.screen_.run) is not before and run.has_model)
     run = window.screen_.run
     assert run is not None
     step = [one for one in run.holds if not one.pause][-1]
