@@ -171,15 +171,25 @@ def _by_circuit(run: Measurement, trial: MeasuredTrial) -> Conclusion:
     )
     measured = trial.response.silent
     if law.silent_from is not None and measured is not None:
-        said += (
-            f" It fires its last spike at {law.silent_from:.4g} s, the sensor did at "
-            f"{measured:.4g} s."
-        )
+        said += _silence(law.silent_from, measured)
     values = {
         "tau_s": law.tau, "V_GS_V": law.V_GS, "V_P_V": law.V_P, "rms_Hz": law.rms,
         "law_silent_from_s": law.silent_from,
     }  # fmt: skip
     return Conclusion((said,), values)
+
+
+def _silence(by_law: float, measured: float) -> str:
+    """Whether the law, going on from the sensor's last spike, is silent too."""
+    if by_law <= measured:
+        return (
+            f" After the sensor's last spike at {measured:.4g} s it charges C2 to no "
+            "other within the hold."
+        )
+    return (
+        f" After the sensor's last spike at {measured:.4g} s it would fire on until "
+        f"{by_law:.4g} s."
+    )
 
 
 def _by_exponential(trial: MeasuredTrial) -> Conclusion:

@@ -122,7 +122,8 @@ def _slope(run: Measurement) -> Conclusion:
         f"The rate at the end of the ramp rises by {told}: the slope of Eq. (15) with "
         f"a V_GS of {plus_minus(law.V_GS.value, law.V_GS.half, 'V')} and "
         f"{plus_minus(law.scale.value, law.scale.half)} of the stated force, fitted to "
-        f"the {law.intervals} intervals in the holds."
+        f"the {law.intervals} intervals in the holds (the circuit's other parameters "
+        "as believed)."
     )
     values = {
         "slopes": [

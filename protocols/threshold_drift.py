@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.arrays import FloatArray
-from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
+from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Pause, Unit, show
@@ -88,7 +88,8 @@ class ThresholdDrift(Recovering):
         sentences = [
             f"The critical force lay between {show(forces.min(), 'N')} and "
             f"{show(forces.max(), 'N')}, each known to ±{show(found[0].half, 'N', 2)} "
-            f"({len(found)} values)."
+            f"({len(found)} values).",
+            _stated(run, float(forces.mean())),
         ]
         by_time = _slope(found, np.array([b.time for b in found]) / HOUR)
         values["drift_N_per_h"] = by_time
@@ -190,6 +191,17 @@ def _bracket(
         middle=sum(forces) / 2,
         half=abs(forces[0] - forces[1]) / 2,
         kelvin=sum(known) / 2 if len(known) == 2 else None,
+    )
+
+
+def _stated(run: Measurement, force: float) -> str:
+    """What calibration and geometry leave open of all forces together."""
+    known = run.uncertain(force)
+    if known is None:
+        return NOT_STATED
+    return (
+        f"All of them together may be off by {show(known, 'N', 2)} (95 %), by what "
+        "calibration and geometry leave open."
     )
 
 

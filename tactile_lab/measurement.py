@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 CUT_OFF = "spikes could not be told all of the time: their channel left its range"
 """Why a trial has no latency, rate or fit."""
+NOT_HELD = "no one force is held"
+"""Why a trial has no adaptation: without a level its force changes all the time."""
 
 SETTLING = 0.3
 """Time after a late set-point until the field read is that of its current, s."""
@@ -143,6 +145,8 @@ class MeasuredTrial:
             return None, "no spikes"
         if self.hold is None:
             return None, "no hold"
+        if self.level is None:
+            return None, NOT_HELD
         try:
             return fit_adaptation(self.spike_times, self.hold), ""
         except NotIdentifiableError as error:
@@ -173,6 +177,7 @@ class Measurement:
             shape (m, 2), s and V.
         traces: decimated signals, the derived I_DS and the model's V_C1 among them.
         circuit: the sensor as it is believed to be, to compare with, or None.
+        listed: whether the current was played as a waveform, not as set-points.
         displaced: the circuit with each thing that is not known of it, such as the
             follower's input bias or its temperature, at the end of its 95 % band.
         lag_uncertainty: the same of the lags of coil and core together, s; None where
@@ -199,6 +204,7 @@ class Measurement:
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
     displaced: tuple[Circuit, ...] = ()
+    listed: bool = False
     lag_uncertainty: float | None = None
     searched: bool = True
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
@@ -249,6 +255,8 @@ class Measurement:
     ) -> tuple[CircuitAdaptation | None, str]:
         if trial.unsearched:
             return None, CUT_OFF
+        if trial.hold is not None and trial.level is None:
+            return None, NOT_HELD
         begin = self.applied_edge(trial)
         if self.circuit is None or trial.hold is None or begin is None:
             return None, "no hold, or no circuit to compare with"

@@ -28,6 +28,8 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import count
 
 FEWEST_INTERVALS = 6
+LUCKY = 0.95
+"""The scatter is at most so much larger than it seems, with this probability."""
 FOLLOWED = 0.03
 """Time after the force is there until the core's field and node A have followed, s."""
 SMALLEST_SCATTER = 1e-5
@@ -87,8 +89,12 @@ def fit_circuit_adaptation(
 
     Raises:
         NotIdentifiableError: fewer than 6 intervals, a rate that does not fall, a T1
-            that saturates, or a tau not known to a factor 2.
+            that saturates, or a tau not known to a factor 2, were the scatter as large
+            as so few intervals leave open: else a short hold is told where it was
+            small by luck, and then mostly wrongly.
     """
+    from scipy.special import chdtri
+
     if circuit.saturation:
         raise NotIdentifiableError("T1 saturates: V_C1 alone does not tell its current")
     times = within(spike_times, hold) - hold[0]
@@ -112,7 +118,8 @@ def fit_circuit_adaptation(
         found = [f.widened(abs(float(m))) for f, m in zip(found, moved, strict=True)]
     V_GS, V_P, log_tau = found
     tau = math.exp(log_tau.value)
-    if not log_tau.half < math.log(2):
+    luck = math.sqrt(freedom / float(chdtri(freedom, LUCKY)))
+    if not log_tau.half * luck < math.log(2):
         raise NotIdentifiableError(
             f"the hold does not determine tau: about {tau:.2g} s, no better known than "
             "by a factor 2"

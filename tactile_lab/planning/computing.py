@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from tactile_lab.planning.needs import Needs
+from tactile_lab.planning.needs import Needs, compared
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
 
@@ -121,7 +121,7 @@ def computing(
     if needed.detect_on is not None:
         told["detection"] = DETECTED * millions
     memory = BASE + MEMORY_CHANNEL * len(needed.channels)
-    if scene.compared:
+    if compared(scene, needed):
         told["model beside the run"] = (
             COMPARED
             + COMPARED_TRIAL * len(drive.steps)
@@ -175,5 +175,5 @@ def savings(
         )
         yield Saving(what, how, disk / number, storing / number)
     beside = cost.time.get("model beside the run")
-    if beside is not None and scene.compared:
+    if beside is not None:
         yield Saving("model beside the run", "record.compare = false", 0.0, beside)

@@ -65,6 +65,11 @@ class Needs:
     expected: Extremes = field(default_factory=dict)
 
 
+def compared(scene: Scene, needed: Needs) -> bool:
+    """Whether a run has a model beside it: the applied current drives that."""
+    return scene.compared and needed.coil
+
+
 def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
     """The closure of `scene`.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tactile_lab.instruments.registry import voltage_capability
-from tactile_lab.planning.needs import Needs
+from tactile_lab.planning.needs import Needs, compared
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.warn import threshold_of
 from tactile_lab.quantity import show
@@ -70,7 +70,7 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
             found.append((name, "derived from the spikes"))
         elif name == "I_DS" and name not in enabled:
             found.append((name, "derived from V_C1 by Eq. (16)"))
-    if scene.compared:
+    if compared(scene, needed):
         found.append(("model beside the run", "from the applied current; compared"))
     if bench.simulated:
         found.append(("plant", "computes coil, magnet, sensor and noise"))
@@ -116,7 +116,7 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
             found.append((name, "not recorded"))
     if any(step.trial.pause for step in drive.steps):
         found.append(("samples of pauses", "recovery is neither streamed nor stored"))
-    if not scene.compared:
+    if not compared(scene, needed):
         found.append(("model beside the run", _not_compared(scene)))
     if bench.simulated:
         off = "off in [simulated]: not computed"
@@ -137,6 +137,8 @@ def _not_compared(scene: Scene) -> str:
         return PROBES_MOVED
     if protocol.sets:
         return f"{', '.join(protocol.sets)} is another from trial to trial"
+    if scene.compared:
+        return "no current is applied that would drive it"
     return NOTHING_ALIKE
 
 

@@ -77,6 +77,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             belief=_belief(run, scene),
             compared=scene.compared,
             displaced=scene.displaced,
+            listed=_played(run),
             lag_uncertainty=scene.bench.magnet.lag_uncertainty,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
@@ -291,6 +292,12 @@ def _warming(run: Run) -> float | None:
     ratio = rows["resistance_ratio"]
     ratio = ratio[np.isfinite(ratio)]
     return float(ratio[-1] - ratio[0]) / COPPER if ratio.size > 1 else None
+
+
+def _played(run: Run) -> bool:
+    """Whether the current was played as a waveform, not set point by point."""
+    rows = run.current  # older runs lack the column
+    return "listed" in (rows.dtype.names or ()) and bool(rows["listed"].any())
 
 
 def _field_per_ampere(scene: Scene) -> float:

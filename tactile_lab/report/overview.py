@@ -126,7 +126,8 @@ def _force(run: Measurement, axis: ClosedTime) -> Told:
     )
     text = "Force by the current that flowed, the lags of coil and core included"
     if run.current is not None and len(run.current) > 2:
-        text += "; its steps are the source's set-points"
+        steps = "points of the waveform played" if run.listed else "source's set-points"
+        text += f"; its steps are the {steps}"
     return panel, text
 
 

@@ -132,7 +132,7 @@ def circuit_fits_table(run: Measurement) -> Table:
         "the last one, from when the applied force was there; all other parts of the "
         "circuit as given. ±: 95 %, the follower's input bias within, and the "
         "temperature where the scene says how well it is known. Last spike: by the "
-        "law, from the trial's start.",
+        "law, going on from the last one measured, from the trial's start.",
     )  # fmt: skip
 
 

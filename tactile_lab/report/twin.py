@@ -174,20 +174,28 @@ def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
         said.append(
             f"{residual.signal}: measured less model is {offset} mV on average, "
             f"{residual.rms * 1e3:.1f} mV rms, within {residual.band * 1e3:.1f} mV for "
-            f"95 % of the time; {100 * residual.within:.0f} % lie within the "
-            f"tolerance of {np.median(residual.tolerance) * 1e3:.1f} mV "
-            f"(median){shifted}."
+            f"95 % of the time; {100 * residual.within:.0f} % lie within their "
+            f"tolerance, {_ranging(residual.tolerance * 1e3, 'mV')}{shifted}."
         )
     if found.spikes is not None:
         text = f"Spikes: {found.spikes.sentence}"
         if np.isfinite(found.spikes.within):
-            open_ = np.nanmedian(found.spikes.tolerance) * 1e3
+            open_ = found.spikes.tolerance * 1e3
             text += (
-                f"; {100 * found.spikes.within:.0f} % of the offsets lie within the "
-                f"tolerance of {rounded(open_)} ms (median)"
+                f"; {100 * found.spikes.within:.0f} % of the offsets lie within their "
+                f"tolerance, {_ranging(open_, 'ms')}"
             )
         said.append(f"{text}.")
     return tuple(said)
+
+
+def _ranging(tolerance: FloatArray, unit: str) -> str:
+    """A tolerance that grows where the force does: its median, and 95 % of it."""
+    known = tolerance[np.isfinite(tolerance)]
+    if not known.size:
+        return "which is not known"
+    middle, most = (rounded(float(v)) for v in np.percentile(known, (50, 95)))
+    return f"{middle} {unit} (median; 95 % below {most} {unit})"
 
 
 def twin_plot(run: Measurement, twin: Twin) -> Plot | None:

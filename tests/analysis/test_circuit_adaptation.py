@@ -43,6 +43,15 @@ def scattered(circuit, V_P, wobble, seed, *, hold=10.0, step=5e-4):
     return np.array(spikes)
 
 
+def test_a_scatter_that_is_small_by_luck_tells_no_tau():
+    """A touch of half a second: 1.1 s (0.58 to 2.09 s) for 8.69 s, one of 120 alike."""
+    force = Waveform.through([(0, 0), (0.05, 0.2), (0.65, 0.2)])
+    spikes = simulate(Circuit(), force, keep=("spikes",)).spike_times
+    wobble = np.random.default_rng(74).normal(0, 1.5e-4, spikes.size)
+    with pytest.raises(NotIdentifiableError, match="factor 2"):
+        fit_circuit_adaptation(Circuit(), spikes + np.cumsum(wobble), (0.1, 0.6))
+
+
 @pytest.mark.parametrize("tau", [8.69, 6.0])
 def test_it_gives_the_circuit_back_from_the_believed_one(tau):
     circuit = Circuit(tau=tau, V_GS=1.41)

@@ -311,12 +311,14 @@ def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
     [
         ("threshold_trim", "V_GS is another from trial to trial"),
         ("wiring_check", "the probes are moved"),
+        ("monitor", "no current is applied"),
         ("calibrate_field", "nothing recorded is predicted by it"),
     ],
 )
 def test_why_no_model_is_compared_is_told(scene, why):
-    told = dict(plan(load(scene)).leaves_out)["model beside the run"]
-    assert told.startswith(why)
+    planned = plan(load(scene))
+    assert dict(planned.leaves_out)["model beside the run"].startswith(why)
+    assert "model beside the run" not in planned.computing.time
 
 
 def test_no_error_of_spike_times_is_told_where_no_spike_is_expected():

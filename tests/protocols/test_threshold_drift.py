@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from protocols.threshold_drift import ThresholdDrift, brackets
+from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.trial import Outcome
 from tactile_lab.waveform import Waveform
@@ -91,6 +92,10 @@ def test_a_temperature_that_stands_still_is_said():
     found = protocol.conclude(run)
     assert "The temperature did not change." in found.text
     assert not protocol.conclude(replace(run, searched=False)).sentences
+    assert "states no uncertainty of force" in found.text
+    known = replace(run, force_uncertainty=ForceUncertainty(0.0, 0.03))
+    told = protocol.conclude(known).text
+    assert "All of them together may be off by 3 mN (95 %)" in told
 
 
 def test_it_asks_for_the_temperature_and_never_for_no_force():

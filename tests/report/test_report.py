@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from protocols.hold import Hold
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import sensor_texts, stimulus_onset
 from tactile_lab.report.html import rendered
@@ -192,6 +194,30 @@ def test_a_long_hold_gives_a_time_constant(run_maker):
     assert fit is not None
     assert 1 < fit.time_constant.value < 5
     assert re.match(r"[\d.]+ s \([\d.]+ to", trials_table(findings.run).rows[0][-1])
+
+
+def test_no_adaptation_is_told_of_a_force_that_is_not_held(run_maker):
+    """A scanned grating had a time constant of 0.25 s (0.13 to 3.5 s)."""
+    run = run_maker((0.2,), ramp=0.01, hold=10.0, rest=0.5)
+    (held,) = run.results
+    assert held.adaptation is not None
+    scanned = replace(held, level=None)
+    assert (scanned.adaptation, scanned.why_not) == (None, "no one force is held")
+    assert run.circuit_adaptation(scanned) == (None, "no one force is held")
+
+
+def test_a_law_that_goes_on_from_the_last_spike_does_not_foretell_it(run_maker):
+    """The sensor's own last spike stood as the law's, equal to four digits."""
+    run = run_maker((0.15,), ramp=0.01, hold=10.0, rest=0.5)
+    told = Hold().conclude(replace(run, circuit=Circuit())).sentences[0]
+    last = f"{run.results[0].response.silent:.4g} s"
+    assert f"After the sensor's last spike at {last} it charges C2 to no" in told
+
+
+def test_the_caption_says_whether_the_current_was_played(demo):
+    assert "its steps are the source's set-points" in overview(demo).caption
+    played = overview(replace(demo, listed=True)).caption
+    assert "its steps are the points of the waveform played" in played
 
 
 def test_i_ds_is_derived_where_v_c1_is_known(demo):
