@@ -229,7 +229,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
                 wire.command(line)
             if row.range_query is None:
                 return
-            found = wire.number(row.range_query)
+            found = wire.number(row.range_query) * row.voltage_unit
             if abs(found - full) <= SAME_RANGE * full:
                 return
         raise RefusedError(
@@ -242,7 +242,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
     def _limit_current(self) -> None:
         wire, most = self._wire, self.limits.compliance
         wire.command(self.dialect.limit_line(most))
-        wire.confirm("compliance", self.dialect.limit_query, most, 0.01 * most)
+        wire.confirm("compliance", wire.compliance, most, 0.01 * most)
 
     def _ramp(self, volts: float) -> Iterator[None]:
         """Steps until `volts`, V, is commanded."""

@@ -221,7 +221,10 @@ class RowVoltageSource(VoltagePanel):
         self._row, self.gap = row, row.serial.min_gap
         self.reply_end = row.serial.reply_end.encode("ascii")
         self.clearing = row.serial.preamble.encode("ascii")
-        self._levels = (reader(row.set), self.set), (reader(row.limit), self.limit)
+        self._levels = (
+            (reader(row.set), row.set_unit, self.set),
+            (reader(row.limit), row.limit_unit, self.limit),
+        )
         self._chosen = reader(row.range or row.set)
         self._range = row.ranges[-1].full
         self._told: deque[str] = deque()
@@ -233,36 +236,42 @@ class RowVoltageSource(VoltagePanel):
 
     def _queries(self) -> dict[str, Answer]:
         row, one = self._row, self._row.number
+        volt, ampere = row.voltage_unit, row.current_unit
         on = row.on_match, row.off_match
         found: dict[str, Answer] = {
-            row.set_query: lambda: invented(one, f"{self.setpoint:.6f}"),
-            row.limit_query: lambda: invented(one, f"{self.compliance:.9f}"),
+            row.set_query: lambda: invented(one, f"{self.setpoint / volt:.6f}"),
+            row.limit_query: lambda: invented(one, f"{self.compliance / ampere:.9f}"),
             row.on_query: lambda: invented(on[0] if self.output_on else on[1]),
         }
         if row.range_query is not None:
-            found[row.range_query] = lambda: invented(one, f"{self._range:.3f}")
+            found[row.range_query] = lambda: invented(one, f"{self._range / volt:.3f}")
         if row.measure_current == row.measure_voltage:
             # the order that both patterns of the rows that ship have
-            return found | {row.measure_current: lambda: self._both("{:.6f},{:.9f}")}
+            both = "{:.6f},{:.9f}"
+            return found | {row.measure_current: lambda: self._told_as(both)}
         return found | {
-            row.measure_voltage: lambda: invented(one, f"{self.measured()[0]:.6f}"),
-            row.measure_current: lambda: invented(one, f"{self.measured()[1]:.9f}"),
+            row.measure_voltage: lambda: invented(one, self._told_as("{:.6f}")),
+            row.measure_current: lambda: invented(one, self._told_as("{1:.9f}")),
         }
 
-    def _both(self, form: str) -> str:
-        return form.format(*self.measured())
+    def _told_as(self, form: str) -> str:
+        """Voltage and current as `form` has them, in the row's units."""
+        voltage, current = self.measured()
+        row = self._row
+        return form.format(voltage / row.voltage_unit, current / row.current_unit)
 
     def _act(self, text: str) -> bool:
-        for read, act in self._levels:
+        for read, unit, act in self._levels:
             if (value := read(text)) is not None:
-                act(value)
+                act(value * unit)
                 return True
         if text in self._row.on or text in self._row.off:
             self.switch(text in self._row.on)
             return True
         if self._row.range is None or (volts := self._chosen(text)) is None:
             return False
-        self._range = next(one.full for one in self._row.ranges if volts <= one.full)
+        most = volts * self._row.voltage_unit
+        self._range = next(one.full for one in self._row.ranges if most <= one.full)
         return True
 
 

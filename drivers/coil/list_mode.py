@@ -92,7 +92,7 @@ def load(wire: CoilWire, mode: ListMode, points: CurrentList) -> None:
         NoReplyError, BadReplyError: answers are lost.
     """
     digits = wire.dialect.digits
-    currents = [f"{i:.{digits}f}" for i in points.currents]
+    currents = [f"{wire.dialect.sent(i):.{digits}f}" for i in points.currents]
     dwells = [f"{t:.{mode.dwell_digits}f}" for t in points.dwells]
     if np.all(points.dwells == points.dwells[0]):
         dwells = dwells[:1]  # one stands for all

@@ -207,7 +207,7 @@ class CoilSource(SerialInstrument[CoilWire]):
         if self._setpoint is None:  # the last answer was lost on the way
             self._setpoint = self._wire.setpoint()
         passed = min(now - self._commanded, max(2 * self._interval, CATCH_UP))
-        step = self._limits.slew * passed + 0.5 * 10.0**-self.dialect.digits
+        step = self._limits.slew * passed + 0.5 * self.dialect.grain
         wanted = min(max(current, self._setpoint - step), self._setpoint + step)
         self._commanded = now
         try:

@@ -54,9 +54,7 @@ class CoilWire(SourceWire[CoilDialect]):
             RefusedError: another value is read back.
         """
         self.command(self.dialect.limit_line(voltage))
-        self.confirm(
-            "compliance", self.dialect.limit_query, voltage, 0.01 * voltage + 0.01
-        )
+        self.confirm("compliance", self.compliance, voltage, 0.01 * voltage + 0.01)
 
     def set_zero(self) -> None:
         """Command 0 A and check by read-back.
@@ -65,9 +63,7 @@ class CoilWire(SourceWire[CoilDialect]):
             RefusedError: another value is read back.
         """
         self.set_current(0.0)
-        self.confirm(
-            "current", self.dialect.set_query, 0.0, 2 * 10.0**-self.dialect.digits
-        )
+        self.confirm("current", self.setpoint, 0.0, 2 * self.dialect.grain)
 
     def current_when_off(self) -> float:
         """Current with the output off, A: measured where the model then measures.
@@ -188,7 +184,7 @@ class CoilWire(SourceWire[CoilDialect]):
                 self.link.sleep_until(answered + min(rest, abs(current) / slew))
                 sent = self.link.now
                 left = abs(current) - slew * (sent - answered)
-                if left < 10.0**-self.dialect.digits:
+                if left < self.dialect.grain:
                     return  # 0 A is what comes next anyway
                 current = math.copysign(left, current)
                 self.set_current(current)

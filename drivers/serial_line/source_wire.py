@@ -59,20 +59,22 @@ class SourceWire(Conversation[S]):
         )
 
     def setpoint(self) -> float:
-        """Set-point read back, A."""
-        return self.number(self.dialect.set_query)
+        """Set-point read back, A or V."""
+        return self.number(self.dialect.set_query) * self.dialect.set_unit
 
     def compliance(self) -> float:
-        """Compliance read back, V."""
-        return self.number(self.dialect.limit_query)
+        """Compliance read back, V or A."""
+        return self.number(self.dialect.limit_query) * self.dialect.limit_unit
 
     def current(self) -> float:
         """Measured current, A."""
-        return self.number(self.dialect.measure_current, self.dialect.current_match)
+        row = self.dialect
+        return self.number(row.measure_current, row.current_match) * row.current_unit
 
     def voltage(self) -> float:
         """Measured voltage, V."""
-        return self.number(self.dialect.measure_voltage, self.dialect.voltage_match)
+        row = self.dialect
+        return self.number(row.measure_voltage, row.voltage_match) * row.voltage_unit
 
     def measured(self) -> tuple[float, Callable[[], float]]:
         """Measured current, A, and what gives the voltage, V, measured with it.
@@ -87,15 +89,18 @@ class SourceWire(Conversation[S]):
         voltage = self.parsed(answer, row.voltage_match)
         if current is None or voltage is None:
             return self.current(), self.voltage
-        return current, lambda: voltage
+        volts = voltage * row.voltage_unit
+        return current * row.current_unit, lambda: volts
 
-    def confirm(self, what: str, query: str, wanted: float, within: float) -> None:
+    def confirm(
+        self, what: str, read: Callable[[], float], wanted: float, within: float
+    ) -> None:
         """Read back that a setting was taken.
 
         Raises:
             RefusedError: another value is read back.
         """
-        found = self.number(query)
+        found = read()
         if abs(found - wanted) > within:
             raise RefusedError(
                 f"The source reports a {what} of {found:g} after being set to "
@@ -118,7 +123,7 @@ class SourceWire(Conversation[S]):
         row = self.dialect
         for value in (REHEARSED, 0.0):
             self.command(row.set_line(value))
-            self.confirm("set-point", row.set_query, value, REHEARSED / 2)
+            self.confirm("set-point", self.setpoint, value, REHEARSED / 2)
         untried = [*row.on]
         for line, pattern in (
             (row.measure_voltage, row.voltage_match),

@@ -101,8 +101,12 @@ class RowCoil(CoilPanel):
     def _queries(self) -> dict[str, Answer]:
         row = self._row
         found: dict[str, Answer] = {
-            row.set_query: lambda: self._number(self.setpoint, row.number),
-            row.limit_query: lambda: self._number(self.compliance, row.number),
+            row.set_query: lambda: self._number(
+                self.setpoint / row.set_unit, row.number
+            ),
+            row.limit_query: lambda: self._number(
+                self.compliance / row.limit_unit, row.number
+            ),
             row.on_query: lambda: invented(
                 row.on_match if self.output_on else row.off_match
             ),
@@ -112,16 +116,18 @@ class RowCoil(CoilPanel):
         current, voltage = row.current_match, row.voltage_match
         return found | {
             row.measure_current: lambda: self._number(
-                self.measured_current(), current or row.number
+                self.measured_current() / row.current_unit, current or row.number
             ),
             row.measure_voltage: lambda: self._number(
-                self.measured_voltage(), voltage or row.number
+                self.measured_voltage() / row.voltage_unit, voltage or row.number
             ),
         }
 
     def _both(self) -> str:
         """Current and voltage in one answer, in the order the row looks for."""
-        row, parts = self._row, (self.measured_voltage(), self.measured_current())
+        row = self._row
+        voltage = self.measured_voltage() / row.voltage_unit
+        parts = (voltage, self.measured_current() / row.current_unit)
         for order in (parts, parts[::-1]):
             text = ",".join(f"{value:.{row.digits}f}" for value in order)
             found = [
@@ -140,7 +146,8 @@ class RowCoil(CoilPanel):
 
     def _act(self, text: str) -> bool:
         row = self._row
-        if (amperes := self._set(text)) is not None:
+        if (number := self._set(text)) is not None:
+            amperes = number * row.set_unit
             if abs(amperes) > row.current or (
                 amperes < 0 and row.polarity == "positive"
             ):
@@ -148,7 +155,8 @@ class RowCoil(CoilPanel):
             else:
                 self.set_current(amperes)
             return True
-        if (volts := self._limit(text)) is not None:
+        if (number := self._limit(text)) is not None:
+            volts = number * row.limit_unit
             if volts > row.voltage:
                 self._told.append(TOO_MUCH)
             else:

@@ -224,9 +224,10 @@ class SerialDialect(Dialect):
 class SourceDialect(SerialDialect):
     """What the dialect of every source has, of a current or of a voltage.
 
-    Templates use `{i}` A and `{v}` V, fixed-point.
+    Templates use `{i}` and `{v}`, fixed-point.
 
     Attributes:
+        current_unit, voltage_unit: what a 1 means on the wire, sent and read, A and V.
         digits: decimals of the set-point on the wire.
         limit, limit_query: set and read the compliance.
         set, set_query: set and read the set-point.
@@ -239,7 +240,9 @@ class SourceDialect(SerialDialect):
 
     sets: ClassVar[Literal["i", "v"]]
     """What its set-point is, as `set` has it; the other is its compliance."""
-    digits: int = Field(default=5, ge=2, le=8)
+    current_unit: Annotated[float, Unit("A", above=0.0)] = 1.0
+    voltage_unit: Annotated[float, Unit("V", above=0.0)] = 1.0
+    digits: int = Field(default=5, ge=0, le=8)
     limit: Line
     limit_query: Line
     set: Line
@@ -261,17 +264,37 @@ class SourceDialect(SerialDialect):
             return super().verified(line)
         return (line + self.join + self.error,)
 
+    @property
+    def set_unit(self) -> float:
+        """What a 1 of the set-point means, A or V."""
+        return self.current_unit if self.sets == "i" else self.voltage_unit
+
+    @property
+    def limit_unit(self) -> float:
+        """What a 1 of the compliance means, V or A."""
+        return self.voltage_unit if self.sets == "i" else self.current_unit
+
+    @property
+    def grain(self) -> float:
+        """Smallest step of the set-point that the wire carries, A or V."""
+        return float(10.0**-self.digits * self.set_unit)
+
+    def sent(self, value: float) -> float:
+        """A set-point, A or V, as the number on the wire; never a negative zero."""
+        return round(value / self.set_unit, self.digits) + 0.0
+
     def fixed(self, value: float) -> float:
-        """A set-point as the wire carries it; never a negative zero."""
-        return round(value, self.digits) + 0.0
+        """A set-point, A or V, as the source gets it."""
+        return self.sent(value) * self.set_unit
 
     def set_line(self, value: float) -> str:
         """Line that sets A or V; never an exponent, never a negative zero."""
-        return self.set.format(**{self.sets: self.fixed(value)})
+        return self.set.format(**{self.sets: self.sent(value)})
 
     def limit_line(self, value: float) -> str:
         """Line that sets the compliance, V or A."""
-        return self.limit.format(**{"v" if self.sets == "i" else "i": value})
+        other = "v" if self.sets == "i" else "i"
+        return self.limit.format(**{other: value / self.limit_unit})
 
     def _try_lines(self, lines: Iterable[str], where: str) -> None:
         """Refuse lines that are too long, and set-points that lose digits."""
@@ -326,7 +349,7 @@ class CoilDialect(SourceDialect):
 
     def _try_list_lines(self, mode: ListMode, where: str) -> None:
         """Refuse more points a line than a line can hold."""
-        current = f"{-self.current:.{self.digits}f}"
+        current = f"{self.sent(-self.current):.{self.digits}f}"
         dwell = f"{mode.longest:.{mode.dwell_digits}f}"
         for template, value in ((mode.points, current), (mode.dwells, dwell)):
             line = template.format(values=",".join([value] * mode.points_per_line))
@@ -369,7 +392,7 @@ class CoilDialect(SourceDialect):
         mode = self.list
         if mode is None:
             return None
-        current = f"{-self.current:.{self.digits}f}"
+        current = f"{self.sent(-self.current):.{self.digits}f}"
         dwell = f"{mode.shortest:.{mode.dwell_digits}f}"
         per_line = sum(
             self._exchange(template.format(values=",".join(values)), baud)

@@ -30,7 +30,7 @@ class VoltageRange(DialectTable):
 
 
 class VoltageDialect(SourceDialect):
-    """How a source meter speaks; `set` and `range` take `{v}` V, `limit` `{i}` A.
+    """How a source meter speaks; `set` and `range` take `{v}`, `limit` `{i}`.
 
     Attributes:
         current: largest compliance the model takes, A.
@@ -63,7 +63,11 @@ class VoltageDialect(SourceDialect):
 
     def range_lines(self, volts: float) -> tuple[str, ...]:
         """Lines that choose the range that reaches `volts`, V."""
-        return () if self.range is None else (self.range.format(v=volts),)
+        return (
+            ()
+            if self.range is None
+            else (self.range.format(v=volts / self.voltage_unit),)
+        )
 
     def range_for(self, limits: VoltageLimits) -> VoltageRange:
         """The finest range that reaches all that `limits` allow.
@@ -93,7 +97,7 @@ class VoltageDialect(SourceDialect):
         used = self.range_for(limits)
         return VoltageSourceCapability(
             title=self.title,
-            resolution=max(used.resolution, 10.0**-self.digits),
+            resolution=max(used.resolution, self.grain),
             error=used.error,
             error_part=used.error_part,
         )

@@ -44,7 +44,10 @@ def go(source: SourceMeter, volts: float) -> None:
 def test_ramp_and_read_back(source: SourceMeter) -> None:
     fact("identity", source.identity)
     if query := source.dialect.range_query:
-        fact("range read back, V", source._wire.number(query))
+        fact(
+            "range read back, V",
+            source._wire.number(query) * source.dialect.voltage_unit,
+        )
     go(source, 1.0)
     held = source.read()
     fact("set to 1 V, read V and A", (held.voltage, held.current))
