@@ -336,14 +336,14 @@ class SerialLink:
         end = self.wire.reply_end.encode("ascii")
         while True:
             line = b""
+            # a long line may take most of that time to get out
+            due = max(self._sent, self._clock.now()) + self.wire.timeout
             with self._mapped() as port:
-                line = port.read_until(end)
-                # a long line may have taken most of that time to get out
-                while not line.endswith(end) and (
-                    self._clock.now() < self._sent + self.wire.timeout
-                ):
+                while not line.endswith(end):
                     line += port.read_until(end)
-            self._beat()
+                    self._beat()
+                    if self._clock.now() >= due:
+                        break
             self._rest_from(self._clock.now())
             if line:
                 self._tell("<", line)

@@ -28,6 +28,10 @@ CONNECT = 0.25
 pyserial's own is twenty times that."""
 
 
+HEARTBEAT = 0.2
+"""Longest wait for bytes at once, s: in between the guard is told that we are alive."""
+
+
 def port_settings(port: str, wire: SerialSettings) -> dict[str, Any]:
     """Arguments with which pyserial opens `port`; a write timeout is always set."""
     is_url = "://" in port
@@ -64,6 +68,7 @@ def open_port(port: str, wire: SerialSettings, what: str) -> serial.Serial:
         opened: serial.Serial = serial.serial_for_url(
             port, do_not_open=True, **port_settings(port, wire)
         )
+        opened.timeout = min(wire.timeout, HEARTBEAT)
         if wire.dtr is not None:
             opened.dtr = wire.dtr
         opened.open()

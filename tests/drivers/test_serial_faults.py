@@ -135,15 +135,28 @@ def test_a_lasting_fault_is_told_and_not_called_safe(serial_bench, kind):
     assert it.coil.safe_off().verified
 
 
-@pytest.mark.parametrize("kind", ["deaf", "stuck", "missing"])
-def test_a_silent_source_does_not_make_the_program_look_hung(serial_bench, kind):
+@pytest.mark.parametrize(
+    ("kind", "timeout"),
+    [
+        ("deaf", 0.2),
+        ("stuck", 0.2),
+        ("missing", 0.2),
+        ("missing", 0.8),
+        ("partial", 0.8),
+    ],
+)
+def test_a_silent_source_does_not_make_the_program_look_hung(
+    serial_bench, kind, timeout
+):
     """The guard killed it while it tried to switch off: exit -9, and no word of why."""
     it, beats = serial_bench, []
+    link = it.coil._wire.link
+    link.wire = link.wire.model_copy(update={"timeout": timeout})
     it.coil.open()
     it.coil.energise()
     it.coil._wire.link._beat = lambda: beats.append(it.clock.now())
     it.drive(0.5)
-    it.end.faults.add(SerialFault(kind=kind, times=None))
+    it.end.faults.add(SerialFault(kind=kind, amount=3, times=None))
     with pytest.raises(InstrumentError):
         it.drive(0.7)
     assert not it.coil.safe_off().verified
