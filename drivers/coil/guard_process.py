@@ -155,12 +155,21 @@ def send(port: serial.SerialBase, told: dict[str, Any], lines: list[str]) -> Non
 
 
 def switch_off(
-    told: dict[str, Any], ports: list[serial.SerialBase], log: GuardLog
+    told: dict[str, Any],
+    ports: list[serial.SerialBase],
+    log: GuardLog,
+    state: str = UNKNOWN,
 ) -> str | None:
     """Send and verify output-off, again and again while patience lasts.
 
     Where the port is another device than the owner had, or has another name, whoever
     answers there is asked for its name first: a stranger is told nothing.
+
+    Args:
+        told: the owner's settings.
+        ports: of the source.
+        log: is told how it goes.
+        state: of the output while it is not verified, for the terminal.
 
     Returns:
         Port at which the output was verified off, None if at none.
@@ -170,7 +179,7 @@ def switch_off(
     lines = "send"
     while (spent := time.monotonic() - begun) < PATIENCE:
         if spent > TERMINAL:
-            log.leave_terminal(f"{UNKNOWN}; it is tried for {PATIENCE:g} s")
+            log.leave_terminal(f"{state}; it is tried for {PATIENCE:g} s")
         for name, port in zip(told["ports"], ports, strict=True):
             if port is not ports[0] and node(name) == node(told["ports"][0]):
                 continue  # it has not moved
@@ -273,7 +282,9 @@ def main() -> int:
         return 0
     begun = time.monotonic()
     killed = "silent" in reason and kill_hung(told["owner"])
-    off = switch_off(told, ports, log)
+    # an owner that let go has said it already
+    state = "still not verified off" if owner.take_over else UNKNOWN
+    off = switch_off(told, ports, log, state)
     log.write(
         f"{reason}{'; it was killed' if killed else ''}; "
         f"owner {told['owner']}, port {off or told['ports'][0]}, "

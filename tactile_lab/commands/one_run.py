@@ -6,9 +6,7 @@ import sys
 import time
 from contextlib import suppress
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, NoReturn
-
-import click
+from typing import TYPE_CHECKING, Any
 
 from tactile_lab.commands.attended import Signals, interrupted, run_attended
 from tactile_lab.commands.read_off import field_reader
@@ -297,20 +295,22 @@ def concluded(
 ) -> bool:
     """Tell of a run that ended, write its report, and do what follows a run.
 
-    Nothing in here changes how the run ended: what fails is told. False where a signal
-    cut it short: then whoever has more to do ends, too.
+    How it ended, and how the coil was left, is told first, and once. Nothing in here
+    changes it: what fails is told. False where a signal cut this short: then whoever
+    has more to do ends, too.
 
     Args:
         done: how it ended.
         no_report: leave the report out.
         tell: says more of it, with its report where there is one.
     """
+    if done.exit_code:
+        with suppress(OSError):  # nobody may be there to read it
+            say(f"tactile-lab: {done.told}", sys.stderr)
     with interrupted():
         try:
             for text in overrange(done):
                 warn(text)
-            if done.exit_code:
-                say(f"tactile-lab: {done.told}", sys.stderr)
             report = None if no_report else write_report(done.folder)
             tell(done, report)
             _follow(done.folder)
@@ -369,10 +369,3 @@ def tell_of(done: Executed, watchers: Watchers, *, no_report: bool) -> bool:
         print_run(done, report, time.monotonic() - began)
 
     return concluded(done, no_report=no_report, tell=tell)
-
-
-def leave(done: Executed) -> NoReturn:
-    """End the program as the run ended, whatever became of telling it."""
-    if not done.off.verified:
-        fail(done.off.text, done.exit_code)
-    raise click.exceptions.Exit(done.exit_code)

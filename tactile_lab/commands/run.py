@@ -15,7 +15,6 @@ from tactile_lab.commands.one_run import (
     answer,
     concluded,
     finished,
-    leave,
     prepared,
     print_run,
     tell_others,
@@ -157,7 +156,7 @@ def command(
                 say(f"against {again}\n{changed}")
 
         concluded(done, no_report=no_report, tell=tell)
-    leave(done)
+    raise click.exceptions.Exit(done.exit_code)
 
 
 def _refuse_with_sweep(options: list[str]) -> None:
