@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tactile_lab.errors import RecordingError
 from tactile_lab.lab import kept_of_port
-from tactile_lab.store.folder import write_text
+from tactile_lab.whole_file import write_text
 
 BY_ID = Path("/dev/serial/by-id")
 """Where Linux names serial ports by their adapters."""

@@ -25,8 +25,9 @@ from gui.look.tokens import LIGHT, Tokens
 from gui.session.log import Severity
 from gui.setup.parameter import FieldError
 from tactile_lab.arrays import FloatArray
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import RecordingError, TactileLabError
 from tactile_lab.trace import Trace
+from tactile_lab.whole_file import replacing, write_text
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels
@@ -51,7 +52,7 @@ def save_scene(panels: Panels) -> None:
 def write_scene(panels: Panels, path: Path) -> None:
     """Write the form as a scene."""
     try:
-        path.write_text(panels.setup.request().load().to_toml(), encoding="utf-8")
+        write_text(path, panels.setup.request().load().to_toml())
     except (TactileLabError, FieldError, OSError) as error:
         panels.session.log.add(
             Severity.ERROR, "scene", f"{path} was not saved: {error}"
@@ -84,14 +85,15 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
         title += f", {bar.comparison.layout.value}"
     title += " · SIMULATED" if simulated else " · measured"
     try:
-        ending = path.suffix.lower()
-        if ending == ".csv":
-            path.write_text(table(stack, title), encoding="utf-8")
-        elif ending == ".svg":
-            path.write_bytes(_svg(stack, title))
-        elif not picture(stack, title).save(str(path)):
-            raise OSError(f"{path} cannot be written as a picture; end it in .png.")
-    except OSError as error:
+        with replacing(path) as part:
+            ending = path.suffix.lower()
+            if ending == ".csv":
+                part.write_bytes(table(stack, title).encode())
+            elif ending == ".svg":
+                part.write_bytes(_svg(stack, title))
+            elif not picture(stack, title).save(str(part)):
+                raise OSError(f"{path} cannot be written as a picture; end it in .png.")
+    except (RecordingError, OSError) as error:
         panels.session.log.add(
             Severity.ERROR, "export", f"The view was not exported: {error}"
         )

@@ -14,6 +14,7 @@ import tomli_w
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
+from tactile_lab.whole_file import write_text
 
 
 def presets(folder: Path, protocol: str) -> dict[str, Path]:
@@ -35,8 +36,7 @@ def save_preset(folder: Path, name: str, scene: Scene) -> Path:
     file = folder / scene.protocol.name / f"{name}.toml"
     text = tomli_w.dumps({"protocol": scene.to_dict()["protocol"]})
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8")
+        write_text(file, text)
     except OSError as error:
         raise SceneError(f"The preset {file} was not kept: {error}.") from error
     return file

@@ -91,6 +91,7 @@ def _draw(planned: Plan, path: Path) -> None:
     from tactile_lab.errors import SceneError
     from tactile_lab.planning.figure import preview_plot
     from tactile_lab.report.canvas import draw
+    from tactile_lab.whole_file import replacing
 
     scene = planned.scene
     figure = draw(
@@ -100,7 +101,8 @@ def _draw(planned: Plan, path: Path) -> None:
         simulated=scene.bench.simulated or None,
     )
     try:
-        figure.savefig(path, dpi=160)
+        with replacing(path) as part:
+            figure.savefig(part, dpi=160)
     except OSError as reason:
         raise SceneError(f"--preview {path} cannot be written: {reason}.") from reason
 

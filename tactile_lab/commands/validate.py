@@ -140,8 +140,9 @@ def _write(text: str, out: Path | None, name: str) -> None:
     if out is None:
         say(text)
         return
-    out.mkdir(parents=True, exist_ok=True)
-    (out / name).write_text(text, encoding="utf-8")
+    from tactile_lab.whole_file import write_text
+
+    write_text(out / name, text)
     say(f"Wrote {out / name}.")
 
 

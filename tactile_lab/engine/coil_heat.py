@@ -21,7 +21,8 @@ from tactile_lab.errors import LimitError
 from tactile_lab.lab import kept_of_port
 from tactile_lab.planning.heat import cool_down
 from tactile_lab.scene.scene import Scene
-from tactile_lab.store.folder import lock, write_text
+from tactile_lab.store.folder import lock
+from tactile_lab.whole_file import write_text
 
 BOOT = Path("/proc/sys/kernel/random/boot_id")
 """Where Linux tells one start of the computer from another."""

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.neuro import circuit_brian2, circuit_nestml, last_stage_nir
 from tactile_lab.neuro.formats import circuit_format_of
 from tactile_lab.neuro.solved import Solved
-from tactile_lab.store.folder import replacing, write_text
+from tactile_lab.whole_file import replacing, write_text
 
 
 def write(solved: Solved, file: Path) -> list[Path]:

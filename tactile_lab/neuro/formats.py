@@ -117,7 +117,7 @@ def write(events: Events, file: Path, name: str | None = None) -> list[Path]:
         RecordingError: there is no room.
         OSError: it cannot be written.
     """
-    from tactile_lab.store.folder import replacing, write_text
+    from tactile_lab.whole_file import replacing, write_text
 
     name = name or format_of(file)
     one = SPIKES[name]

@@ -22,7 +22,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
 from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
-from tactile_lab.store.folder import replacing, write_text
+from tactile_lab.whole_file import replacing, write_text
 
 # Any: matplotlib types the keys as some 400 literals
 STYLE: Any = {

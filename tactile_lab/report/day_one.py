@@ -12,7 +12,8 @@ from urllib.parse import quote
 from tactile_lab.errors import RunFolderError
 from tactile_lab.report.html import Picture, inlined, rendered
 from tactile_lab.scene.bench_file import BenchSpec
-from tactile_lab.store.folder import read_info, write_text
+from tactile_lab.store.folder import read_info
+from tactile_lab.whole_file import write_text
 
 FIGURE, REPORT = "figure.svg", "report.html"
 

@@ -19,7 +19,7 @@ from tactile_lab.quantity import unbroken
 from tactile_lab.report import palette
 from tactile_lab.report.canvas import HEAD_HEIGHT
 from tactile_lab.report.taxel_map import TaxelMaps
-from tactile_lab.store.folder import write_text
+from tactile_lab.whole_file import write_text
 
 FITS = 12
 """Letters that any column of names holds."""

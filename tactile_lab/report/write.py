@@ -12,8 +12,8 @@ from tactile_lab.report.findings import Findings, find
 from tactile_lab.report.page import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
-from tactile_lab.store.folder import replacing, write_text
 from tactile_lab.store.progress import Progress, counted, nothing, share
+from tactile_lab.whole_file import replacing, write_text
 
 FOUND = 0.3
 """Part of the work until all is found that is then drawn."""
@@ -91,5 +91,5 @@ def _keep(folder: Path, files: Mapping[str, str]) -> None:
         if path.exists():
             continue
         with replacing(path) as new:
-            new.write_text(text, encoding="utf-8")
+            new.write_bytes(text.encode())
             new.chmod(0o444)

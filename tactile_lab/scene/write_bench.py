@@ -10,6 +10,7 @@ from tactile_lab.errors import SceneError
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.table import dumped
+from tactile_lab.whole_file import replacing
 
 
 def write_bench(text: str, path: Path) -> BenchSpec:
@@ -19,14 +20,9 @@ def write_bench(text: str, path: Path) -> BenchSpec:
         SceneError: `text` is no usable bench; what was at `path` stays.
         OSError: `path` cannot be written.
     """
-    draft = path.with_suffix(".new.toml")
-    draft.write_text(text, encoding="utf-8")
-    try:
+    with replacing(path) as draft:
+        draft.write_bytes(text.encode())
         load_bench(draft)
-    except ValueError:
-        draft.unlink()
-        raise
-    draft.replace(path)
     return load_bench(path)
 
 
@@ -57,8 +53,9 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
                 "never changed. Choose another name for the bench file."
             )
         if not copy.exists():
-            copy.write_bytes(contents)
-            copy.chmod(0o444)
+            with replacing(copy) as part:
+                part.write_bytes(contents)
+                part.chmod(0o444)
         return write_bench(tomli_w.dumps(table), path)
     except OSError as reason:
         raise SceneError(

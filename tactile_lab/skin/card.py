@@ -17,6 +17,7 @@ from tactile_lab.skin.dataset import (
 )
 from tactile_lab.skin.decoder import COMPARED, MEMORY, SHUFFLES, Coding
 from tactile_lab.skin.events import recording
+from tactile_lab.whole_file import write_text
 
 TOLD = {
     "press": "a ball of 5 mm radius presses: with which force? (drawn: 15 % more or "
@@ -78,5 +79,5 @@ def write_card(
     )  # fmt: skip
     card = folder / "README.md"
     with recording():
-        card.write_text(text, encoding="utf-8")
+        write_text(card, text)
     return card

@@ -26,6 +26,7 @@ from tactile_lab.skin.bound import spans
 from tactile_lab.skin.events import recording
 from tactile_lab.skin.forces import Loads
 from tactile_lab.skin.skin import Skin, load_skin
+from tactile_lab.whole_file import replacing
 
 FILE = "touches.h5"
 DURATION = 0.6
@@ -171,19 +172,19 @@ class Dataset:
         Raises:
             RecordingError: it cannot be written.
         """
-        with recording():
-            folder.mkdir(parents=True, exist_ok=True)
-            partial_file = folder / f"{FILE}.part"
-            with h5py.File(partial_file, "w") as file:
-                for name, values in vars(self).items():
-                    if name != "seed":
-                        file.create_dataset(
-                            name, data=values, compression="gzip", shuffle=True
-                        )
-                file.attrs["seed"] = self.seed
-                file.attrs["duration_s"] = DURATION
-                file.attrs["labels"] = json.dumps(LABELS)
-            partial_file.replace(folder / FILE)
+        with (
+            recording(),
+            replacing(folder / FILE) as part,
+            h5py.File(part, "w") as file,
+        ):
+            for name, values in vars(self).items():
+                if name != "seed":
+                    file.create_dataset(
+                        name, data=values, compression="gzip", shuffle=True
+                    )
+            file.attrs["seed"] = self.seed
+            file.attrs["duration_s"] = DURATION
+            file.attrs["labels"] = json.dumps(LABELS)
 
 
 def make(

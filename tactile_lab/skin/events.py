@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.folder import lock
+from tactile_lab.whole_file import replacing
 
 EVENT = np.dtype([("time", np.float64), ("taxel", np.int32)])
 """One event: s, and the number of the taxel."""
@@ -92,8 +93,7 @@ class EventWriter:
         Raises:
             RecordingError: it cannot be written.
         """
-        partial = self._path.with_suffix(".part")
-        with recording(), h5py.File(partial, "w") as file:
+        with recording(), replacing(self._path) as part, h5py.File(part, "w") as file:
             stored = {
                 name: file.create_dataset(
                     name, (self._count,), EVENT[name], chunks=True, shuffle=True,
@@ -112,7 +112,6 @@ class EventWriter:
             for name, values in columns.items():
                 file.create_dataset(f"taxels/{name}", data=values)
             file.attrs["about"] = json.dumps(about)
-        partial.replace(self._path)
 
 
 def _remove_left(folder: Path) -> None:

@@ -23,7 +23,7 @@ from tactile_lab.skin.press import Pressed
 from tactile_lab.skin.receptive import receptive_plot
 from tactile_lab.skin.skin import Skin
 from tactile_lab.skin.squares import Squares, squares_of
-from tactile_lab.store.folder import write_text
+from tactile_lab.whole_file import write_text
 
 FRAMES = 200
 """Of a film."""

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from typing import IO, Any, Literal
 
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.trust import INFO
+from tactile_lab.whole_file import check_space, write_text
 
 Status = Literal["running", "complete", "aborted", "faulted", "recovered"]
 
@@ -109,11 +109,9 @@ class RunFolder:
         Its SHA-256 goes into `run.json`, so that a later change shows.
         """
         path = self.path / name
-        data = text.encode()
         with _refused(f"{path} cannot be written"):
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(data)
-        files = {**self.info.get("files", {}), name: digest(data)}
+            write_text(path, text)
+        files = {**self.info.get("files", {}), name: digest(text.encode())}
         self.update(files=files)
         return path
 
@@ -136,14 +134,9 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     Raises:
         RecordingError: the folder cannot be written.
     """
-    new = path.with_suffix(".new")
+    text = json.dumps(content, indent=2, ensure_ascii=False, default=str)
     with _refused(f"{path} cannot be written", "The old one stays."):
-        with new.open("w", encoding="utf-8") as file:
-            json.dump(content, file, indent=2, ensure_ascii=False, default=str)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
+        write_text(path, f"{text}\n", lasting=True)
 
 
 def write_info(folder: Path, info: Mapping[str, Any]) -> None:
@@ -195,53 +188,6 @@ def read_info(path: Path) -> dict[str, Any]:
 def has_lost_data(path: Path, info: Mapping[str, Any]) -> bool:
     """Whether a run's samples were written, and their file is there no more."""
     return bool(info.get("samples")) and not (path / DATA).exists()
-
-
-def check_space(path: Path, needed: int) -> None:
-    """Refuse when the disk under `path` has fewer than `needed` bytes free.
-
-    Raises:
-        RecordingError: too little room.
-    """
-    free = shutil.disk_usage(path).free
-    if free < needed:
-        raise RecordingError(
-            f"{path} has {free / 1e9:.2f} GB free but {needed / 1e9:.2f} GB are needed "
-            "(run and reserve). Free some space, choose another --out, or record less."
-        )
-
-
-@contextmanager
-def replacing(path: Path, size: int = 0) -> Iterator[Path]:
-    """A new file to write, which takes the place of `path` once it is whole.
-
-    Args:
-        path: what it will be called; its folder is made.
-        size: about how many bytes it will take.
-
-    Raises:
-        RecordingError: that many are not free.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    check_space(path.parent, size)
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    part.unlink(missing_ok=True)  # of one that was killed
-    try:
-        yield part
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Replace `path` in one step by this text, in UTF-8.
-
-    Raises:
-        RecordingError: there is no room.
-        OSError: it cannot be written.
-    """
-    with replacing(path, len(text)) as part:
-        part.write_text(text, encoding="utf-8")
 
 
 def is_live(path: Path) -> bool:

@@ -16,12 +16,13 @@ from tactile_lab.errors import RecordingError
 from tactile_lab.scope import Block, Stream
 from tactile_lab.store.columns import SampleColumn
 from tactile_lab.store.data_file import DataFile
-from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status, check_space
+from tactile_lab.store.folder import DATA, RESERVE, RunFolder, Status
 from tactile_lab.store.layout import RECORDS, Layout
 from tactile_lab.store.sample_counter import SampleCounter
 from tactile_lab.store.write_queue import QUEUE_BYTES, WhenFull, Write, WriteQueue
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.voltage_source import HeldVoltage
+from tactile_lab.whole_file import check_space
 
 CADENCE = 0.5
 """Longest time anything stays in memory only, s of real time."""

@@ -24,7 +24,6 @@ from tactile_lab.store.folder import (
     DATA,
     RESERVE,
     as_written,
-    check_space,
     is_live,
     read_info,
     write_info,
@@ -33,6 +32,7 @@ from tactile_lab.store.layout import RECORDS
 from tactile_lab.store.ledger import LEDGER, LedgerContents, goes_on, read_ledger
 from tactile_lab.store.progress import Progress, nothing, share
 from tactile_lab.store.run import Run
+from tactile_lab.whole_file import check_space
 
 KEPT = "data.killed.h5"
 """What the file is called that the crash left."""

@@ -24,6 +24,7 @@ from tactile_lab.studies.figures import plots
 from tactile_lab.studies.points import BY_POINT, RUNS
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
+from tactile_lab.whole_file import write_text
 
 LIVE, RESULTS, LOCK = "live.json", "results.json", ".lock"
 """Files in a study's folder: while it is computed, once it is finished, and the one
@@ -166,7 +167,7 @@ class SeenStudy:
 
 def _write(file: Path, scene: Scene) -> None:
     try:
-        file.write_text(scene.to_toml(), encoding="utf-8")
+        write_text(file, scene.to_toml())
     except OSError as reason:
         raise RecordingError(
             f"{file} cannot be written: {reason.strerror}. Make room, or make the "

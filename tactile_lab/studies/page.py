@@ -9,12 +9,13 @@ from typing import Any
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import show
-from tactile_lab.store.folder import write_json, write_text
+from tactile_lab.store.folder import write_json
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import MADE_OF, Gathered, is_written
 from tactile_lab.studies.live import RESULTS, SHOWN, shown
 from tactile_lab.studies.study import Study
+from tactile_lab.whole_file import write_text
 
 REPORT = "report.html"
 MARKS = {"model": "Circuit model", "simulated": "Simulated bench", "bench": "Measured"}

@@ -28,6 +28,7 @@ from tactile_lab.studies.kept import CRITICAL_FORCE, OF_TRAINS, Kept
 from tactile_lab.studies.shelf import Batch
 from tactile_lab.studies.study import Study
 from tactile_lab.trial import Protocol
+from tactile_lab.whole_file import write_text
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
@@ -254,8 +255,7 @@ class Points:
             done = self._play(Execution(scene, folder, realtime=real))
             if self.runs is not None:
                 named = self.runs / BY_POINT / address
-                named.parent.mkdir(exist_ok=True)
-                named.write_text(done.folder.name, encoding="utf-8")
+                write_text(named, done.folder.name)
             if not done.off.verified:
                 raise UnsafeError(
                     f"{done.told} The study stops; what was finished is kept. Make the "

@@ -140,6 +140,7 @@ def put(batch: Batch, folder: Path) -> Path:
     """
     name = hashlib.blake2b(batch.addresses.tobytes(), digest_size=ADDRESS)
     path = folder / f"{name.hexdigest()}.npz"
+    # another study on this shelf may write the same batch
     part = path.with_suffix(f".{os.getpid()}.part")
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -26,6 +26,7 @@ from tactile_lab.validation.contest import (
 from tactile_lab.validation.problem import Problem
 from tactile_lab.validation.table import markdown, provenance
 from tactile_lab.waveform import Waveform
+from tactile_lab.whole_file import replacing
 
 COLUMNS = (
     "scene", "method", "setting", "runs", "verdict", "spikes", "spike_error_s",
@@ -238,7 +239,10 @@ def _orders(by_scene: Mapping[str, Sequence[Row]]) -> list[list[str]]:
 
 def write_csv(rows: Sequence[Row], path: Path) -> None:
     """All rows with full digits."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with (
+        replacing(path) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for row in rows:
@@ -373,5 +377,6 @@ def figure(rows: Sequence[Row], path: Path) -> None:
         list(handles.values()), list(handles), loc="outside lower center", ncols=4,
         frameon=False, fontsize=9,
     )  # fmt: skip
-    plot.savefig(path, metadata={"Date": None})
+    with replacing(path) as part:
+        plot.savefig(part, metadata={"Date": None})
     plt.close(plot)

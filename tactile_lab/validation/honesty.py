@@ -19,6 +19,7 @@ from tactile_lab.model.state import Start
 from tactile_lab.validation.reference import reference
 from tactile_lab.validation.table import provenance
 from tactile_lab.waveform import Waveform
+from tactile_lab.whole_file import replacing
 
 SAMPLES = 40
 """Times at which V_C1 is compared."""
@@ -215,7 +216,10 @@ def campaign(count: int, out: Path | None, say: Callable[[str], None]) -> Measur
                 if (seed + 1) % 50 == 0:
                     say(f"{kind}: {seed + 1} random scenes")
     if file is not None:
-        with file.open("w", newline="", encoding="utf-8") as whole:
+        with (
+            replacing(file) as part,
+            part.open("w", newline="", encoding="utf-8") as whole,
+        ):
             writer = csv.writer(whole, lineterminator="\n")
             writer.writerow(("scenes", "seed", "answer", *NUMBERS))
             writer.writerows((*key, *kept[key]) for key in sorted(kept))
@@ -288,7 +292,8 @@ def scatter(rows: Measured, path: Path) -> None:
         )  # fmt: skip
         axis.grid(visible=True, color="0.92")
     axes[0].legend(frameon=False, loc="lower right")
-    plot.savefig(path, metadata={"Date": None})
+    with replacing(path) as part:
+        plot.savefig(part, metadata={"Date": None})
     plt.close(plot)
 
 

@@ -31,6 +31,7 @@ from tactile_lab.validation.extremes import formula, grazing
 from tactile_lab.validation.problem import Problem
 from tactile_lab.validation.table import markdown, provenance
 from tactile_lab.waveform import Waveform
+from tactile_lab.whole_file import replacing, write_text
 
 SETTINGS = {
     OURS: "tol 1e-09", "Dormand-Prince 5(4)": "tol 1e-09", "Rodas5P": "tol 1e-09",
@@ -116,8 +117,10 @@ def _judged(
 
 def write(points: Sequence[Point], cap: float, out: Path) -> None:
     """sweeps.md, sweeps.csv and sweeps.svg."""
-    out.mkdir(parents=True, exist_ok=True)
-    with (out / "sweeps.csv").open("w", newline="", encoding="utf-8") as file:
+    with (
+        replacing(out / "sweeps.csv") as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(
             "sweep at method setting verdict error_s evaluations time_s".split()
@@ -144,7 +147,7 @@ def write(points: Sequence[Point], cap: float, out: Path) -> None:
         "![sweeps](sweeps.svg)\n",
         markdown(("method", "setting", *AXES), list(_shares(points))),
     ]
-    (out / "sweeps.md").write_text("\n".join(parts) + "\n", encoding="utf-8")
+    write_text(out / "sweeps.md", "\n".join(parts) + "\n")
     _figure(points, out / "sweeps.svg")
 
 
@@ -200,5 +203,6 @@ def _figure(points: Sequence[Point], path: Path) -> None:
     plot.legend(
         handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9
     )
-    plot.savefig(path, metadata={"Date": None})
+    with replacing(path) as part:
+        plot.savefig(part, metadata={"Date": None})
     plt.close(plot)

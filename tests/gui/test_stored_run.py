@@ -1,6 +1,7 @@
 """Runs on disk in the lanes: opened, looked at closely, exported."""
 
 import numpy as np
+from full_disk import full_after
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtSvg import QSvgRenderer
@@ -97,10 +98,16 @@ def test_view_is_exported(lab) -> None:
         write_view(window.panels, None, folder / name)
         assert (folder / name).stat().st_size > 100
     assert QSvgRenderer(str(folder / "view.svg")).isValid()
-    for name in ("gone/view.png", "gone/view.svg", "gone/view.csv"):
-        write_view(window.panels, None, folder / name)
+    before = {file: file.read_bytes() for file in folder.glob("view.*")}
+    write_scene(window.panels, folder / "saved.toml")
+    for file in before:
+        write_view(window.panels, None, file / "in a file.png")
         assert "not exported" in window.session.log.lines[-1].text
+        with full_after(50):
+            write_view(window.panels, None, file)
+            write_scene(window.panels, folder / "saved.toml")
+        assert "not saved" in window.session.log.lines[-1].text
+        assert file.read_bytes() == before[file]
     header = (folder / "view.csv").read_text().splitlines()[1]
     assert "V_C1_time_s" in header and "force_mean_N" in header
-    write_scene(window.panels, folder / "saved.toml")
     assert 'name = "pulses"' in (folder / "saved.toml").read_text()

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 import scipy.io
+from full_disk import full_after
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export import csv as to_csv
@@ -34,6 +35,18 @@ def run(bench, recorder, folder):
     recorder.close("complete", 6000)
     with Run.load(folder.path) as loaded:
         yield loaded
+
+
+def test_a_table_is_whole_or_as_it_was(run, tmp_path):
+    selection = Selection(rate=1.0)
+    to_csv.export(run, tmp_path, selection)
+    before = {file: file.read_bytes() for file in tmp_path.glob("*.csv")}
+    sizes = {file.stem: len(text) for file, text in before.items()}
+    largest = max(sizes, key=lambda name: sizes[name])
+    assert largest != "signals"
+    with full_after(sizes[largest] - 1), pytest.raises(OSError, match="too large"):
+        to_csv.export(run, tmp_path, selection)
+    assert {file: file.read_bytes() for file in tmp_path.glob("*.csv")} == before
 
 
 def rows(path):

@@ -17,10 +17,10 @@ from tactile_lab.store.export.content import (
     unit,
 )
 from tactile_lab.store.export.lines import CodeText, Text, fixed, lines, steps, written
-from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
+from tactile_lab.whole_file import replacing
 
 AT_ONCE = 1 << 15
 """Rows turned into text at once: more do not fit a processor's cache."""
@@ -87,7 +87,10 @@ def _text(run: Run, name: str, selection: Selection) -> Callable[[FloatArray], T
 
 
 def _table(path: Path, table: ExportTable) -> Path:
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with (
+        replacing(path) as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table.heads)
         columns = (_cells(column.tolist()) for column in table.columns.values())

@@ -16,10 +16,10 @@ from tactile_lab.store.export.content import (
     tables,
     unit,
 )
-from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
+from tactile_lab.whole_file import replacing
 
 LARGEST = 2_000_000_000
 """Bytes one variable of a MAT file of version 5 can have."""

@@ -17,10 +17,10 @@ from tactile_lab.store.export.content import (
     tables,
 )
 from tactile_lab.store.export.library import library
-from tactile_lab.store.folder import replacing
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
+from tactile_lab.whole_file import replacing
 
 UNITS = {"V": "volts", "A": "amperes", "T": "tesla", "N": "newtons", "Hz": "hertz"}
 """What NWB calls SI units."""

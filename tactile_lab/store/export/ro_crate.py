@@ -15,10 +15,10 @@ from typing import Any
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import count
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.folder import replacing, write_text
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
+from tactile_lab.whole_file import replacing, write_text
 
 METADATA = "ro-crate-metadata.json"
 CONTEXT = "https://w3id.org/ro/crate/1.1/context"

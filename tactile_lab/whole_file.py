@@ -1,0 +1,63 @@
+"""Files that are there whole or as they were before: written beside, then renamed.
+
+Every output takes this way, so that no reader, crash or full disk leaves half of one.
+What grows while a run goes on (samples, ledger, log) has a way of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tactile_lab.errors import RecordingError
+
+
+def check_space(path: Path, needed: int) -> None:
+    """Refuse when the disk under `path` has fewer than `needed` bytes free.
+
+    Raises:
+        RecordingError: too little room.
+    """
+    free = shutil.disk_usage(path).free
+    if free < needed:
+        raise RecordingError(
+            f"{path} has {free / 1e9:.2f} GB free but {needed / 1e9:.2f} GB are needed "
+            "(run and reserve). Free some space, choose another --out, or record less."
+        )
+
+
+@contextmanager
+def replacing(path: Path, size: int = 0, *, lasting: bool = False) -> Iterator[Path]:
+    """A new file to write, which takes the place of `path` once it is whole.
+
+    Args:
+        path: what it will be called; its folder is made.
+        size: about how many bytes it will take.
+        lasting: wait until the disk has it, so that a power cut leaves it whole, too.
+
+    Raises:
+        RecordingError: that many are not free.
+        OSError: it cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    check_space(path.parent, size)
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    part.unlink(missing_ok=True)  # of one that was killed
+    try:
+        yield part
+        if lasting:
+            with part.open("r+b") as file:
+                os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str, *, lasting: bool = False) -> None:
+    """Replace `path` in one step by this text, in UTF-8; see `replacing`."""
+    data = text.encode()
+    with replacing(path, len(data), lasting=lasting) as part:
+        part.write_bytes(data)

@@ -1,0 +1,59 @@
+"""Outputs are whole or as they were, on a disk that fills up while they are written."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from full_disk import full_after
+
+from gui.setup.presets import save_preset
+from tactile_lab.commands import validate
+from tactile_lab.errors import TactileLabError
+from tactile_lab.scene.load import load
+from tactile_lab.scene.write_bench import write_bench
+from tactile_lab.store.folder import RunFolder
+from tactile_lab.validation.accuracy import COLUMNS, write_csv
+
+BENCH = Path("tactile_lab/scene/simulated_bench.toml").read_text(encoding="utf-8")
+
+
+def preset(path: Path) -> None:
+    save_preset(path.parent.parent, path.stem, load("demo"))
+
+
+def report_of_the_solver(path: Path) -> None:
+    validate._write("word " * 100, path.parent, path.name)
+
+
+def input_of_a_run(path: Path) -> None:
+    root = path.parents[1]
+    folder = RunFolder(root, {}, (root / "log").open("w", encoding="utf-8"))
+    try:
+        folder.write_text("pulses/a.toml", "word " * 100)
+    finally:
+        folder._log.close()
+
+
+WRITERS: list[Callable[[Path], object]] = [
+    preset,
+    report_of_the_solver,
+    input_of_a_run,
+    lambda path: write_csv([], path),
+    lambda path: write_bench(BENCH, path),
+]
+
+
+@pytest.mark.parametrize("write", WRITERS)
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path, write) -> None:
+    path = tmp_path / "pulses" / "a.toml"
+    path.parent.mkdir()
+    path.write_text("as it was")
+    with full_after(50), suppress(OSError, TactileLabError):
+        write(path)
+    assert path.read_text() == "as it was"
+    assert list(path.parent.iterdir()) == [path], "nothing else is left of it"
+
+
+def test_what_is_written_is_there() -> None:
+    assert len(",".join(COLUMNS)) > 50, "the disk is full before its first line ends"
