@@ -277,7 +277,7 @@ def _series(axes: Axes, s: Series, x_by: float, y_by: float, order: int) -> None
         beside = s.mark == "text"
         up = 1 if value >= 0 or not beside else -1
         axes.annotate(
-            text, (at, value), (0, (3 if beside else 6) * up),
+            _plain(text), (at, value), (0, (3 if beside else 6) * up),
             textcoords="offset points", ha="center",
             va="bottom" if up > 0 else "top", size=7.5 if beside else 7,
             color=colour if beside else QUIET.light, gid=BESIDE if beside else None,
@@ -358,18 +358,22 @@ def _scaled(values: ArrayLike, factor: float) -> FloatArray:
 
 def _math(text: str) -> str:
     """Text with V_C1 as a symbol with its subscript."""
-    return re.sub(r"\b([A-Z])_([A-Z0-9]+)\b", r"$\1_{\2}$", text)
+    return re.sub(r"\b([A-Z])_([A-Z0-9]+)\b", r"$\1_{\2}$", _plain(text))
+
+
+def _plain(text: str) -> str:
+    """Text of others: what stands between two $ is no formula in it."""
+    return text.replace("$", r"\$")
 
 
 def heading(figure: Figure, title: str, subtitle: str, simulated: bool | None) -> None:
     """Title, a quiet second line, and the mark that tells simulated from measured."""
     width, height = figure.get_size_inches()
     left, top = 0.12 / width, 1 - 0.12 / height
+    below, grey = top - 0.2 / height, QUIET.light
     texts = [
-        figure.text(left, top, title, size=11, weight="bold", va="top"),
-        figure.text(
-            left, top - 0.2 / height, subtitle, size=7.5, va="top", color=QUIET.light
-        ),
+        figure.text(left, top, _plain(title), size=11, weight="bold", va="top"),
+        figure.text(left, below, _plain(subtitle), size=7.5, va="top", color=grey),
     ]
     if simulated is not None:
         mark = SIMULATED.light if simulated else MEASURED.light

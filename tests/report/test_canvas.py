@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.report.canvas import draw
+from tactile_lab.plot import Guide, Panel, Plot, Series
+from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.findings import find
 from tactile_lab.report.overview import overview
 from tactile_lab.report.splice import ClosedTime
@@ -23,6 +23,20 @@ def test_a_flat_row_of_points_stands_clear_of_the_upper_end():
     low, high = axes(joined, limits=(0.0, None)).get_ylim()
     assert low == 0
     assert high > 0.88 * 1.03
+
+
+def test_dollars_in_names_are_no_formula(tmp_path):
+    odd = "a$b_{$ of V_C1"
+    at = Series(x=[0.0, 1.0], y=[0.0, 1.0], mark="text", texts=(odd, odd))
+    panel = Panel(
+        label=odd, series=(Series(x=[0.0, 1.0], y=[0.0, 1.0], name=odd), at),
+        guides=(Guide(at=0.5, text=odd),), text=odd, note=odd,
+    )  # fmt: skip
+    plot = Plot(name="x", caption=odd, x_label=odd, panels=(panel,))
+    figure = draw(plot, odd, odd, simulated=True)
+    save(figure, tmp_path / "x")
+    assert figure.texts[0].get_text().replace("\\$", "$") == odd
+    assert "$V_{C1}$" in figure.axes[0].get_xlabel()
 
 
 @pytest.mark.parametrize("apart", [0.01, 0.3, 1.0, 3.0])
