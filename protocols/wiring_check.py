@@ -237,8 +237,14 @@ def _gate(
     said = (
         f"V_C1 rests at {plus_minus(V_C1, half, 'V')}, the model at "
         f"{show(rest_V_C1(circuit), 'V')}: a V_GS of {show(gate.value, 'V')} "
-        f"({show(gate.low, 'V')} to {show(gate.high, 'V')}, 95 %) explains it; "
+        f"({show(gate.low, 'V')} to {show(gate.high, 'V')}, a bound rather than a 95 % "
+        "interval: a converter's steps may err all one way) explains it; "
         f"threshold_search refines it ({1 / abs(circuit.k_F):.2g} mN per mV)."
     )
-    values = {"value": gate.value, "low_95": gate.low, "high_95": gate.high}
+    values = {
+        "value": gate.value,
+        "low_95": gate.low,
+        "high_95": gate.high,
+        "is_bound": True,
+    }
     return Conclusion((said,), {"V_GS": values})

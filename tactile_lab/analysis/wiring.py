@@ -113,7 +113,8 @@ class ChannelCalibration:
         """For a person: offset and gain with their uncertainty, and what is done."""
         said = (
             f"offset {plus_minus(self.offset, self.known, 'V')}, gain "
-            f"{plus_minus(self.gain, self.gain_known)} by 0 V and V_S (95 %)"
+            f"{plus_minus(self.gain, self.gain_known)} by 0 V and V_S (bounds: a "
+            "converter's steps)"
         )
         if self.corrects:
             return f"{said}, corrected"

@@ -66,6 +66,19 @@ def test_93_to_97_is_said_of_runs_that_can_tell_it(runs, outside, said):
     assert cells[5] == said
 
 
+def test_what_is_told_as_a_bound_is_not_held_to_be_an_interval():
+    rows = [
+        {
+            "case": "wiring_check", "seed": seed, "commit": "0000000", "cpu": 1.0,
+            "told": [["V_GS", 1.4 + seed * 1e-5, 1.37, 1.43, 1.4]],
+        }
+        for seed in range(200)
+    ]  # fmt: skip
+    page = runpy.run_path(str(PAGE))["table"](rows)
+    (row,) = [line for line in page.splitlines() if "| V_GS |" in line]
+    assert row.split(" | ")[5] == "told as a bound"
+
+
 def test_every_page_that_measures_is_listed_with_what_it_measures():
     root = PAGE.parent.parent
     made = runpy.run_path(str(root / "docs" / "make_reports.py"))

@@ -44,6 +44,9 @@ def test_a_right_bench_passes_and_tells_its_v_gs(tmp_path):
     assert gate["low_95"] < 1.4 < gate["high_95"]
     assert gate["high_95"] - gate["low_95"] < 0.1  # tens of mV: 8 bits over 10 V
     assert any("threshold_search" in s for s in sentences)
+    # it held the truth in 1000 of 1000 runs as a "95 %" interval
+    assert gate["is_bound"] and any("a bound rather than" in s for s in sentences)
+    assert not any("95 %)" in s for s in sentences if "V_GS of" in s)
 
 
 @pytest.mark.parametrize(
