@@ -6,7 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import (
+    QDialogButtonBox,
+    QFileDialog,
+    QLineEdit,
+    QMessageBox,
+    QWidget,
+)
 
 CLOSING = 50
 """Time in which Qt comes back from a question that was closed, ms."""
@@ -61,7 +67,20 @@ def ask_file(
             then(Path(name))
 
     dialog.fileSelected.connect(chosen)
+    _accept_what_is_typed(dialog)
     dialog.show()
+
+
+def _accept_what_is_typed(dialog: QFileDialog) -> None:
+    """Have the button and Return take any name.
+
+    Qt locks the button for a file of which it has not read yet what it is, and does not
+    unlock it when it has. What it cannot take it says itself.
+    """
+    (name,) = dialog.findChildren(QLineEdit, "fileNameEdit")
+    (box,) = dialog.findChildren(QDialogButtonBox)
+    button = box.buttons()[0]
+    name.textChanged.connect(lambda text: button.setEnabled(bool(text)))
 
 
 def _forget(dialog: QFileDialog) -> None:

@@ -5,6 +5,7 @@ from PySide6.QtGui import QDragEnterEvent, QGuiApplication, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QDialogButtonBox,
     QFileDialog,
     QLineEdit,
     QMessageBox,
@@ -12,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 from shiboken6 import isValid
 
+from gui.ask_file import ask_file
 from gui.dialogs.overlay import Overlay
 from gui.state import WindowState
 
@@ -52,6 +54,19 @@ def test_a_question_of_a_file_dialog_is_not_modal(lab) -> None:
     seen = seen_within(dialog.accept)
     assert seen["asked"] == 1, "Qt says that there is no such folder"
     assert seen["modal"] is None, "or no click would reach STOP"
+    dialog.close()
+
+
+def test_a_file_that_is_typed_fast_can_be_opened(lab) -> None:
+    """Qt had not read yet what it is, and locked the button for good."""
+    window, scene = lab.window, lab.folder / "short.toml"
+    ask_file(window, "Open", print, start=str(lab.folder / "other.toml"))
+    (dialog,) = window.findChildren(QFileDialog)
+    name = dialog.findChild(QLineEdit, "fileNameEdit")
+    name.clear()
+    QTest.keyClicks(name, str(scene))
+    (box,) = dialog.findChildren(QDialogButtonBox)
+    assert box.button(QDialogButtonBox.StandardButton.Open).isEnabled()
     dialog.close()
 
 
