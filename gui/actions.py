@@ -27,6 +27,7 @@ from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
 from gui.menu import GearMenu, MenuActions
+from gui.parts import IconButton
 from gui.preferences import Preferences
 from gui.run_actions import RunActions
 from gui.screen.panels import Panels
@@ -105,17 +106,10 @@ class Actions(QObject):
         self._skin_read.connect(self._show_skin)
         self._skin_failed.connect(self._say_skin)
         panels.header.help_asked.connect(lambda: self.show_help())
-        for button, topic in (
-            (panels.setup.help, "Protocol"),
-            (panels.centre.tools.help, "Lanes"),
-            (panels.centre.log.help, "Steps and log"),
-        ):
-            button.clicked.connect(lambda _=False, topic=topic: self.show_help(topic))
-        panels.review.help.clicked.connect(
-            lambda: self.show_help(
-                ("Results", "Runs", "Manual", "Spikes")[panels.review.tab]
+        for part, button in self._helped:
+            button.clicked.connect(
+                lambda _=False, part=part: self.show_help(self._topic(part))
             )
-        )
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
 
@@ -184,6 +178,7 @@ class Actions(QObject):
                 repeats=True,
             ),
             Shortcut(("X",), "Crosshair", cross, single=True),
+            Shortcut(("L",), "Choose lanes", tools.lanes.click, single=True),
             Shortcut(
                 ("Left",), "Earlier", lambda: self._nudge(-1), single=True, repeats=True
             ),
@@ -263,8 +258,8 @@ class Actions(QObject):
             Shortcut(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
             Shortcut(
                 ("?", "F1"),
-                "Help and shortcuts",
-                lambda: self.show_help(),
+                "Help on the panel that has the keyboard, and shortcuts",
+                self._help_here,
                 single=True,
             ),
         ]
@@ -380,6 +375,38 @@ class Actions(QObject):
         roots = (out.parent / "studies", out)
         opened = self.screen.open_point
         show_studies(self.window, self.panels.theme, roots, opened)
+
+    @property
+    def _helped(self) -> list[tuple[QWidget, IconButton]]:
+        """Panels, and the button of each that asks for help on it."""
+        setup, centre, review = (
+            self.panels.setup,
+            self.panels.centre,
+            self.panels.review,
+        )
+        return [
+            (setup, setup.help),
+            (centre.lanes, centre.tools.help),
+            (centre.record, centre.log.help),
+            (review, review.help),
+        ]
+
+    def _topic(self, part: QWidget) -> str:
+        """Of the help, for a panel."""
+        panels = self.panels
+        if part is panels.review:
+            return ("Results", "Runs", "Manual", "Spikes")[panels.review.tab]
+        if part is panels.setup:
+            return "Protocol"
+        return "Lanes" if part is panels.centre.lanes else "Steps and log"
+
+    def _help_here(self) -> None:
+        """Show the help at the panel that has the keyboard, else its start."""
+        focus = QApplication.focusWidget()
+        inside = [
+            part for part, _ in self._helped if focus and part.isAncestorOf(focus)
+        ]
+        self.show_help(self._topic(inside[0]) if inside else "")
 
     def show_help(self, topic: str = "", page: int = 0) -> None:
         """Show the help: 0 panels, at a topic; 1 shortcuts; 2 about the program."""

@@ -52,9 +52,9 @@ class Tools(QWidget):
             "Monitor: watch the sensor between runs, coil off (Ctrl+M)",
             "Monitor",
         )
-        self.lanes = IconButton(theme, "layers", "Choose lanes")
+        self.lanes = IconButton(theme, "layers", "Choose lanes (L)")
         self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
-        self.help = IconButton(theme, "help", "Help on the lanes")
+        self.help = IconButton(theme, "help", "Help on the lanes (F1 from a lane)")
         self.readout = QLabel()
         self._lay_out()
         self._connect()

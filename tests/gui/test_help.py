@@ -2,6 +2,10 @@
 
 from pathlib import Path
 
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu
+
 from gui.dialogs.help import PANELS, Help
 
 
@@ -22,6 +26,35 @@ def test_each_panel_opens_the_help_at_its_own_topic(lab) -> None:
         assert window.findChild(Help).topic == topic
         window.findChild(Help).hide()
     window.review.show_tab(0)
+
+
+def test_a_key_opens_the_help_at_the_panel_that_has_the_keyboard(lab) -> None:
+    window = lab.window
+    for focus, topic in (
+        (window.setup.form.field("hold"), "Protocol"),
+        (window.centre.stack.rows[0].card, "Lanes"),
+        (window.centre.log.note, "Steps and log"),
+        (window.page, ""),
+    ):
+        focus.setFocus()
+        QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_F1)
+        assert window.findChild(Help).topic == topic
+        window.findChild(Help).hide()
+
+
+def test_lanes_are_chosen_by_keys_alone(lab) -> None:
+    """Their menu could only be clicked."""
+    window = lab.window
+    stack = window.centre.stack
+    key = stack.rows[0].lane.key
+    for hidden in (True, False):
+        window.page.setFocus()
+        QTest.keyClick(window, Qt.Key.Key_L)
+        (menu,) = window.centre.tools.findChildren(QMenu)
+        QTest.keyClick(menu, Qt.Key.Key_Down)
+        QTest.keyClick(menu, Qt.Key.Key_Return)
+        assert stack.is_hidden(key) is hidden
+        lab.app.sendPostedEvents(menu, QEvent.Type.DeferredDelete)
 
 
 def test_every_topic_says_something() -> None:
