@@ -286,7 +286,11 @@ class SerialLink:
         for sent in (*self._echoes, line) if self.wire.echo else ():
             repeated = self._receive(sent)
             if repeated != sent:
-                raise self._bad(sent, repeated.encode())
+                raise BadReplyError(
+                    f"The {self._what} at {self.port} answered {repeated!r} where it "
+                    f"was to repeat {sent!r}. Leave echo out of its dialect row if it "
+                    "has none or it is switched off; else check baud rate and cable."
+                )
         self._echoes.clear()
         answer = self._receive(line, blank)
         if answer == line:

@@ -143,7 +143,11 @@ class FarEnd:
         else:
             answer = self.instrument.line(line)
         faults = self.faults.strike(line, clock.now(), ANSWER_KINDS)
-        return DelayedBytes(*spoilt(answer, line, self.instrument.reply_end, faults))
+        end = self.instrument.reply_end
+        said = DelayedBytes(*spoilt(answer, line, end, faults))
+        if not self.wire.echo:
+            return said
+        return DelayedBytes(said.delay, line + end + said.data)
 
 
 _far_ends: WeakValueDictionary[str, FarEnd] = WeakValueDictionary()

@@ -292,6 +292,16 @@ def test_echo_at_connect_is_named(serial_bench):
         it.coil.open()
 
 
+def test_an_echo_that_does_not_come_is_named(serial_bench):
+    it = serial_bench
+    row = coil_dialect("kepco-bop")
+    wire = row.serial.model_copy(update={"echo": True})
+    row = row.model_copy(update={"serial": wire})
+    coil = CoilSource(row, it.end.url, CoilLimits(), it.clock, baud=19200)
+    with pytest.raises(BadReplyError, match="Leave echo out"):
+        coil.open()
+
+
 @pytest.mark.parametrize("join", [";:", ""])
 def test_a_row_with_echo_reads_past_it(serial_bench, join):
     it = serial_bench

@@ -48,7 +48,17 @@ def wired(row, far_end, clock):
     return plug_in(far_end, row.serial, clock, "row").url
 
 
-@pytest.mark.parametrize("row", COILS, ids=lambda row: row.id)
+def odd_row():
+    """A row that echoes each line and speaks of mA."""
+    row = next(row for row in COILS if row.id == "scpi-generic")
+    changed = {
+        "id": "odd", "current_unit": 1e-3, "digits": 2,
+        "serial": row.serial.model_copy(update={"echo": True}),
+    }  # fmt: skip
+    return row.model_copy(update=changed)
+
+
+@pytest.mark.parametrize("row", [*COILS, odd_row()], ids=lambda row: row.id)
 def test_a_source_made_from_its_row_plays_a_session(row):
     clock, plant = SimulatedClock(), Resistor()
     source = RowCoil(plant, row, clock)
