@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QBuffer, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QImage, QPainter
+from PySide6.QtCore import QBuffer, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QImage, QPainter, QStaticText, QTransform
 from PySide6.QtSvg import QSvgGenerator
 
 from gui.ask_file import ask_file
@@ -79,7 +79,7 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
     simulated = panels.session.bench.spec is None or panels.session.bench.spec.simulated
     if run is not None:
         simulated = run.simulated
-    title = panels.session.name or "plan"
+    title = panels.session.name.removeprefix("Looking at ") or "plan"
     bar = panels.centre.compare_bar
     if run is not None and bar.comparison is run:
         title += f", {bar.comparison.layout.value}"
@@ -173,10 +173,10 @@ def _card(painter: QPainter, row: LaneRow, grey: bool, tokens: Tokens) -> None:
     painter.setPen(QColor(tokens.text))
     painter.setFont(sized(13, QFont.Weight.DemiBold))
     unit = f" / {lane.unit}" if lane.unit else ""
-    short = lane.title if lane.key == "residual" else lane.plain
-    painter.drawText(
-        QRectF(29, 4, CARD - 32, 20), Qt.AlignmentFlag.AlignVCenter, short + unit
-    )
+    words = QStaticText(lane.title + unit)  # V_C1 with its subscript, as on screen
+    words.setTextFormat(Qt.TextFormat.RichText)
+    words.prepare(QTransform(), painter.font())
+    painter.drawStaticText(QPointF(29, 14 - words.size().height() / 2), words)
 
 
 def table(stack: LaneStack, title: str) -> str:

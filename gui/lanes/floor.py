@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import pyqtgraph as pg
@@ -152,19 +153,32 @@ def hold_names(painter: QPainter, stage: LaneContext) -> None:
             paint.write(painter, QPointF(left + 5, 10), text, stage.tokens.muted)
 
 
+def note_texts(painter: QPainter, stage: LaneContext) -> None:
+    """As much of the text of each note as there is room for, beside its flag.
+
+    On a ground of its own: lines of the grid would strike it through.
+    """
+    frame, tokens = stage.whole(), stage.tokens
+    notes = sorted(n for n in stage.source.notes if frame.start <= n[0] <= frame.end)
+    places = [round(frame.x1(time)) + 0.5 for time, _ in notes]
+    ends = pairwise([*places, frame.right])
+    for (_, text), (x, after) in zip(notes, ends, strict=True):
+        text = paint.shortened(text, min(after - x, FLAG) - 12)
+        at = QPointF(x + 8, frame.top + 23)
+        if text:
+            paint.write_on(painter, at, text, tokens.accent, tokens.plot)
+
+
 def _flags(
     painter: QPainter, frame: Frame, notes: list[tuple[float, str]], tokens: Tokens
 ) -> None:
-    """A flag at the time of each note, with as much of its text as there is room."""
+    """A flag at the time of each note; `note_texts` writes what it says."""
     inside = sorted(note for note in notes if frame.start <= note[0] <= frame.end)
     places = [round(frame.x1(time)) + 0.5 for time, _ in inside]
-    for number, (_, text) in enumerate(inside):
-        x, following = places[number], [*places, frame.right][number + 1]
+    for x in places:
         painter.setPen(paint.pen(tokens.accent, Qt.PenStyle.DashLine))
         painter.drawLine(QLineF(x, frame.top, x, frame.bottom))
         painter.fillRect(QRectF(x, frame.top + 17, 4, 12), QColor(tokens.accent))
-        text = paint.shortened(text, min(following - x, FLAG) - 12)
-        paint.write(painter, QPointF(x + 8, frame.top + 23), text, tokens.accent)
 
 
 def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:

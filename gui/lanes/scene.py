@@ -20,7 +20,15 @@ from PySide6.QtGui import (
 
 from gui.lanes import paint
 from gui.lanes.box import LaneBox
-from gui.lanes.floor import AXIS, TIME_AXIS, Background, LaneContext, Layer, hold_names
+from gui.lanes.floor import (
+    AXIS,
+    TIME_AXIS,
+    Background,
+    LaneContext,
+    Layer,
+    hold_names,
+    note_texts,
+)
 from gui.lanes.paint import Frame
 from gui.lanes.readings import values_at
 from gui.look.fonts import sized
@@ -64,6 +72,7 @@ class Marks(Layer):
         frame, source = stage.whole(), stage.source
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         hold_names(painter, stage)
+        note_texts(painter, stage)
         if source.running and frame.start <= source.reach <= frame.end:
             pen = paint.pen(tokens.border_strong)
             self._upright(painter, frame.x1(source.reach), pen)

@@ -127,7 +127,8 @@ class LogView(QWidget):
         self.note.setMaximumWidth(280)
         self.table = LogTable(self.filter)
         self.title = label("Run log", "title")
-        top = (self.title, self.choices, STRETCH, (self.note, 1), self.help)
+        # its hint says where a note goes: it has the room first
+        top = (self.title, self.choices, (STRETCH, 0), (self.note, 1), self.help)
         column(self, row(*top, spacing=10), (self.table, 1))
         self.choices.group.idClicked.connect(self._chosen)
         self.note.returnPressed.connect(self._noted)

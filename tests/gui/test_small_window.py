@@ -89,6 +89,11 @@ def test_the_tools_fit_between_both_panels(lab, small) -> None:
     words = tools.widths.group.buttons()
     assert all(one.width() >= one.minimumSizeHint().width() for one in words)
     assert tools.fit.isVisible(), "no more is left out than needs to be"
+    small.resize(1180, 720)
+    small.fold(small.setup, False)
+    lab.app.processEvents()
+    note, hint = small.centre.log.note, "Note on the run in progress …  (N)"
+    assert note.width() >= note.fontMetrics().horizontalAdvance(hint) + 26
     small._folds = dict.fromkeys(small._folds)  # nobody has folded one by hand
 
 
