@@ -49,9 +49,8 @@ SETTLE = 250
 """Milliseconds without a keystroke before the plan is computed anew."""
 
 
-WARNINGS, TALL = 3, 800
-"""Warnings shown where the panel is so high, px, else one; the tool tip has them all,
-and the log as the run begins."""
+WARNINGS = 3
+"""Warnings shown; the tool tip has them all."""
 
 
 class SetupPanel(QFrame):
@@ -322,11 +321,7 @@ class SetupPanel(QFrame):
 
     def _show_warnings(self, warnings: Sequence[str]) -> None:
         """Show where the bench cannot deliver what is asked."""
-        shown = warnings[: WARNINGS if self.height() >= TALL else 1]
-        more = f" (and {len(warnings) - len(shown)} more)" * (
-            len(warnings) > len(shown)
-        )
-        say(self.warnings, "\n".join(f"⚠ {text}" for text in shown) + more)
+        say(self.warnings, "\n".join(f"⚠ {text}" for text in warnings[:WARNINGS]))
         self.warnings.setToolTip("\n".join(warnings))
 
     def _page(self) -> QScrollArea:
@@ -335,7 +330,7 @@ class SetupPanel(QFrame):
         caption = row(label("WAVEFORM", "section"), STRETCH, axes, spacing=6)
         inner, title = QWidget(), label("PARAMETERS", "section")
         force = (self.about, caption, self.preview)
-        asked = (title, self.form, self.tables)
+        asked = (title, self.form, self.tables, self.warnings)
         inside = column(inner, *force, *asked, STRETCH, spacing=9)
         return with_gutter(scrolling(inner), inside)
 
@@ -356,7 +351,6 @@ class SetupPanel(QFrame):
             page,
             self.queue,
             self.problem,
-            self.warnings,
             line(),
             self.estimate,
             self.buttons,
