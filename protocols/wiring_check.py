@@ -33,6 +33,8 @@ Mains = Annotated[float, Unit("Hz", above=0.0, most=100.0)]
 Window = tuple[float, float]
 CODE = 40e-3
 """One code where a run does not tell, V."""
+QUIET = ("0 V", "V_S", "rest")
+"""Windows in which a voltage stands still: its scatter there is noise."""
 
 
 class WiringCheck(Protocol):
@@ -85,7 +87,7 @@ class WiringCheck(Protocol):
         rest, push = (_found(run, windows[w], calibrations) for w in ("rest", "push"))
         expected = _expected(run, run.circuit, windows)
         bands = {
-            t.signal: _bands(run, t, calibrations.get(t.signal))
+            t.signal: _bands(run, t, calibrations.get(t.signal), windows)
             for t in run.traces
             if t.signal in NODES
         }
@@ -113,7 +115,7 @@ class WiringCheck(Protocol):
         sentences += [f"{name}: {c.text}." for name, c in calibrations.items()]
         found = Conclusion(tuple(sentences), {"channels": channels})
         if "V_C1" in rest and all(v.ok for v in verdicts if v.signal == "V_C1"):
-            found += _gate(run, run.circuit, rest["V_C1"], calibrations.get("V_C1"))
+            found += _gate(run, run.circuit, rest["V_C1"], bands["V_C1"][0])
         return found
 
     def _hum(
@@ -138,20 +140,31 @@ class WiringCheck(Protocol):
 
 def _window(trial: MeasuredTrial) -> Window:
     start, end = trial.held or (trial.start, trial.start + trial.duration)
-    # the second half: the followers and node A have settled
-    return (start + end) / 2, end
+    # the second half: the followers and node A have settled. Not its last instants: the
+    # record's last value there may reach into what comes next
+    return (start + end) / 2, end - 0.02 * (end - start)
 
 
-def _known(run: Measurement, trace: RecordedSignal) -> float:
-    """Half of the 95 % band of a mean: what a converter's steps may leave, V."""
-    return run.step_bias(trace.signal) if trace.code else CODE / 2
+def _known(
+    run: Measurement, trace: RecordedSignal, windows: Mapping[str, Window]
+) -> float:
+    """Half of the band of a mean, V: what converter's steps and noise may leave."""
+
+    def left(window: Window) -> float:
+        steps = run.step_bias(trace.signal, *window) if trace.code else CODE / 2
+        return steps + Z95 * run.error_of_mean(trace.signal, *window)
+
+    return max(left(windows[name]) for name in QUIET if name in windows)
 
 
 def _bands(
-    run: Measurement, trace: RecordedSignal | None, known: ChannelCalibration | None
+    run: Measurement,
+    trace: RecordedSignal,
+    known: ChannelCalibration | None,
+    windows: Mapping[str, Window],
 ) -> tuple[float, float]:
-    """Halves of the 95 % bands of a voltage's mean and of a change of it, V."""
-    one = CODE if trace is None else _known(run, trace)
+    """Halves of the bands of a voltage's mean and of a change of it, V."""
+    one = _known(run, trace, windows)
     # without a calibration the channel's offset may be a code; a change knows neither
     return Z95 * known.error if known else math.hypot(one, CODE), 2 * one
 
@@ -172,7 +185,7 @@ def _calibrated(
         )
         try:
             found[trace.signal] = calibrate_channel(
-                low, high, circuit.V_S, _known(run, trace)
+                low, high, circuit.V_S, _known(run, trace, windows)
             )
         except NotIdentifiableError as reason:
             faults[trace.signal] = str(reason)
@@ -222,13 +235,10 @@ def _expected(
     return SignalLevels(levels[0], levels[1])
 
 
-def _gate(
-    run: Measurement, circuit: Circuit, V_C1: float, known: ChannelCalibration | None
-) -> Conclusion:
-    """V_GS that explains V_C1 at rest."""
+def _gate(run: Measurement, circuit: Circuit, V_C1: float, half: float) -> Conclusion:
+    """V_GS that explains V_C1 at rest, whose band has half this width, V."""
     from tactile_lab.model.equations import rest_V_C1
 
-    half, _ = _bands(run, run.trace("V_C1"), known)
     try:
         gate = explaining_V_GS(circuit, V_C1, half / Z95, run.displaced)
     except NotIdentifiableError as reason:

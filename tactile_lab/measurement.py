@@ -310,6 +310,19 @@ class Measurement:
         inside = (trace.time >= start) & (trace.time <= end)
         return float(trace.mean[inside].mean()) if inside.any() else float("nan")
 
+    def error_of_mean(self, signal: str, start: float, end: float) -> float:
+        """Standard error of a signal's mean in [start, end] s by its scatter, SI.
+
+        0 with fewer than two values there. A hum, a ramp or steps count as scatter.
+        """
+        trace = self.trace(signal)
+        if trace is None:
+            return 0.0
+        values = trace.mean[(trace.time >= start) & (trace.time <= end)]
+        if values.size < 2:
+            return 0.0
+        return float(values.std(ddof=1) / np.sqrt(values.size))
+
     def left_range(self, signal: str, start: float, end: float) -> bool:
         """Whether a signal left its channel's range within [start, end] s."""
         trace = self.trace(signal)
@@ -318,12 +331,18 @@ class Measurement:
         begins, ends = trace.overrange.T
         return bool(np.any((begins <= end) & (ends >= start)))
 
-    def step_bias(self, signal: str) -> float:
-        """How far means of a signal may be off by its converter's steps, SI."""
+    def step_bias(
+        self, signal: str, start: float = -math.inf, end: float = math.inf
+    ) -> float:
+        """How far means of a signal may be off by its converter's steps, SI.
+
+        By its noise in [start, end] s, of the whole run unless given.
+        """
         trace = self.trace(signal)
         if trace is None or trace.code is None:
             return 0.0
-        return step_bias(trace.mean, trace.code, trace.samples)
+        inside = (trace.time >= start) & (trace.time <= end)
+        return step_bias(trace.mean[inside], trace.code, trace.samples)
 
     def applied_edge(self, trial: MeasuredTrial) -> float | None:
         """When the force came within 1 % of that of the hold, s of run time, or None.

@@ -75,7 +75,8 @@ class ChannelCalibration:
     Attributes:
         offset: shown at 0 V, V.
         gain: volts shown per volt.
-        known: half of the 95 % band of one mean, V: what the converter's steps leave.
+        known: half of the band of one mean, V: what the converter's steps and the
+            noise leave.
         supply: at which the gain was taken, V.
     """
 
@@ -114,7 +115,7 @@ class ChannelCalibration:
         said = (
             f"offset {plus_minus(self.offset, self.known, 'V')}, gain "
             f"{plus_minus(self.gain, self.gain_known)} by 0 V and V_S (bounds: a "
-            "converter's steps)"
+            "converter's steps and the noise)"
         )
         if self.corrects:
             return f"{said}, corrected"

@@ -40,6 +40,10 @@ def test_a_right_bench_passes_and_tells_its_v_gs(tmp_path):
         assert channels[signal]["gain"] == pytest.approx(1, abs=0.02)
         assert abs(channels[signal]["offset_V"]) < 0.025
         assert channels[signal]["hum_V"] < 0.01
+    # a probe on 0 V has none of the noise that smooths V_K's steps at rest
+    assert channels["V_K"]["offset_uncertainty_V_95"] > 0.019
+    # the whole window shows 0 V, nothing of V_S that comes after it: half a code
+    assert channels["V_K"]["offset_V"] == pytest.approx(-10 / 508, rel=1e-6)
     gate = values["V_GS"]
     assert gate["low_95"] < 1.4 < gate["high_95"]
     assert gate["high_95"] - gate["low_95"] < 0.1  # tens of mV: 8 bits over 10 V
@@ -67,7 +71,7 @@ def test_a_right_bench_passes_and_tells_its_v_gs(tmp_path):
         ({"attenuation": {"A": 10.0}}, {"V_C1": "10 times too little"}),
         ({"attenuation": {"B": 0.1}}, {"V_C2": "times too much"}),
         ({"attenuation": {"D": 10.0}}, {"coil_current": "10 times too little"}),
-        ({"attenuation": {"D": 1.9}}, {"coil_current": "times: check the shunt"}),
+        ({"attenuation": {"D": 1.9}}, {"coil_current": "52 % of it: check the shunt"}),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )  # fmt: skip
