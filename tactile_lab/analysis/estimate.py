@@ -122,11 +122,16 @@ class Line:
         slope = float(np.sum(apart * y) / spread)
         left = y - mean - slope * apart
         scatter = math.sqrt(float(np.sum(left**2)) / freedom)
+        offset = mean - slope * middle
+        # of points on a line, only what rounding leaves: no error, and no offset
+        least = 16 * np.finfo(float).eps * float(np.abs(y).max())
+        scatter = scatter if scatter > least else 0.0
+        offset = offset if abs(offset) > least else 0.0
         error = scatter * math.sqrt(1 / x.size + middle**2 / spread)
         return cls(
             Estimate.of(slope, scatter / math.sqrt(spread), freedom),
             (middle, mean),
-            Estimate.of(mean - slope * middle, error, freedom),
+            Estimate.of(offset, error, freedom),
             scatter,
             spread,
         )

@@ -50,7 +50,7 @@ def test_a_calibration_from_what_is_read_off(tmp_path, given):
     with Run.load(done.folder) as run:
         assert run.field["field"] == pytest.approx([float(b) * 1e-3 for b in SHOWN])
     told = " ".join(find(read(done.folder)).conclusion.sentences)
-    assert "10.8 mT/A" in told and "500 µT" in told
+    assert "10.8 mT/A, from 0 T at 0 A" in told and "500.0 ± 6.9 µT" in told
     if given == "by a person":
         assert "shows at 1 A, in mT" in person.asked[0]
         assert len(person.asked) == 13

@@ -1,6 +1,7 @@
 """Full disks, slow disks and crowded folders end in a message, with the data kept."""
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -11,7 +12,6 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import RecordingError
-from tactile_lab.store import folder as folder_module
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
@@ -114,7 +114,7 @@ def test_the_reserve_stops_a_run_and_keeps_its_data(bench, folder, layout, monke
     recorder.segment(bench.stream(), 0.0)
     recorder.append(bench.block(made, 0, 2048))
     usage = type("Usage", (), {"free": 0})
-    monkeypatch.setattr(folder_module.shutil, "disk_usage", lambda path: usage)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
     with pytest.raises(RecordingError, match="Free some space"):
         recorder.append(bench.block(made, 2048, 2500))
     monkeypatch.undo()
