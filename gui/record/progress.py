@@ -13,6 +13,9 @@ from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, row
 from gui.state import Snapshot, WindowState, minutes
 
+ENDS = {"Complete": "green", "Aborted": "amber", "Faulted": "red"}
+"""Colour of a run that is over, by the first word of how it ended."""
+
 
 class Blocks(QWidget):
     """One block per step; done ones are filled. A click shows one in the lanes."""
@@ -124,10 +127,7 @@ class ProgressStrip(QWidget):
         if state.in_run:
             self._running(snapshot, holds, length, reach, trial)
         else:
-            if ending.startswith("Complete"):
-                colour = "green"
-            elif ending.startswith("Aborted"):
-                colour = "amber"
+            colour = ENDS.get(ending.partition(" ")[0], colour)
             self._left.setText(ending or "No run yet")
             shown = ending and kept
             self._right.setText(f"{reach:.1f} s kept" if shown else "")

@@ -7,7 +7,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 
 from gui.look.theme import Theme
-from gui.parts import STRETCH, Segments, column, label, row
+from gui.parts import SCROLL_BAR, STRETCH, Segments, column, label, row
 from gui.plots.numbers import unbroken
 from gui.plots.small_plot import SmallPlot
 from gui.session.session import Session
@@ -28,6 +28,8 @@ HIGHEST = 420
 POINTS = 300
 """Of the density as it is drawn."""
 
+FIRST = "No spectrum yet. The first comes once\nenough of the signal was watched."
+
 
 class NoiseView(QWidget):
     """Shown while the sensor is monitored; asks the engine every two seconds."""
@@ -39,11 +41,12 @@ class NoiseView(QWidget):
         title = label("Noise", "title")
         self.signals = Segments(list(SIGNALS), "Signal whose noise is shown")
         self.signals.choose(0)
-        self.plot = SmallPlot(theme)
+        self.plot = SmallPlot(theme, FIRST)
         self.plot.setMaximumHeight(HIGHEST)
         self.said = label("", "", wrap=True)
         head = row(title, STRETCH, self.signals)
-        column(self, head, (self.plot, 1), self.said, STRETCH, spacing=9)
+        parts = head, (self.plot, 1), self.said, STRETCH
+        column(self, *parts, spacing=9).setContentsMargins(0, 0, SCROLL_BAR, 0)
         self.signals.group.idClicked.connect(self._ask)
         timer = QTimer(self)
         timer.timeout.connect(self._ask)
@@ -55,7 +58,7 @@ class NoiseView(QWidget):
 
     def show_noise(self, signal: str, found: Noise | None, problem: str = "") -> None:
         """Show the spectrum of a signal, or why there is none."""
-        self.plot.nothing = problem or "watching …"
+        self.plot.nothing = problem or FIRST
         self.plot.show_plot(None if found is None else spectrum_plot(signal, found))
         self.said.setText("" if found is None else unbroken(told(signal, found)))
 

@@ -127,7 +127,8 @@ class ResultsView(QWidget):
         self, steps: Sequence[MeasuredTrial], *, total: int, running: bool, whole: bool
     ) -> None:
         """Show what the steps so far gave; `whole` is whether the run was completed."""
-        self.cards.mark_old(len(steps) > len(self._steps))
+        if len(steps) != len(self._steps):  # the same ones again are not yet fitted
+            self.cards.mark_old(len(steps) > len(self._steps))
         self._steps, self._model, self._laws = tuple(steps), (), ()
         self._show_rates()
         self._fill(steps)

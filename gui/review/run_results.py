@@ -109,6 +109,7 @@ class RunResults(QObject):
         self._elsewhere = source.moves_probes
         self._view.show_kind(fires="spikes" in source.signals)
         self._show(running=False)
+        self._show_fit(None)  # those of the run before
         self._fit(source)
         self._view.show_loop(source.loop)
         report = (source.path / "report.html").exists()

@@ -111,7 +111,9 @@ class FrameLoop(QObject):
         elif bar.isVisible():
             bar.hide()
         panels.centre.tools.show_monitor(on=monitor.alive)
-        panels.review.show_monitor(on=monitor.alive)
+        # also once it has ended: results of a run would lie beside lanes of none
+        seen = panels.centre.stack.source is monitor.source
+        panels.review.show_monitor(on=monitor.alive or seen)
 
     def _keep_budget(self, cost: float) -> None:
         self.costs.append(cost)

@@ -45,3 +45,10 @@ def test_record_keeps_what_the_monitor_saw(lab) -> None:
     lab.until(lambda: not window.centre.monitor_bar.isVisible())
     lab.until(lambda: window.centre.progress.text.startswith("Monitor: only Record"))
     assert session.name == "Monitor", "what is in the lanes is not the last run"
+    noise = window.review.noise
+    window.review.show_tab(0)
+    assert noise.isVisible(), "nor are results of it beside them"
+    lab.app.processEvents()
+    right = noise.mapTo(window, noise.signals.geometry().bottomRight()).x()
+    tab = window.review.help
+    assert right == tab.mapTo(window, tab.rect().bottomRight()).x()

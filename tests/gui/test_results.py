@@ -103,6 +103,8 @@ def test_cards_without_the_newest_step_are_pale(results: ResultsView) -> None:
     three = steps(3)
     assert results.cards.old, "they say that one step fired, beside a plot of two"
     assert "newest" in results.cards.toolTip()
+    results.show_steps(three, total=3, running=False, whole=True)
+    assert results.cards.old, "the run has ended, and the fit is still on its way"
     fitted(three)
     assert not results.cards.old and not results.cards.toolTip()
 

@@ -1,5 +1,7 @@
 import pytest
 
+from gui.look.theme import Theme
+from gui.record.progress import ProgressStrip
 from gui.state import (
     STALE,
     CoilKnowledge,
@@ -92,3 +94,16 @@ def test_durations() -> None:
 def test_clock_shows_elapsed_and_expected() -> None:
     running = Snapshot(state=WindowState.RUNNING, elapsed=23.4, expected=41.0)
     assert clock_text(running) == ("RUNNING", "00:23.4 / 00:41")
+
+
+@pytest.mark.parametrize(
+    ("ending", "colour"),
+    [("Complete", "green"), ("Aborted", "amber"), ("Faulted", "red"), ("", "accent")],
+)
+def test_a_run_that_is_over_has_the_colour_of_its_end(app, ending, colour) -> None:
+    """Once acknowledged, a fault's steps were blue, as those of a run in progress."""
+    strip = ProgressStrip(Theme("light"))
+    snapshot = Snapshot(state=WindowState.READY)
+    told = f"{ending} · some run" if ending else ""
+    strip.show_run(snapshot, [], 1.0, 1.0, None, told)
+    assert strip.blocks._colour == colour
